@@ -204,10 +204,13 @@ def drawing_set(
         sheets += table_sheets("Supports", *_rows(listed, decimals, forces), sheet)
     flat = None
     if schedule is not None:
-        sheets += table_sheets("Families of panels", *_rows(_families(schedule), decimals), sheet)
-    if schedule is not None and panel_sheets:
-        flat = flat_panels(schedule, millimetres)
-        sheets += panels_at_true_size(schedule, sheet, millimetres)
+        listed = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
+        listed = listed.assign(family=[f"F{k}" for k in listed["family"]])
+        listed = listed.rename(columns={"count": "panels", "mirrored": "turned over"})
+        sheets += table_sheets("Families of panels", *_rows(listed, decimals), sheet)
+        if panel_sheets:
+            flat = flat_panels(schedule, millimetres)
+            sheets += panels_at_true_size(schedule, sheet, millimetres)
     part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
     add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
@@ -266,13 +269,6 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
         profiles.append((views.profile(surface, title, ends[0], along, found), found))
     return profiles
-
-
-def _families(schedule: Panels) -> pd.DataFrame:
-    """The families as they are listed."""
-    listed = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
-    shown = listed.assign(family=[f"F{k}" for k in listed["family"]])
-    return shown.rename(columns={"count": "panels", "mirrored": "turned over"})
 
 
 def _rows(

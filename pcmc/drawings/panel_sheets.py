@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..panels import Panels
-from ..panels.nesting import packed, turned_to_fit
+from ..panels.flat import packed, turned_to_fit
 from .sheet import WIDTH, Line, Sheet, Text, corner, room, table_sheets
 
 
@@ -72,9 +72,8 @@ def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: 
     family = f"F{schedule.panels['family'].iloc[k]}"
     most = 1.2 * radius / (WIDTH * max(len(number), len(family)))
     height = min(max(12.0, 0.15 * radius), 0.4 * radius, most)
-    x, y = map(float, middle)
-    sheet.texts.append(Text((x, y + 0.2 * height), number, height, align="C"))
-    sheet.texts.append(Text((x, y - 0.9 * height), family, 0.6 * height, align="C"))
+    sheet.texts.append(Text(middle + np.array([0.0, 0.2 * height]), number, height, align="C"))
+    sheet.texts.append(Text(middle - np.array([0.0, 0.9 * height]), family, 0.6 * height, align="C"))
     for j in range(3):
         small = min(4.0, 0.25 * radius, 0.7 * lengths[j] / (WIDTH * len(labels[j])))
         along = edges[j] / lengths[j]
@@ -82,5 +81,4 @@ def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: 
         at = 0.5 * (corners[j - 1] + corners[j - 2]) + small * inward
         turn = float(np.degrees(np.arctan2(along[1], along[0])))
         turn += 180.0 if not -90.0 < turn <= 90.0 else 0.0
-        x, y = map(float, at)
-        sheet.texts.append(Text((x, y), labels[j], float(small), "PCMC-LABEL", "C", turn))
+        sheet.texts.append(Text(at, labels[j], float(small), "PCMC-LABEL", "C", turn))

@@ -54,7 +54,10 @@ def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families
     >>> families(triangles, 0.01, apart=True).family.tolist()
     [0, 0, 1]
     """
-    orders = _canonical_orders(lengths, apart)  # (m,w,3)
+    orders = np.argsort(lengths, axis=1, kind="stable")[:, None]  # (m,w,3) that are tried: these differ least
+    if apart:  # the three turns, the least one first
+        turned = lengths[:, TURNS]
+        orders = TURNS[np.lexsort((turned[..., 2], turned[..., 1], turned[..., 0]), axis=1)]
     points = np.take_along_axis(lengths[:, None], orders, axis=2)
     rank = np.lexsort(points[:, 0].T[::-1])  # equal triangles are interchangeable
     at_least = _incompatible(points[rank], tolerance)
@@ -81,15 +84,6 @@ def family_of_face(surface: Surface) -> Floats:
         lengths = np.linalg.norm(edge_vectors(surface.vertices[surface.faces[roof]]), axis=2)
         family[roof] = 1 + families(lengths, ALIKE * float(lengths.mean())).family
     return family
-
-
-def _canonical_orders(lengths: Floats, apart: bool) -> Ints:
-    """(m,w,3) the orders of edges that are tried: ascending; or the three turns, the least one first."""
-    if not apart:  # sorted lengths differ least
-        return np.argsort(lengths, axis=1, kind="stable")[:, None]
-    turned = lengths[:, TURNS]
-    by_length = np.lexsort((turned[..., 2], turned[..., 1], turned[..., 0]), axis=1)
-    return TURNS[by_length]
 
 
 def _numbered(family: Ints, aligned: Floats) -> Ints:

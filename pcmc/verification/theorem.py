@@ -45,6 +45,7 @@ STEPS = 8  # of inverse iteration for the least eigenvalue: within some tens of 
 SHARE = 0.5  # of that estimate is σ first; a quarter of it after each failure
 TRIES = 4
 REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
+LEVEL = 1e-9  # of a unit motion along Π: a part across it that is rounding
 MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
 
 
@@ -64,6 +65,7 @@ class Theorem:
     beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
     symmetric_in, volumes_kept : the mirror planes that motions are symmetric in, the rooms whose volumes they
         keep: index and gap are about such motions.
+    rigid : the rigid motions that no support resists: it is alone, and so on, but for these.
     spare : how much of their walls' capacity resting vertices have left, at least; None without any.
     """
 
@@ -79,6 +81,7 @@ class Theorem:
     symmetric_in: tuple[str, ...] = ()
     volumes_kept: tuple[str, ...] = ()
     spare: float | None = None
+    rigid: int = 0
 
     def __str__(self) -> str:
         return self.text()
@@ -98,12 +101,13 @@ class Theorem:
         volumes = f"keep the volume of {', '.join(self.volumes_kept)}" if self.volumes_kept else ""
         motions = " and ".join(filter(None, (planes, volumes)))
         among = f", among motions that {motions}" if motions else ""
+        still = f", but for its {self.rigid} free rigid motions," if self.rigid else ""
         rests = "" if self.spare is None else f"; walls rest where these do, with {self.spare:.1%} to spare"
         return (
             f"proved: an exact equilibrium of this mesh is within {self.radius:.1e}{length} of its vertices,"
-            f" and no other within {self.unique_within:.1e}{length}; its Morse index is exactly {self.index}"
-            f"{among}, and no eigenvalue of its second variation is within {self.gap:.2g}{tension} of zero"
-            f"{rests}"
+            f" and no other{still} within {self.unique_within:.1e}{length}; its Morse index is exactly"
+            f" {self.index}{among}, and no eigenvalue of its second variation is within"
+            f" {self.gap:.2g}{tension} of zero{rests}"
         )
 
 
@@ -139,8 +143,10 @@ def verify(surface: Surface) -> Theorem:
 def _proved(surface: Surface) -> Theorem:
     part = standing_part(surface)
     space = motion_space(part.surface, part.classes, part.surface.vertices)
-    _refuse(part, space)
-    found = system(part, space)
+    rigid = rigid_motions(part.surface)
+    free = rigid_modes(space, rigid, part.surface.vertices)
+    _refuse(part, space, rigid if free.shape[1] else rigid[:0])
+    found = system(part, space, free)
     _refuse_moving(part, found)
     index, gap = _inertia(found)
     beta = SAFE / gap
@@ -180,19 +186,23 @@ def _proved(surface: Surface) -> Theorem:
         symmetric_in=mirrors,
         volumes_kept=rooms,
         spare=spare,
+        rigid=free.shape[1],
     )
 
 
-def _refuse(part: StandingPart, space: MotionSpace) -> None:
-    """Refuse what the theorem does not cover."""
+def _refuse(part: StandingPart, space: MotionSpace, rigid: Floats) -> None:
+    """Refuse what the theorem does not cover, such as free rigid motions (k,2,3) that change E."""
     surface = part.surface
     if not space.size:
         raise _Unproved("no vertex can move")
     if any(space.dimension[along].any() for _, along in surface.on_circle):
         raise _Unproved("vertices slide along a circle, and the frozen frames are straight")
-    free = rigid_modes(space, rigid_motions(surface), surface.vertices).shape[1]
-    if free:
-        raise _Unproved(f"no support resists {free} of its rigid motions, so equilibria are not isolated")
+    n = np.array(surface.plane.normal)
+    level = (
+        not len(rigid) or max(np.abs(rigid[:, 0] @ n).max(), np.abs(np.cross(rigid[:, 1], n)).max()) < LEVEL
+    )
+    if len(rigid) and (surface.uncancelled.any() or (surface.weights.any() and not level)):
+        raise _Unproved("its weight or pressure pushes along rigid motions that no support resists")
 
 
 def _refuse_moving(part: StandingPart, found: System) -> None:
@@ -208,7 +218,7 @@ def _refuse_moving(part: StandingPart, found: System) -> None:
 
 def _inertia(found: System) -> tuple[int, float]:
     """The Morse index, and g: no eigenvalue of K is within g of zero."""
-    pattern, data, rooms = found.pattern, found.matrix, len(found.scales)
+    pattern, data = found.pattern, found.matrix
     solver = factoriser(pattern, "superlu")
     rough = solver.factor(data)
     x = np.cos(1.618 * np.arange(pattern.size))
@@ -230,7 +240,7 @@ def _inertia(found: System) -> tuple[int, float]:
                 counts.append(int(np.count_nonzero(lu.U.diagonal() < 0.0)))
         gap = (sigma - (max(errors) + found.matrix_error) * SAFE) / SAFE
         if len(set(counts)) == 1 and gap > 0.0:
-            return counts[0] - rooms, gap
+            return counts[0] - found.borders, gap
         reason = f"{min(counts)} to {max(counts)} eigenvalues below ∓{sigma:.1e}"
         if gap <= 0.0:
             reason = f"rounding, {sigma - gap:.1e}, hides eigenvalues as near to zero as {sigma:.1e}"
