@@ -300,7 +300,7 @@ def unheld(surface: Surface) -> Unheld | None:
     resting = surface.held.copy()
     resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
     falling = np.setdiff1d(parts[surface.faces[surface.weights[patch] > 0.0, 0]], parts[resting])
-    if len(falling):
+    if len(falling) and not (surface.weights < 0.0).any():
         return Unheld(int(np.flatnonzero(parts == falling[0])[0]), falls=True)
     for part, pressed in _scaled(surface):
         if not pressed and surface.tensions[patch[parts[surface.faces[:, 0]] == part]].any():
