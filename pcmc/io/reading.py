@@ -98,8 +98,12 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
     if not given:
         some = f" of {', '.join(map(repr, data.bare))}" if len(data.bare) < len(data.patches) else ""
         values = f"tensions and pressures{some} are 1 unless given"
-        said = {NO_SUPPORTS: data.support is None, values: data.bare, NO_UNIT: data.bare and not data.units}
-        notes = (*notes, *(text for text, true in said.items() if true))
+        hints = {
+            NO_SUPPORTS: data.support is None,
+            values: data.bare,
+            NO_UNIT: data.bare and not data.units,
+        }
+        notes = (*notes, *(text for text, true in hints.items() if true))
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
