@@ -18,7 +18,7 @@ from ..advice.masts import mast_note
 from ..advice.rises import Rise, take_rises, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
-from ..base.files import check_name, check_regular, system_error
+from ..base.files import as_path, check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
@@ -154,7 +154,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
         For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
         and for a roof held at single points inside.
     """
-    path = Path(path)
+    path = as_path(path)
     if not is_project(path):
         return Project(path, mesh=mesh_file(path), units=Units(units))
     text, data = read_data(path, units)
