@@ -63,22 +63,22 @@ class DrawingSet:
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
-        works: list[tuple[Path, Callable[[Path], None]]] = []
+        jobs: list[tuple[Path, Callable[[Path], None]]] = []
         document: Any = None
         for path in map(Path, paths):
             suffix = check_suffix(path)
             if document is None:
                 document = dxf.document(self)
             if suffix == ".dxf":
-                works.append((path, document.saveas))
+                jobs.append((path, document.saveas))
             elif suffix == ".pdf":
-                works.append((path, partial(pdf.write_pdf, self.sheets)))
+                jobs.append((path, partial(pdf.write_pdf, self.sheets)))
             else:
                 many = len(self.sheets) > 1
                 for k in range(len(self.sheets)):
                     one = path.with_name(f"{path.stem}-{k + 1}{path.suffix}") if many else path
-                    works.append((one, partial(dxf.write_svg, document, k)))
-        return works
+                    jobs.append((one, partial(dxf.write_svg, document, k)))
+        return jobs
 
     def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
         """Write .dxf, .pdf (a page per sheet) and .svg (a file NAME-1.svg and so on per sheet).
@@ -89,12 +89,12 @@ class DrawingSet:
         ------
         FileError : for another suffix, or a file that cannot be written.
         """
-        works = self.files(*paths)
-        with atomic_writes([path for path, _ in works]) as temporaries:
-            for (path, write), temporary in zip(works, temporaries, strict=True):
+        jobs = self.files(*paths)
+        with atomic_writes([path for path, _ in jobs]) as temporaries:
+            for (path, write), temporary in zip(jobs, temporaries, strict=True):
                 with writing(path):
                     write(temporary)
-        return [path for path, _ in works]
+        return [path for path, _ in jobs]
 
 
 def drawing_set(

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..panels import Panels
 from ..panels.flat import packed, turned_to_fit
-from .sheet import WIDTH, Line, Sheet, Text, corner, room, table_sheets
+from .sheet import WIDTH, Line, Sheet, Text, corner, drawing_area, table_sheets
 
 
 def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]:
@@ -17,7 +17,7 @@ def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]
 
     Those that fit no sheet at true size are listed on sheets of their own; ``flat_panels`` has them.
     """
-    labels, (wide, high) = _labels(schedule), room(name)
+    labels, (wide, high) = _labels(schedule), drawing_area(name)
     turned = {k: turned_to_fit(panel, wide, high) for k, panel in enumerate(schedule.flat * millimetres)}
     fit = {k: panel for k, panel in turned.items() if panel is not None}
     sheets: list[Sheet] = []

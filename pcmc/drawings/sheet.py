@@ -129,7 +129,9 @@ class Sheet:
         return self.lines + [line for lines, _ in parts for line in lines], self.texts + [t for _, t in parts]
 
 
-def apart(labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed: bool = True) -> list[Text]:
+def place_labels(
+    labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed: bool = True
+) -> list[Text]:
     """Labels at or beside their places, so that none covers another text.
 
     One without room within ``rings`` steps of its height stays at its place if it is needed, else it is left
@@ -167,14 +169,14 @@ def box(text: Text) -> Floats:
     return np.asarray(text.at) + corners
 
 
-def room(name: str) -> tuple[float, float]:
+def drawing_area(name: str) -> tuple[float, float]:
     """Width and height, mm, that a format leaves for drawing."""
     width, height = FORMATS[name]
     return width - 2 * MARGIN - 2 * GAP, height - 2 * MARGIN - STRIP - 2 * GAP
 
 
 def corner() -> Floats:
-    """(2,) the lower left corner of that room, mm."""
+    """(2,) the lower left corner of that drawing_area, mm."""
     return np.array([MARGIN + GAP, MARGIN + STRIP + GAP])
 
 
@@ -205,14 +207,14 @@ def fits(size: Floats, name: str) -> bool:
     >>> fits(np.array([500.0, 300.0]), "A2"), fits(np.array([500.0, 300.0]), "A3")
     (True, False)
     """
-    return bool((np.asarray(size) <= np.array(room(name)) + 1e-9).all())
+    return bool((np.asarray(size) <= np.array(drawing_area(name)) + 1e-9).all())
 
 
 def table_sheets(title: str, head: list[str], rows: list[list[str]], name: str) -> list[Sheet]:
     """A table in as many columns and sheets as it needs."""
     widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
     across = np.append(0.0, np.cumsum([(w + 2.0) * WIDTH * SMALL for w in widths]))
-    wide, high = room(name)
+    wide, high = drawing_area(name)
     step = 1.8 * SMALL
     per_column = int(high / step) - 1
     columns = max(1, int((wide + GAP) // (across[-1] + GAP)))

@@ -24,10 +24,10 @@ from .sheet import (
     Line,
     Sheet,
     Text,
-    apart,
     corner,
+    drawing_area,
     fits,
-    room,
+    place_labels,
     width,
 )
 
@@ -193,7 +193,7 @@ def placed(
     sheet = Sheet(title, name, f"1:{scale}")
     factor = millimetres / scale
     cell = extent * factor + BEFORE + BEHIND
-    origin = corner() + 0.5 * (np.array(room(name)) - np.array([columns, rows]) * cell) + BEFORE
+    origin = corner() + 0.5 * (np.array(drawing_area(name)) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
         spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
@@ -233,8 +233,8 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     small: list[Text] = []
     marks: list[Text] = []
     large = [
-        Text(factor * at + shift + way * [0.5 * width(text) + 1.0, SMALL], text, align="C")
-        for at, text, way in view.texts
+        Text(factor * at + shift + direction * [0.5 * width(text) + 1.0, SMALL], text, align="C")
+        for at, text, direction in view.texts
     ]
     for at, name, layer in view.points:
         place = factor * at + shift
@@ -246,8 +246,8 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
             marks.append(Text(place, "##", align="C"))  # kept free of names
         beside = place + np.array([half + 0.3, half + 0.6 * height])
         (small if layer == "PCMC-POINT" else large).append(Text(beside, name, height, layer))
-    sheet.texts += apart(large, sheet.drawn()[1])
-    sheet.texts += apart(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
+    sheet.texts += place_labels(large, sheet.drawn()[1])
+    sheet.texts += place_labels(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
 
 
 def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, decimals: int) -> None:

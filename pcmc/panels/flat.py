@@ -107,12 +107,12 @@ def _beside(row: list[Floats], panel: Floats) -> Floats:
 
     Its highest point has y = 0, at the left end of a row its leftmost one x = 0.
     """
-    ways = []
-    for way in (panel, -panel):
-        at = way - np.array([way[:, 0].min(), way[:, 1].max()])
+    placements = []
+    for turned in (panel, -panel):
+        at = turned - np.array([turned[:, 0].min(), turned[:, 1].max()])
         shift = max((_gap(other, at) + SPACE for other in row[-3:]), default=0.0)
-        ways.append(at + np.array([max(shift, 0.0), 0.0]))
-    return min(ways, key=lambda way: float(way[:, 0].max()))
+        placements.append(at + np.array([max(shift, 0.0), 0.0]))
+    return min(placements, key=lambda placed: float(placed[:, 0].max()))
 
 
 def _gap(left: Floats, right: Floats) -> float:
@@ -144,7 +144,7 @@ def turned_to_fit(corners: Floats, wide: float, high: float) -> Floats | None:
         return corners
     cosine, sine = np.cos(TURNS), np.sin(TURNS)
     turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
-    ways = corners @ turn.transpose(0, 2, 1)
-    sizes = np.ptp(ways, axis=1)
+    turned = corners @ turn.transpose(0, 2, 1)
+    sizes = np.ptp(turned, axis=1)
     fit = np.flatnonzero((sizes <= np.array([wide, high]) + ROUNDING).all(axis=1))
-    return ways[fit[sizes[fit, 1].argmin()]] if len(fit) else None
+    return turned[fit[sizes[fit, 1].argmin()]] if len(fit) else None
