@@ -66,9 +66,10 @@ def load_is_given(surface: Surface) -> bool:
     d [p]_e times its length along Π, so that a chain of edges adds what its ends do, and these are fixed or
     in two such planes.
 
-    The capacity is that of fixed edges and of cables' ends. So nothing that pulls may slide on Π, nor anything
-    on a leaning plane, where the length that carries varies, or along lines. No single vertex may be held: it carries nothing on
-    a smooth surface, but something on a mesh. There must be no weights and no prescribed volumes.
+    The capacity is that of fixed edges and of cables' ends. So what pulls may not slide on Π, and nothing
+    on a leaning plane, where the length that carries varies, or along lines. No single vertex may be held: it
+    carries nothing on a smooth surface, but something on a mesh. There must be no weights and no prescribed
+    volumes.
     """
     topo, pinned = surface.topology, surface.pinned
     pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
