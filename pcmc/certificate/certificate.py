@@ -37,7 +37,7 @@ from .leaning import lean_table, lean_texts
 from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
 from .supports import boundary_view, pull_table, support_table
-from .verdict import COLLAPSED, NEUTRAL, Evidence, Findings, Verdict, judge
+from .verdict import COLLAPSED, NEAR, NEUTRAL, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
 UNKNOWN = np.empty(0), np.empty((0, 0, 3))  # no eigenvalues, no modes
@@ -327,7 +327,8 @@ def _stability(
 ) -> tuple[Spectrum, Floats, Floats]:
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
     variation = SecondVariation.of(surface, classes, space, rigid)
-    spectrum, system = count_soft(variation, NEUTRAL / surface.size**2)
+    square = surface.size**2
+    spectrum, system = count_soft(variation, NEUTRAL / square, NEAR / square)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)
