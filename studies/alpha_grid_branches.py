@@ -1,4 +1,4 @@
-"""Why there is no equilibrium at some tensions of Example 2: weak patches, balance, folds.
+"""Why no equilibrium is found at some tensions of Example 2: balance, weak patches, folds.
 
 Everything here is found on the mesh of the grid. Tensions are triples (wall, large, small).
 """

@@ -1,13 +1,15 @@
 """The grid of Fig. 16 by the geometric solver, and why the paper's flow diverges where it does.
 
 Each case of ``alpha_grid`` is solved for a stationary point on the same mesh. Where none is found, the
-reason is looked for in this order:
+reason is looked for in this order. Only the first is a theorem about every surface; the others tell what
+was tried, and how it ended.
 
+- *balance*: where the patches' tensions differ by more than the wall's, no angles at the junction are in
+  balance (7), whether it stands free or rests on Π. The certificate has this proof, and no other here: as the
+  wall's foot slides, vertical balance has no capacity that holds for every shape.
 - *patch*: a patch over its part of the plan, held all around and along the chord between the corners too,
   folds at a tension a little below half its radius (``patch_folds``). ``weakening`` follows one patch's
   tension down from every equilibrium of weak patches: no branch comes below that patch's own fold.
-- *balance*: where the patches' tensions differ by more than the wall's, no angles at the junction are in
-  balance (7), whether it stands free or rests on Π.
 - *fold*: from the equilibria of the grid that are nearest, those that share a patch's tension first, the
   branch is followed along a straight line in the tensions, and folds before it arrives: it turns back, and
   a way down opens (its index grows) as it does, on triangles that are sound. ``explained`` has the tensions
@@ -69,9 +71,9 @@ CATEGORIES = {
     "a minimum; the flow does not": "#9ECAE1",
     "a saddle": "#CC79A7",
     "one, found along a branch": "#41B6A4",
-    "none: a patch below its fold": "#D6604D",
     "none: tensions cannot balance": "#E6E6E6",
-    "none: a fold on the way": "#F4A582",
+    "none found: a patch below its fold": "#D6604D",
+    "none found: a fold on the way": "#F4A582",
     "undecided: the junction slips": "#FFF2AE",
     "none found": "#BDBDBD",
 }
@@ -167,6 +169,9 @@ def table(folder: Folder) -> dict[str, float]:
         "crosses_with_equilibrium": float(crossed.equilibrium.sum()),
         "crosses_unexplained": float(slipped.sum()),
         "equilibria": float(cases.equilibrium.sum()),
+        "proved": float((cases.proved & ~cases.equilibrium).sum()),
+        "none_found": float((~cases.proved & ~cases.equilibrium).sum()),
+        "proved_elsewhere": float((cases.proved & (cases.balanced | cases.equilibrium)).sum()),
         "equilibria_thin": float((cases.equilibrium & (cases.quality < THIN)).sum()),
         "equilibria_finer": float(cases.finer.sum()),
         "thin_finer": float((cases.finer & (cases.quality < THIN)).sum()),
@@ -191,14 +196,15 @@ def explained(folder: Folder) -> pd.DataFrame:
     cases["equilibrium"] = (cases.status == "converged") | (cases.ending == REACHED)
     triples = cases[list(AXES)].to_numpy()
     cases["balanced"], cases["weak"] = balanced(triples), _weak(folder, triples)
+    cases["proved"] = cases.verdict == "no equilibrium"
     names = list(CATEGORIES)
     tests = [
         cases.equilibrium & (cases.verdict == "saddle"),
         cases.ending == REACHED,
         cases.equilibrium & cases.near,
         cases.equilibrium,
-        cases.weak,
         ~cases.balanced,
+        cases.weak,
         cases.ending == FOLD,
         cases.ending == SLIP,
     ]
@@ -207,7 +213,7 @@ def explained(folder: Folder) -> pd.DataFrame:
     folds = folder.read_table("patch_folds").iloc[0]
     cases["reason"] = [_reason(case, folds) for _, case in cases.iterrows()]
     return cases[
-        [*AXES, "crossed", "near", "equilibrium", "finer", "balanced", "weak", "category", "reason",
+        [*AXES, "crossed", "near", "equilibrium", "finer", "balanced", "weak", "proved", "category", "reason",
          "ending", "share", "verdict", "index", "quality", "pinched", "wall_area"]
     ]  # fmt: skip
 
@@ -221,11 +227,11 @@ def _reason(case: pd.Series[Any], folds: pd.Series[float]) -> str:
         status = case["half_status"]
         why = f": {status.replace('_', ' ')}" if isinstance(status, str) else ""
         return f"not found at half the edge length{why}"
+    if not case["balanced"]:
+        return f"|{large:g} - {small:g}| > {wall:g}"
     if case["weak"]:
         pairs = [("larger", large, folds.large), ("smaller", small, folds.small)]
         return ", ".join(f"the {n} patch folds at {f:.3f}" for n, alpha, f in pairs if alpha < f)
-    if not case["balanced"]:
-        return f"|{large:g} - {small:g}| > {wall:g}"
     if not isinstance(case["ending"], str):
         return ""
     start, end = (", ".join(f"{case[f'{where}_{name}']:.4g}" for name in PATCHES) for where in ("from", "at"))

@@ -28,7 +28,7 @@ from .coverage_weights import barrels, domes, strips
 
 def cases() -> Iterator[Case]:
     """All closed forms on all meshes."""
-    families = (helicoids, scherk, _tubes, domes, barrels, strips, _bubbles, _wedges, random_caps)
+    families = (helicoids, scherk, _tubes, domes, barrels, strips, _bubbles, wedges, random_caps)
     for family in families:
         yield from family()
 
@@ -205,7 +205,7 @@ def _bubble_values(alphas: tuple[float, float, float], volumes: tuple[float, flo
     }
 
 
-def _wedges() -> Iterator[Case]:
+def wedges() -> Iterator[Case]:
     """Sectors of caps between two upright mirror planes: p = 1, radius 2α, over a sector of the unit disc."""
     for degrees in (40.0, 75.0, 110.0, 150.0):
         for alpha in (0.55, 0.7, 1.5):

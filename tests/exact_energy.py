@@ -14,6 +14,7 @@ from pcmc import Surface
 from pcmc.contact.pinching import standing_part
 from pcmc.energy.flat_pieces import flat_pieces
 from pcmc.energy.motion_space import motion_space
+from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
 from pcmc.energy.rooms import closing_volumes
 
 ctx.prec = 800
@@ -46,7 +47,10 @@ class Frozen:
         self.surface, self.classes = part.surface, part.classes
         self.X = [[arb(x) for x in row] for row in part.surface.vertices.tolist()]
         self.space = motion_space(part.surface, part.classes, part.surface.vertices)
+        free = rigid_modes(self.space, rigid_motions(part.surface), part.surface.vertices)
+        self.held = [[arb(x) for x in column] for column in free.T.tolist()]
         self.size, self.rooms = self.space.size, len(surface.rooms)
+        self.borders = self.rooms + len(self.held)
         self.unknowns = [
             list(range(a, b)) for a, b in zip(self.space.start, self.space.start[1:], strict=False)
         ]
@@ -116,14 +120,15 @@ class Frozen:
 
     def derivatives(self, s):
         """∇ and ∇² with respect to (s, δ), of E - Σ δ (V - V̄)."""
-        total = self.size + self.rooms
+        total = self.size + self.borders
         gradient, hessian = [arb(0)] * total, [[arb(0)] * total for _ in range(total)]
         for vertices, energy in self.elements:
-            own = [k for v in vertices for k in self.unknowns[v]] + list(range(self.size, total))
+            own = [k for v in vertices for k in self.unknowns[v]]
+            own += list(range(self.size, self.size + self.rooms))
 
             def value(moves, vertices=vertices, energy=energy):
                 t = {k: s[k] for v in vertices for k in self.unknowns[v]}
-                t |= {k: s[k] for k in range(self.size, total)}
+                t |= {k: s[k] for k in range(self.size, self.size + self.rooms)}
                 for k, amount in moves:
                     t[k] = t[k] + amount
                 return energy([self.place(v, t) for v in vertices], t)
@@ -143,11 +148,16 @@ class Frozen:
                 hessian[i][j] = mid(hessian[i][j] + entry)
                 if i != j:
                     hessian[j][i] = hessian[i][j]
+        for j, column in enumerate(self.held, self.size + self.rooms):  # + μ ⟨q, s⟩: it stays where it is
+            for k, q in enumerate(column):
+                gradient[k] = mid(gradient[k] + s[j] * q)
+                gradient[j] = mid(gradient[j] + s[k] * q)
+                hessian[j][k] = hessian[k][j] = q
         return gradient, hessian
 
     def equilibrium(self):
         """(s, δ) of the exact equilibrium to 50 digits, by Newton from (0, 0), and the matrix there."""
-        s = [arb(0)] * (self.size + self.rooms)
+        s = [arb(0)] * (self.size + self.borders)
         for _ in range(9):
             gradient, hessian = self.derivatives(s)
             if max(abs(g) for g in gradient) < DIGITS:
@@ -157,12 +167,12 @@ class Frozen:
         raise AssertionError("Newton does not come to rest in many digits")
 
 
-def negative(matrix, shift: float = 0.0, rooms: int = 0) -> int:
+def negative(matrix, shift: float = 0.0, borders: int = 0) -> int:
     """How many eigenvalues of a symmetric matrix of flint's numbers are below ``shift``, by elimination.
 
-    Of a matrix bordered by the gradients of volumes: those among motions that keep the volumes.
+    Of a matrix bordered by gradients of volumes and rigid motions: those among motions across them.
     """
-    own = len(matrix) - rooms
+    own = len(matrix) - borders
     A = [[x - (arb(shift) if i == j < own else 0) for j, x in enumerate(row)] for i, row in enumerate(matrix)]
     count = 0
     for k in range(len(A)):
@@ -174,4 +184,4 @@ def negative(matrix, shift: float = 0.0, rooms: int = 0) -> int:
                 A[i] = [
                     mid(x - f * y) if j > k else x for j, (x, y) in enumerate(zip(A[i], A[k], strict=True))
                 ]
-    return count - rooms
+    return count - borders

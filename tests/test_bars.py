@@ -8,7 +8,7 @@ import pytest
 from pcmc import MeshVerdict, check_mesh, solve, solve_to_accuracy
 from pcmc.accuracy.adaptive import AccuracyStatus
 from pcmc.accuracy.extrapolation import extrapolate
-from studies import coverage_forms
+from studies import coverage_forms, coverage_weights
 from studies.coverage import STUDY
 from studies.folder import Folder
 from studies.study import perform
@@ -72,6 +72,15 @@ def test_orders_that_the_surface_does_not_have_are_not_believed(errors, shape_or
     found = extrapolate(np.array(errors)[:, None], np.array([1e-12]), shape_order=shape_order)
     assert abs(found.limit[0]) <= found.limit_error[0]
     assert found.limit_error[0] < 1.5 * abs(errors[-1])
+
+
+def test_heights_in_mirror_planes_are_read_with_the_images():
+    """The crown of a barrel of nine squares lies between vertices, the highest of them in mirror planes."""
+    case = next(c for c in coverage_weights.barrels() if c.name == "α 2, p 1, w 0.3, 9 squares")
+    case, check = checked_case(case)
+    row, exact = check.row("height", "vault"), case.exact["height", "vault"]
+    assert abs(row.limit - exact) <= row.limit_error < 0.05 * row.error
+    assert holds(case, check)
 
 
 def test_the_reaction_of_an_uneven_mesh_is_that_of_its_loads():

@@ -24,6 +24,7 @@ from pcmc.energy.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
+from pcmc.quantities import figures
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.surface.topology import CURVE, POINT, SHEET
 from studies import evolver
@@ -194,8 +195,11 @@ def test_other_solvers_know_cables_and_weights():
 
 def test_a_cable_too_short_of_tension_is_named():
     certificate = solve(hypar_roof(6, height=0.0, cable=4.0)).certify()
+    assert certificate.verdict is pcmc.Verdict.NO_EQUILIBRIUM  # it is flat: a theorem
+    assert "4 < α L / (2 sin(φ/2)) = 7.071, L = 10, φ = 90°" in certificate.detail
+    certificate = solve(hypar_roof(6, height=1.0, cable=4.0)).certify()
     assert not certificate.certified
-    assert "spans 10, more than 2 τ/α = 8" in certificate.detail
+    assert "more than 2 τ/α = 8" in certificate.detail
 
 
 def test_a_free_edge_carries_nothing():
@@ -266,6 +270,14 @@ def test_quantities_of_cables_have_taylor_slope_two(roof, quantity):
         moved = measure(roof._with(vertices=roof.vertices + t * d), Target(quantity, "south")).value
         left.append(abs(moved - found.value - t * slope))
     assert left[1] < 0.02 * left[0] + 1e-12
+
+
+def test_key_figures_have_the_lengths_and_sags_of_cables(roof):
+    shown = {(f.quantity, f.of): f.value for f in figures(roof, pcmc.certify(roof)) if f.owner == "cable"}
+    for cable in roof.cables:
+        for quantity in ("length", "sag", "force"):
+            expected = measure(roof, Target(quantity, cable.name)).value
+            assert shown[quantity, cable.name] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_closed_cable_has_no_sag():

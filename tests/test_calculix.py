@@ -217,6 +217,51 @@ def test_a_sail_between_edge_cables_is_at_rest_there():
     assert max(off[1]) < 3e-3
 
 
+ROPE = {"cable_area": 0.025**2, "cable_material": Material(young=1.6e8)}  # steel, as a beam 0.5 stiff
+
+
+def test_a_film_with_a_rope_across_follows_poisson():
+    """α Δu + τ u_xx δ(y - ½) = s over the square: a series of the odd modes n, k = nπ, of closed form.
+
+    Beside the rope u_n = p (1 - cosh ky) + ..., p = 4 s/(nπ α k²); at the rope
+    u_n = p (cosh(k/2) - 1) / (cosh(k/2) + τ k sinh(k/2) / (2α)).
+    """
+    tension, snow, n = 3.0, 1e-3, 32
+    model = model_of(square(n, cable=tension), loads=[Snow(snow, patches=["film"])], anyway=True, **ROPE)
+    k = np.pi * np.arange(1, 100, 2)[:, None]
+    share = 4.0 * snow / (k * 2.0 * k**2)
+    share = share * (1.0 - 1.0 / np.cosh(k / 2)) / (1.0 + tension * k / 4.0 * np.tanh(k / 2))
+    rope = np.append(model.surface.cables[0].edges[:, 0], model.surface.cables[0].edges[-1, 1])
+    expected = (share * np.sin(k * model.surface.vertices[rope, 0])).sum(axis=0)
+    found = -calculix.run(model)[1].deflections[rope]
+    np.testing.assert_allclose(found, expected, atol=1e-3 * expected.max())
+
+
+def test_a_sail_between_ropes_follows_poisson_with_strings():
+    """α Δu = s inside, τ u'' = α ∂u/∂n along the arcs of its edges; by linear elements on the same mesh."""
+    flat = sail(12)
+    start = flat.moved(flat.vertices * [1.0, 1.0, 0.0])
+    surface = pcmc.solve(start.retensioned(pressures={"film": 0.0}), target="stationary").surface
+    snow = 1e-4
+    model = model_of(surface, loads=[Snow(snow, patches=["film"])], anyway=True, **ROPE)
+    X, K, load_at = surface.vertices, np.zeros((surface.n, surface.n)), np.zeros(surface.n)
+    for face, area in zip(surface.faces, face_areas(X[surface.faces]), strict=True):
+        sides = X[np.roll(face, -1)] - X[np.roll(face, 1)]
+        K[np.ix_(face, face)] += 2.0 * sides @ sides.T / (4.0 * area)
+        load_at[face] += snow * area / 3.0
+    for cable in surface.cables:
+        for a, b in cable.edges:
+            K[np.ix_([a, b], [a, b])] += 20.0 / np.linalg.norm(X[b] - X[a]) * np.array([[1, -1], [-1, 1]])
+    free = np.setdiff1d(np.arange(surface.n), np.flatnonzero(surface.fixed))
+    expected = np.zeros(surface.n)
+    expected[free] = np.linalg.solve(K[np.ix_(free, free)], load_at[free])
+    found = -calculix.run(model)[1].deflections
+    assert np.ptp(X[:, 2]) < 1e-9
+    np.testing.assert_allclose(found, expected, atol=1e-3 * expected.max())
+    edge = surface.cables[0].edges[1:, 0]
+    np.testing.assert_allclose(found[edge], expected[edge], rtol=1e-3)
+
+
 def test_a_heavy_roof_is_at_rest_under_its_own_weight():
     """Weights per area belong to the form-finding load."""
     surface = pcmc.solve(spherical_cap(0.15, alpha=0.6).retensioned(weights={"cap": 0.2})).surface

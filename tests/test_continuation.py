@@ -178,7 +178,7 @@ def test_ratio_keeps_the_lower_tension_and_names_what_varies():
 
 
 def test_diagram_cuts_the_branch_where_stability_changes(small_cap, tmp_path):
-    from pcmc.plot.diagrams import _pieces
+    from pcmc.plot.curves import _pieces
 
     branch = follow(small_cap, "cap", until={"height": 1.2}, step=-0.05)
     stable, unstable = _pieces(branch, "parameter", "height")

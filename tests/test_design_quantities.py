@@ -35,9 +35,6 @@ def roof():
         Target("volume", "east"),
         Target("area"),
         Target("area", "wall 1"),
-        Target("reaction"),
-        Target("reaction", "north"),
-        Target("reaction", "wall 2"),
     ],
     ids=lambda t: t.label,
 )

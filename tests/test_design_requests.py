@@ -193,7 +193,7 @@ def test_ctrl_c_between_solves_ends_the_search_with_the_best_so_far(monkeypatch)
     def pressed(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pcmc.design.search.sensitivities", pressed)
+    monkeypatch.setattr("pcmc.design.search.slopes", pressed)
     design = meet(cap(), Target("apex", None, 0.9), "cap")
     assert (design.status, design.solves) == (DesignStatus.STOPPED, 1)
     assert design.result.converged

@@ -22,7 +22,7 @@ from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import FORMATS, drawing_set, pdf
 from pcmc.drawings.panel_sheets import panel_sheets
-from pcmc.drawings.sheet import LAYERS, box, corner, room
+from pcmc.drawings.sheet import LAYERS, box, corner, drawing_area
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
 from pcmc.surface.geometry import cross_2d, edge_vectors
@@ -96,7 +96,7 @@ def test_panels_on_sheets_are_congruent_apart_and_within_the_frame(squares, name
     sheets = panel_sheets(schedule, name, millimetres)
     assert len(sheets) > 1
     number = 0
-    low, high = corner(), corner() + room(name)
+    low, high = corner(), corner() + drawing_area(name)
     for sheet in sheets:
         outlines = [line.points for line in sheet.lines if line.layer == "PCMC-CUT"]
         for outline in outlines:

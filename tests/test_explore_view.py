@@ -27,7 +27,7 @@ def test_terms_are_explained_where_they_stand_by_keys_too(page):
 
     for name, words in (
         ("Morse index", "saddle"),
-        ("Load over capacity", "no equilibrium exists"),
+        ("Load over capacity", "raise tensions or lower pressures"),
         ("Error by Meyer's measure", "Voronoi"),
     ):
         (summary,) = [

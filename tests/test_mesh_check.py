@@ -138,7 +138,7 @@ def test_scales_of_length_and_force_scale_the_table(length, force):
             continue
         for column in ("value", "error", "limit", "limit_error"):
             assert b[column] == pytest.approx(scale[a.quantity] * a[column], rel=1e-4), (a.quantity, column)
-        assert b.order == pytest.approx(a.order, abs=1e-4)
+        assert b.order == pytest.approx(a.order, abs=1e-4, nan_ok=True)  # of a pull that no mesh changes
 
 
 def test_other_numbers_of_meshes():

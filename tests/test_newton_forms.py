@@ -233,11 +233,11 @@ def test_rigid_motions_are_neutral_and_not_counted():
 
 
 @pytest.mark.parametrize("make", [sphere, double_bubble])
-def test_a_bubble_sought_as_a_minimum_vanishes_and_says_so(make):
-    """It is a saddle: smaller or larger, E falls. Nothing else exists, as the verdict states."""
+def test_a_bubble_sought_as_a_minimum_ends_at_its_saddle_and_says_so(make):
+    """Smaller or larger, E falls: nothing stable exists."""
     result = solve(make(0.8))
     assert not result.converged
     assert np.isfinite(result.surface.vertices).all()
-    assert result.status is Status.VANISHED
-    assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM
-    assert "shrinks to nothing" in result.certificate.detail
+    assert result.status is Status.SADDLE
+    assert result.certificate.verdict is Verdict.SADDLE
+    assert "shrinks to nothing, so that none is stable" in result.message

@@ -109,7 +109,7 @@ def test_without_the_plot_extra_cells_show_text(monkeypatch):
     def missing(surface, **options):
         raise MissingExtra("pyvista", "plot")
 
-    monkeypatch.setattr("pcmc.plot.pictures.draw", missing)
+    monkeypatch.setattr("pcmc.plot.notebook.draw", missing)
     assert notebook.cell_html(tent()).startswith("<pre>Surface of 12 triangles")
 
 

@@ -1,7 +1,5 @@
 """The search for an equilibrium beyond the first start, and the proofs that there is none."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from random_meshes import random_surface
@@ -10,8 +8,9 @@ from starts import sphere, spherical_cap, two_caps, two_squares
 
 from generators import spherical_cap_exact
 from pcmc import Circle, Patch, Verdict, certify, solve, write
+from pcmc.certificate.balance import unheld
 from pcmc.certificate.neck import narrowest_neck
-from pcmc.certificate.proof import Fold, Overload, UnbalancedJunction, Unheld
+from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
 from pcmc.existence.starts import low_start
 from pcmc.io import native
 from pcmc.plan import Divider, Hole, Plan
@@ -55,23 +54,24 @@ def test_every_cap_above_the_fold_is_found_from_any_height(alpha):
 
 
 @pytest.mark.parametrize("alpha", [0.3, 0.45])
-def test_every_cap_below_the_fold_ends_with_it_as_proof(alpha):
+def test_every_cap_below_the_fold_ends_with_balance_as_proof(alpha):
     for height in HEIGHTS[::2]:
         result = solve(paraboloid(height, alpha))
         assert result.status is Status.NO_EQUILIBRIUM
-        overload, fold = result.proofs
-        assert overload == Overload(pytest.approx(0.5 / alpha, rel=0.02))
-        assert fold.parameter == "pressure"
+        assert result.proofs == (Overload(pytest.approx(0.5 / alpha, rel=0.02)),)
+        fold = result.tried[-1]
+        assert fold.way == "pressure"
         assert fold.value == pytest.approx(2.0 * alpha, rel=0.03)
         found = result.certificate
         assert found.verdict is Verdict.NO_EQUILIBRIUM
-        assert found.proofs[1] is fold
+        assert [p.ratio for p in found.proofs] == pytest.approx([p.ratio for p in result.proofs])
+        assert found.tried == result.tried
         for text in (result.message, found.detail, str(found)):
-            assert f"a fold at {fold.value:.3f} of the pressure" in text
+            assert f"folds at {fold.value:.3f} of the pressure" in text
 
 
 def test_the_fold_tends_to_the_hemisphere_with_the_mesh():
-    errors = [solve(paraboloid(0.3, 0.45, edge)).proofs[1].value - 0.9 for edge in (0.25, 0.125)]
+    errors = [solve(paraboloid(0.3, 0.45, edge)).tried[-1].value - 0.9 for edge in (0.25, 0.125)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
 
 
@@ -147,28 +147,31 @@ def test_rings_that_vertices_slide_along_are_moved_apart_as_fixed_ones():
     keep = np.isin(np.arange(fixed.n), [np.flatnonzero(fixed.fixed & side)[0] for side in (top, ~top)])
     rings = {Circle((0, 0, 2.0 * s), (0, 0, 1), 1.0): fixed.fixed & ~keep & (top == (s > 0)) for s in (1, -1)}
     held, sliding = (solve(f) for f in (fixed, fixed.rebuilt(fixed=keep, on_line=rings)))
-    assert sliding.status is held.status is Status.NO_EQUILIBRIUM
-    assert [p.value for p in sliding.proofs] == pytest.approx([p.value for p in held.proofs], rel=1e-3)
+    assert sliding.status is held.status is Status.NONE_FOUND
+    assert sliding.tried[-1].folds
+    assert sliding.tried[-1].value == pytest.approx(held.tried[-1].value, rel=1e-3)
 
 
 def test_the_flow_of_the_paper_is_not_rescued():
     for method in ("nesterov", "lbfgs"):
         result = solve(paraboloid(5.0, 0.6), method)
         assert not result.converged
-        assert result.proofs == ()
+        assert result.proofs == result.tried == ()
 
 
 @pytest.mark.parametrize(("half", "target"), [(0.7, "minimum"), (0.7, "stationary"), (1.0, "minimum")])
 def test_a_neck_between_rings_too_far_apart(half, target):
     result = solve(film(half), target=target)
-    assert result.status is Status.NO_EQUILIBRIUM
-    (fold,) = result.proofs
-    assert isinstance(fold, Fold)
-    assert fold.parameter == "distance"
+    assert result.status is Status.NONE_FOUND
+    assert result.proofs == ()
+    fold = result.tried[-1]
+    assert fold.folds
+    assert fold.way == "distance"
     assert fold.value * half == pytest.approx(WIDEST, rel=0.02)
     found = result.certificate
-    assert found.verdict is Verdict.NO_EQUILIBRIUM
-    assert "the film ends at a fold at" in found.detail
+    assert found.verdict is Verdict.NONE_FOUND
+    assert found.tried == result.tried
+    assert "of the distance between the held curves" in found.detail
     assert "remesh" not in result.message
     if target == "minimum":
         assert "a neck pinches off near [0.0, 0.0, " in found.detail
@@ -181,7 +184,8 @@ def test_half_a_film_with_its_neck_free_on_the_plane():
         return tube(6, 20, lambda t: (1.0 + 0.0 * t, height * t), patch, on_plane=bottom, fixed=top)
 
     assert solve(half_film(0.6)).certificate.verdict is Verdict.STABLE
-    (fold,) = solve(half_film(0.75)).proofs
+    fold = solve(half_film(0.75)).tried[-1]
+    assert fold.folds
     assert 0.75 * fold.value == pytest.approx(WIDEST, rel=0.02)
 
 
@@ -191,9 +195,7 @@ def test_a_neck_that_pinches_off_without_proof_is_called_that():
     found = pinched.certificate
     assert found.verdict is Verdict.RAN_AWAY
     assert found.detail.startswith("a neck pinches off near")
-    assert found.proofs == ()
-    alone = replace(pinched, status=Status.PINCHED).certificate
-    assert alone.verdict is Verdict.RAN_AWAY
+    assert found.proofs == found.tried == ()
 
 
 def test_the_neck_is_the_shortest_cut():
@@ -224,16 +226,33 @@ def test_tensions_that_cannot_balance_are_the_proof():
 
 
 def test_a_bubble_has_no_stable_equilibrium_and_one_that_is_not():
+    """The sphere of radius 2 α/p, at rest with index 1, is the answer where a minimum is asked for."""
     result = solve(sphere(0.8))
-    assert result.proofs == (Unheld(0, True),)
-    assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM
-    assert "none is stable" in result.certificate.detail
-    assert solve(sphere(0.8), target="stationary").converged
+    assert result.status is Status.SADDLE
+    assert result.proofs == ()
+    assert "none is stable" in result.message
+    found = result.certificate
+    assert found.verdict is Verdict.SADDLE
+    assert found.index == 1
+    assert np.linalg.norm(result.surface.vertices, axis=1) == pytest.approx(2.0, rel=0.05)
+    sought = solve(sphere(0.8), target="stationary")
+    assert sought.converged
+    assert sought.energy == pytest.approx(result.energy, rel=1e-12)
+    away = one_start(sphere(0.8)).certificate
+    assert away.verdict is Verdict.RAN_AWAY
+    assert "no equilibrium" not in str(away)
     limp = sphere(0.8).retensioned(None, {patch.name: 0.0 for patch in sphere(0.8).patches})
     for target in ("minimum", "stationary"):
         (proof,) = solve(limp, target=target).proofs
-        assert proof == Unheld(0, False)
+        assert proof == Unheld(0)
     assert certify(limp).verdict is Verdict.NO_EQUILIBRIUM
+
+
+def test_a_part_that_nothing_holds_falls_under_its_weight():
+    heavy = sphere(0.8).retensioned(weights={"bubble": 0.1})
+    result = solve(heavy)
+    assert result.proofs == certify(heavy).proofs == (Unheld(0, falls=True),)
+    assert unheld(heavy.rebuilt(fixed=[0])) is None
 
 
 @pytest.mark.slow
@@ -310,11 +329,11 @@ def test_a_coarse_mesh_at_rest_is_not_disproved():
 def test_a_file_keeps_the_proof(tmp_path):
     result = solve(paraboloid(1.0, 0.45))
     write(tmp_path / "cap.pcmc", result.surface, certificate=result.certificate)
-    overload, fold = native.read(tmp_path / "cap.pcmc").certificate["proofs"]
+    kept = native.read(tmp_path / "cap.pcmc").certificate
     ratio = pytest.approx(result.proofs[0].ratio)
-    assert overload == {"kind": "Overload", "ratio": ratio, "load": "pressure"}
-    assert fold["kind"] == "Fold"
-    assert fold["value"] == result.proofs[1].value
+    assert kept["proofs"] == [{"kind": "Overload", "ratio": ratio, "load": "pressure"}]
+    assert [row["end"] for row in kept["tried"]] == [attempt.end for attempt in result.tried]
+    assert kept["tried"][-1]["value"] == result.tried[-1].value
 
 
 def test_sweeps_search_only_if_asked():
@@ -328,14 +347,16 @@ def test_from_equal_tensions_to_those_asked_for():
     """The pressure cannot be raised from low ones: there the stronger patch pulls the wall away."""
     weak = two_caps(1.2, alpha_large=1.0, alpha_small=1.5, alpha_aux=6.0)
     result = solve(weak, target="stationary")
-    overload, fold = result.proofs
-    assert isinstance(overload, Overload)
-    assert fold.parameter == "tensions"
+    assert result.status is Status.NONE_FOUND  # the wall slides: its foot may be as long as it likes
+    assert result.proofs == ()
+    fold = result.tried[-1]
+    assert fold.folds
+    assert fold.way == "tensions"
     assert 0.0 < fold.value < 1.0
     tensions = dict(fold.tensions)
     assert tensions["large"] > 1.0
     assert tensions["small"] > 1.5
-    assert f"a fold at large {tensions['large']:.4g}, small" in result.message
+    assert f"folds at large {tensions['large']:.4g}, small" in result.message
     found = solve(two_caps(1.2, alpha_large=6.0, alpha_small=5.0, alpha_aux=16.0), target="stationary")
     assert found.certificate.verdict is Verdict.STABLE
     assert "along the branch from equal tensions" in found.message

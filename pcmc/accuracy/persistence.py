@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
-from ..certificate.balance import load_is_given
+from ..certificate.balance import overload
 from ..contact.pinching import standing_part
 from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import motion_space
@@ -31,7 +31,6 @@ FURTHER = 3  # meshes ahead at which an eigenvalue that only falls is foreseen
 RUNNING_AWAY = {
     Status.DIVERGED: "it inflates without bound",
     Status.VANISHED: "it shrinks to nothing",
-    Status.PINCHED: "a neck pinches off",
 }
 POOR = 0.05  # triangle quality that shows where a solve failed
 
@@ -76,11 +75,9 @@ def lost(start: Surface, result: Result) -> Finding:
     place = start.vertices[vertices].mean(axis=0)
     reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
     reason += f", most near {_text(place)}" if result.status in RUNNING_AWAY else f" near {_text(place)}"
-    certificate = result.certificate
-    if certificate.load_ratio > 1.0 and load_is_given(surface):
-        reason += (
-            f"; the pressure is {certificate.load_ratio:.3f} times what the boundary's tension could carry"
-        )
+    load = overload(surface)
+    if load is not None:
+        reason += f"; {load}"
     return _at(MeshVerdict.HELD_BY_MESH, start, reason, place)
 
 

@@ -99,13 +99,13 @@ def given_volume(surface: Surface) -> float | None:
     A room between plates that are not upright encloses another volume than the roof has over Π.
 
     >>> from pcmc import Patch, Room
-    >>> X, F, sides = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 2, 3]], [Patch("side", 2.0)]
-    >>> given_volume(Surface(X[1:], [[0, 1, 2]], [0], sides, fixed=range(3))) is None
+    >>> X, F = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 3]], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    >>> tent = Surface(X, F, [0] * 3, [Patch("tent", 2.0)], fixed=range(3))
+    >>> given_volume(tent) is None
     True
-    >>> room = Room("all", {"lid": 1}, 3.0)
-    >>> lid = Surface(X[:3], [[0, 1, 2]], [0], [Patch("lid", 2.0)], fixed=range(3), rooms=[room])
-    >>> round(given_volume(lid), 12)
-    3.0
+    >>> rooms = [Room("all", {"tent": 1}, 0.5)]
+    >>> round(given_volume(Surface(X, F, [0] * 3, tent.patches, fixed=range(3), rooms=rooms)), 12)
+    0.5
     """
     if not surface.rooms or np.any(closing_volumes(surface)):
         return None
@@ -140,20 +140,24 @@ def _height(surface: Surface, patch: int) -> tuple[float, float]:
     """Greatest height of a patch's vertices over Π, and that of the smooth surface through them there.
 
     The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
-    through it and its neighbours, or on a junction the parabola, has its top at the surface's own.
+    through it and its neighbours, or on a junction the parabola, has its top at the surface's own. In a
+    mirror plane the images of its neighbours belong to them.
     """
     local = surface.plane.to_local(surface.vertices)
     vertices = np.unique(surface.faces[surface.patch_of_face == patch])
     top = int(vertices[local[vertices, 2].argmax()])
     value = float(local[top, 2])
-    if surface.held[top]:
+    mirrors = [plane for plane, mask in surface.on_planes if plane.mirror and mask[top]]
+    if surface.fixed[top] or surface.on_plane[top] or (surface.held[top] and not mirrors):
         return value, value
     topo = surface.topology
     around = (topo.edges == top).any(axis=1)
     if topo.on_junction[top]:
         around &= topo.junction_edge | topo.seam_edge
-    beside = topo.edges[around].sum(axis=1) - top
-    step = local[beside] - local[top]
+    beside = surface.vertices[topo.edges[around].sum(axis=1) - top]
+    for plane in mirrors:
+        beside = np.concatenate([beside, beside - 2.0 * plane.height(beside)[:, None] * plane.normal])
+    step = surface.plane.to_local(beside) - local[top]
     if topo.on_junction[top]:
         if len(beside) != 2:
             return value, value

@@ -13,7 +13,7 @@ from ..base.errors import PcmcError
 from ..base.units import Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
-from ..certificate.proof import Fold, Overload
+from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
 from ..contact.pinching import standing_part
 from ..existence import solve
@@ -32,7 +32,6 @@ BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of 
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
-INFLATED = (Overload, Fold)
 
 
 class Ended(Protocol):
@@ -248,8 +247,8 @@ def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
 def mended(plan: Plan, result: Result) -> Plan:
     """The plan with the tensions and supports that remove what its certificate complains of."""
     certificate = result.certificate
-    grew = any(isinstance(proof, INFLATED) for proof in certificate.proofs)
-    if grew or certificate.verdict is Verdict.RAN_AWAY:
+    grew = any(isinstance(proof, Overload) for proof in certificate.proofs)
+    if grew or certificate.verdict in (Verdict.RAN_AWAY, Verdict.NONE_FOUND):
         plan = _stiffer(plan, result)
     sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
     plan = _with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
@@ -264,7 +263,7 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
 
     pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
     least = ROOM * least_tension(plan_area(plan), max(pressures))
-    folds = [1.0 / proof.value for proof in result.certificate.proofs if isinstance(proof, Fold)]
+    folds = [1.0 / attempt.value for attempt in result.certificate.tried if attempt.folds and attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
     def raised(tension: float) -> float:

@@ -62,6 +62,10 @@ class OptionError(PcmcError):
     """A parameter has a value that is not allowed."""
 
 
+class NoBranch(SurfaceError, OptionError):
+    """No branch of equilibria starts here: not at rest, not held, or nothing depends on the parameter."""
+
+
 class FileError(PcmcError):
     """A file cannot be read or written as the format its suffix names."""
 

@@ -1,7 +1,8 @@
-"""When Ctrl-C takes effect: libraries written in C may lose it, misreport it, or crash."""
+"""When Ctrl-C takes effect: libraries written in C may lose it, misreport it, or crash. And when to stop."""
 
 from __future__ import annotations
 
+import dis
 import signal
 import threading
 from collections.abc import Iterator
@@ -36,6 +37,38 @@ def termination_as_interrupt() -> Iterator[None]:
     """Treat SIGTERM and SIGHUP like Ctrl-C within the block, so that temporary files are removed."""
     with interrupts_handled(signal.default_int_handler, instead_of=signal.SIG_DFL):
         yield
+
+
+def stop_requested(error: BaseException) -> None:
+    """Accept a StopIteration that a ``raise`` statement asked for, and Ctrl-C; refuse others.
+
+    ``next()`` of an empty iterator raises StopIteration, too, and so does the ``__next__`` of an iterator. In
+    a callback that is a mistake, not a request: RuntimeError, as Python has it in generators (PEP 479).
+    The innermost frame of the traceback tells them apart, by the instruction that it has stopped at.
+
+    >>> def stop():
+    ...     raise StopIteration
+    >>> for callback in (stop, lambda: next(iter([]))):
+    ...     try:
+    ...         callback()
+    ...     except StopIteration as error:
+    ...         stop_requested(error)
+    Traceback (most recent call last):
+    ...
+    RuntimeError: StopIteration out of next(), in <lambda>, where nothing asked to stop; raise it to stop
+    """
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    if trace is None or not isinstance(error, StopIteration):
+        return
+    code = trace.tb_frame.f_code
+    raised = code.co_code[trace.tb_lasti] == dis.opmap["RAISE_VARARGS"] and code.co_name != "__next__"
+    if not raised:
+        message = (
+            f"StopIteration out of next(), in {code.co_name}, where nothing asked to stop; raise it to stop"
+        )
+        raise RuntimeError(message) from error
 
 
 @contextmanager

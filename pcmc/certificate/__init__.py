@@ -4,16 +4,17 @@ Gives ``certify`` to the solvers' callers. Imports ``stability``, ``meshing``, `
 """
 
 from .certificate import Certificate, certify
-from .proof import Fold, Overload, UnbalancedJunction, Unheld
+from .proof import Attempt, Overload, UnbalancedJunction, Unheld, WeakCable
 from .verdict import Evidence, Verdict
 
 __all__ = [
+    "Attempt",
     "Certificate",
     "Evidence",
-    "Fold",
     "Overload",
     "UnbalancedJunction",
     "Unheld",
     "Verdict",
+    "WeakCable",
     "certify",
 ]

@@ -10,10 +10,11 @@ import pandas as pd
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
+from ..surface.origin import uncancelled_pressures
 from ..surface.supports import common_point
 from ..surface.topology import Curve
 from ..surface.wall_tensions import balanced_wall
-from .proof import UnbalancedJunction, Unheld
+from .proof import Overload, UnbalancedJunction, Unheld
 
 COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
@@ -26,33 +27,89 @@ def load_ratio(surface: Surface) -> float:
     Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet), along the held
     boundary. Fixed lines inside the surface carry, too: Σ α of all their sheets per length. So do single
     held vertices, at most what their triangles pull; and cables, τ at each end on a support. A free edge
-    carries nothing. With weights, α + w z stands for α, and Σ w A counts against the pressure. Above 1 no
-    smooth surface with this boundary is at rest, whatever its shape. A mesh may be, as its triangles
-    balance along the normals alone. A cap over the unit disc with edge length 0.2 comes to rest down to
-    α = 0.493, where the ratio is 1.014; a pyramid over a square with one free vertex down to α = 1/3, at
-    1.5. So the verdict uses the ratio only above ``1 + coarseness``. 0 for a closed surface that nothing
-    holds.
+    carries nothing. With weights, α + w z stands for α, and Σ w A counts against the pressure. 0 for a closed
+    surface that nothing holds. Load and capacity may depend on the shape; ``overload`` is the proof.
     """
+    topo = surface.topology
+    fixed, held = (np.asarray(mask[topo.edges].all(axis=1)) for mask in (surface.fixed, surface.held))
+    outer = topo.boundary_edge & held
+    return abs(load(surface)) / (_capacity(surface, outer | (fixed & ~_cuts_a_corner(surface))) or np.inf)
+
+
+def overload(surface: Surface) -> Overload | None:
+    """Load over capacity, if no smooth surface with these supports can carry its load; else None.
+
+    Where ``load_is_given``, both are the same for every shape. The capacity is then an upper bound: a sheet
+    pulls at an edge with its tension α per length, whatever its direction, and an edge between two fixed
+    vertices counts with all its sheets, whether it is held or only cuts off a corner of the mesh.
+
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("tent", 0.2)], fixed=range(4))  # p |Ω| = 4, α length(∂Ω) = 1.6
+    >>> print(overload(tent))
+    the pressure is 2.50 times what the boundary's tension could carry on any smooth surface
+    """
+    if not (surface.net_pressures.any() and load_is_given(surface)):
+        return None
+    fixed = np.asarray(surface.pinned[surface.topology.edges].all(axis=1))
+    ratio = abs(load(surface)) / (_capacity(surface, fixed) or np.inf)
+    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 else None
+
+
+def load_is_given(surface: Surface) -> bool:
+    """Whether load and capacity are the same for every shape that has these supports.
+
+    The load of pressures p is Σ p n·∫ν dA = ½ Σ_e [p]_e n·(a × b) by Stokes' theorem, over the edges e from
+    a to b at which the pressures of the sheets leave [p]_e ≠ 0. These must not move: both ends are fixed, or
+    both slide in one plane along Π's normal n. In such a plane at a distance d from Π's point an edge adds
+    d [p]_e times its length along Π, so that a chain of edges adds what its ends do, and these are fixed or
+    in two such planes.
+
+    The capacity is that of fixed edges and of cables' ends. So nothing may slide on Π or on a leaning plane,
+    where the length that carries varies, nor along lines. No single vertex may be held: it carries nothing on
+    a smooth surface, but something on a mesh. There must be no weights and no prescribed volumes.
+    """
+    topo, pinned = surface.topology, surface.pinned
+    if surface.rooms or surface.weights.any() or surface.given_supports.on_line or surface.on_ground.any():
+        return False
+    if any(abs(float(np.dot(plane.normal, surface.plane.normal))) > 1e-9 for plane, _ in surface.on_planes):
+        return False
+    alone = pinned.copy()
+    alone[topo.edges[pinned[topo.edges].all(axis=1)]] = False
+    masks = [pinned, *(mask for _, mask in surface.on_planes)]
+    moving = uncancelled_pressures(topo, surface.net_pressures[surface.patch_of_face], masks)
+    return not (alone.any() or moving.any())
+
+
+def _cuts_a_corner(surface: Surface) -> Bools:
+    """(e,) edges inside that cut off a single triangle between two held edges of the boundary."""
+    topo = surface.topology
+    outer = topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)
+    cut = np.zeros(len(outer), dtype=bool)
+    cut[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
+    return cut & ~topo.boundary_edge
+
+
+def _capacity(surface: Surface, carrying: Bools) -> float:
+    """The most that edges by their mask (e,), single vertices and ends of cables carry along Π's normal."""
     topo, X, F = surface.topology, surface.vertices, surface.faces
     pull = np.abs(edge_tensions(surface))
     sheets = np.bincount(topo.edge_of_face.ravel(), pull.ravel(), len(topo.edges))
-    inside = surface.fixed & ~topo.on_boundary
-    line = inside[topo.edges].all(axis=1)
-    carrying = (topo.boundary_edge & surface.held[topo.edges].all(axis=1)) | line
     lengths = segment_lengths(X, topo.edges[carrying])
+    slides = ~surface.pinned[topo.edges[carrying]].all(axis=1)
     for plane, mask in surface.on_planes:  # a plane carries across itself; a mirror plane nothing at all
         steep = 0.0 if plane.mirror else abs(float(np.dot(plane.normal, surface.plane.normal)))
-        lengths[mask[topo.edges[carrying]].all(axis=1)] *= steep
+        lengths[slides & mask[topo.edges[carrying]].all(axis=1)] *= steep
     capacity = float(sheets[carrying] @ lengths)
     supports = surface.fixed | surface.on_plane
-    single = inside | (supports & topo.on_boundary)
+    single = (surface.fixed & ~topo.on_boundary) | (supports & topo.on_boundary)
     single[topo.edges[carrying]] = False
     if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
         capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
     ends, tension = surface.cable_edges
-    capacity += float(tension[supports[ends].sum(axis=1) == 1].sum())
-    return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
+    return capacity + float(tension[supports[ends].sum(axis=1) == 1].sum())
 
 
 def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
@@ -105,19 +162,10 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     return f"the supports carry the loads{whose} {share} about ({place}){coarse}"
 
 
-def load_is_given(surface: Surface) -> bool:
-    """Whether a ``load_ratio`` above 1 rules out every shape of the surface, not this one alone.
-
-    The load depends on the shape where patches weigh something, where the surface has free edges, as between
-    cables, and where rooms prescribe volumes instead of pressures.
-    """
-    topo = surface.topology
-    free = topo.boundary_edge & ~surface.held[topo.edges].all(axis=1)
-    return not (surface.rooms or surface.weights.any() or free.any())
-
-
 def load_name(surface: Surface) -> str:
-    """What sentences call the load: "pressure", or "net pressure" where snow is taken off."""
+    """What sentences call the load: "pressure", "net pressure" less snow, "weight", or "load" for several."""
+    if surface.weights.any():
+        return "load" if surface.net_pressures.any() else "weight"
     return "net pressure" if surface.snows.any() else "pressure"
 
 
@@ -166,7 +214,8 @@ def unbalanced(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. A junction that is held
     all along is left out, as its support takes the difference, and so is one with a wall that slides on
     Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,) marks such walls.
-    Nothing is known where a cable pulls, too, or a sheet's weight changes its tension with the height.
+    Nothing is known where a cable or pressures that do not cancel pull, too, or a sheet's weight changes its
+    tension with the height.
     """
     return _strained(surface, pinchable, 1.0 + 1e-9)
 
@@ -200,6 +249,7 @@ def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJun
         *others, largest = sorted(surface.tensions[list(curve.sheets)])
         excused = pinchable[strongest] or held[curve.vertices].all()
         excused = excused or surface.weights[list(curve.sheets)].any() or _carries_cable(surface, curve)
+        excused = excused or surface.uncancelled[surface.topology.edge_numbers(curve.pairs)].any()
         if largest > share * sum(others) and not excused:
             names = tuple(surface.patches[i].name for i in curve.sheets)
             remedy = _remedy(surface, curve.sheets)
@@ -233,18 +283,53 @@ def _carries_cable(surface: Surface, curve: Curve) -> bool:
     return bool(np.isin(numbers(curve.pairs), on_cable).any())
 
 
-def unheld(surface: Surface, stable: bool) -> Unheld | None:
-    """A part that no vertex fixes and that so has no equilibrium, or no ``stable`` one; or None.
+def unheld(surface: Surface) -> Unheld | None:
+    """A part without supports that shrinks, as nothing presses it, or falls under its weight; or None.
 
-    A part around a room of prescribed volume can neither grow nor shrink: it may well be at rest.
+    A part around a room of prescribed volume cannot shrink. One under pressure has an equilibrium that is not
+    stable (``growing_part``); that of a bubble of tension α is the sphere of radius 2 α/p.
 
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
     ...                [Patch("tent", 1.0)], on_plane=range(4))
-    >>> unheld(tent, stable=True), unheld(tent, stable=False)
-    (Unheld(vertex=0, pressed=True), None)
+    >>> unheld(tent), unheld(tent.retensioned(None, {"tent": 0.0})), growing_part(tent)
+    (None, Unheld(vertex=0, falls=False), 0)
     """
+    parts, patch = surface.topology.components, surface.patch_of_face
+    resting = surface.held.copy()
+    resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
+    falling = np.setdiff1d(parts[surface.faces[surface.weights[patch] > 0.0, 0]], parts[resting])
+    if len(falling) and not (surface.weights < 0.0).any():
+        return Unheld(int(np.flatnonzero(parts == falling[0])[0]), falls=True)
+    for part, pressed in _scaled(surface):
+        if not pressed and surface.tensions[patch[parts[surface.faces[:, 0]] == part]].any():
+            return Unheld(int(np.flatnonzero(parts == part)[0]))
+    return None
+
+
+def growing_part(surface: Surface) -> int | None:
+    """A vertex of a part under pressure that nothing fixes: none of its equilibria is stable; or None.
+
+    Its homotheties about Π's point are free: E(s) = s² T - s³ P, or with cables s C + s² T - s³ P, where
+    T = Σ α A and P = Σ p V. At rest C + 2 T = 3 P, and there E'' = 2 T - 6 P = -2 (T + C) < 0.
+    """
+    parts = surface.topology.components
+    return next(
+        (int(np.flatnonzero(parts == part)[0]) for part, pressed in _scaled(surface) if pressed), None
+    )
+
+
+def describe_growing(vertex: int) -> str:
+    """Why none of the equilibria of ``growing_part`` is stable, and what to do."""
+    return (
+        f"nothing fixes the part of the surface around vertex {vertex}: from every equilibrium it grows or"
+        " shrinks to nothing, so that none is stable; hold it, or prescribe its volume (rooms=)"
+    )
+
+
+def _scaled(surface: Surface) -> list[tuple[int, bool]]:
+    """The connected parts that may grow and shrink about a point, and whether there is pressure on them."""
     parts, used = surface.topology.components, surface.faces[:, 0]
     pressed = np.unique(parts[used[surface.net_pressures[surface.patch_of_face] != 0.0]])
     held = surface.given_supports.fixed.copy()
@@ -252,10 +337,8 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
         held |= along
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
-    for part in np.setdiff1d(parts[used], parts[held]):
-        if (stable or part not in pressed) and _may_shrink(surface, parts == part):
-            return Unheld(int(np.flatnonzero(parts == part)[0]), bool(part in pressed))
-    return None
+    loose = np.setdiff1d(parts[used], parts[held])
+    return [(part, bool(part in pressed)) for part in loose if _may_shrink(surface, parts == part)]
 
 
 def _may_shrink(surface: Surface, part: Bools) -> bool:

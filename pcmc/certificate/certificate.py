@@ -34,10 +34,10 @@ from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_
 from .cables import cable_end_table, cable_table
 from .curve_tables import junction_table, room_table
 from .leaning import lean_table, lean_texts
-from .proof import Proof
+from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
-from .supports import boundary_view, support_table
-from .verdict import COLLAPSED, NEUTRAL, Evidence, Findings, Verdict, judge
+from .supports import boundary_view, pull_table, support_table
+from .verdict import COLLAPSED, NEAR, NEUTRAL, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
 UNKNOWN = np.empty(0), np.empty((0, 0, 3))  # no eigenvalues, no modes
@@ -71,6 +71,7 @@ class Certificate:
     supports : one row per support: a line, point, plane, mirror or end of a cable, with its length, middle,
         force, moment and largest force per length; see ``pcmc.certificate.supports.support_table``.
         Its forces and moments add up to those of the loads, but for the ``balance``'s remainder.
+    pulls : one row per edge of these, with the force per length there and its direction.
     boundaries : the rows of ``supports`` that are as long as a curve: length, middle, reaction, largest
         reaction per length.
     balance : force and moment of the loads, of the supports, and what remains of both: a row each.
@@ -86,7 +87,8 @@ class Certificate:
     load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
-        ``Fold`` or ``Unheld``.
+        ``Unheld`` or ``WeakCable``.
+    tried : what a search for an equilibrium has tried, if that led to none.
     """
 
     verdict: Verdict
@@ -109,6 +111,7 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    tried: tuple[Attempt, ...] = ()
     cables: pd.DataFrame = field(default_factory=pd.DataFrame)
     cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -119,6 +122,11 @@ class Certificate:
     def supports(self) -> pd.DataFrame:
         """The table of supports, made when first asked for."""
         return support_table(self.acting)
+
+    @cached_property
+    def pulls(self) -> pd.DataFrame:
+        """The force per length along each edge of the supports, made when first asked for."""
+        return pull_table(self.acting)
 
     @cached_property
     def balance(self) -> pd.DataFrame:
@@ -210,7 +218,7 @@ def certify(
     modes: int = 1,
     tolerance: float = TOLERANCE,
     evidence: Evidence | None = None,
-    proofs: tuple[Proof, ...] = (),
+    tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
 ) -> Certificate:
     """Examine a surface.
@@ -220,7 +228,7 @@ def certify(
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
     tolerance : relative residual, > 0, up to which it counts as at rest.
-    evidence, proofs : what happened to it while it was solved, and what that proves.
+    evidence, tried : what happened to it while it was solved, and what a search has tried without success.
         ``Result.certify`` passes them on.
     whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
         index then, and not only those symmetric in these planes. True, or the planes to unfold at.
@@ -277,10 +285,9 @@ def certify(
         quality=quality,
         spectrum=spectrum,
         own_residuals=_own_residuals(standing, classes, left),
-        load_ratio=ratio,
         rounding=rounding_left(standing, classes, X),
         evidence=evidence,
-        given=proofs,
+        tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
         rigid=rigid.shape[1] if surface.rooms else 0,
     )
@@ -306,6 +313,7 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        tried=tried,
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
         rooms=rooms,
@@ -319,7 +327,8 @@ def _stability(
 ) -> tuple[Spectrum, Floats, Floats]:
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
     variation = SecondVariation.of(surface, classes, space, rigid)
-    spectrum, system = count_soft(variation, NEUTRAL / surface.size**2)
+    square = surface.size**2
+    spectrum, system = count_soft(variation, NEUTRAL / square, NEAR / square)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)

@@ -10,7 +10,6 @@ from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import Curve
-from .balance import edge_tensions
 
 ROUNDING = 1e-12  # of the size: a coordinate below is 0
 
@@ -21,23 +20,32 @@ def conormal_sum(surface: Surface, edges: Ints) -> Floats:
     With weights, α + w z stands for α. Zero along a junction of smooth surfaces at rest (7) without a
     cable; of triangles it is zero only in the limit.
     """
-    topo, tension = surface.topology, edge_tensions(surface)
-    row = np.full(len(topo.edges), -1)
-    row[edges] = np.arange(len(edges))
+    at, face, corners = sides_at(surface, edges)
+    c, a, b = surface.vertices[corners].transpose(1, 0, 2)
+    along = b - a
+    length = np.linalg.norm(along, axis=1)
+    along /= np.where(length > 0.0, length, 1.0)[:, None]
+    out = a - c
+    out -= np.einsum("ij,ij->i", out, along)[:, None] * along
+    length = np.linalg.norm(out, axis=1)
+    k, height = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
+    pull = (surface.tensions[k] + surface.weights[k] * height) / np.where(length > 0.0, length, 1.0)
     total = np.zeros((len(edges), 3))
-    for corner in range(3):
-        at = row[topo.edge_of_face[:, corner]]
-        faces = np.flatnonzero(at >= 0)
-        apex, a, b = (surface.vertices[surface.faces[faces, corner - k]] for k in (0, 2, 1))
-        along = b - a
-        length = np.linalg.norm(along, axis=1)
-        along /= np.where(length > 0.0, length, 1.0)[:, None]
-        out = a - apex
-        out -= np.einsum("ij,ij->i", out, along)[:, None] * along
-        length = np.linalg.norm(out, axis=1)
-        pull = tension[faces, corner] / np.where(length > 0.0, length, 1.0)
-        np.add.at(total, at[faces], pull[:, None] * out)
+    np.add.at(total, at, pull[:, None] * out)
     return total
+
+
+def sides_at(surface: Surface, edges: Ints) -> tuple[Ints, Ints, Ints]:
+    """The sides of triangles at edges (k,): which of these, the triangle, and its corners, (s,) and (s,3).
+
+    The corner opposite the side comes first.
+    """
+    row = np.full(len(surface.topology.edges), -1)
+    row[edges] = np.arange(len(edges))
+    at = row[surface.topology.edge_of_face]
+    face, corner = np.nonzero(at >= 0)
+    corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
+    return at[face, corner], face, corners
 
 
 def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:

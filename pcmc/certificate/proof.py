@@ -1,7 +1,12 @@
-"""Proofs that a surface has no equilibrium: what was found, with its numbers. ``str`` gives the sentence."""
+"""Proofs that a surface has no equilibrium, and what a search has tried. ``str`` gives the sentence.
+
+A proof is a theorem about every smooth surface of these supports, tensions and loads. A mesh may come to rest
+where no smooth surface does, as its triangles balance along their normals alone.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -9,13 +14,16 @@ from dataclasses import dataclass
 class Overload:
     """Vertical balance of the whole: the load exceeds what tension at the boundary can carry.
 
+    Load and capacity are those of every smooth surface with these supports: see
+    ``pcmc.certificate.balance.load_is_given``.
+
     Attributes
     ----------
     ratio : load over capacity, above 1; see ``pcmc.certificate.balance.load_ratio``.
     load : what it is called, ``"pressure"`` or, under snow, ``"net pressure"``.
 
     >>> print(Overload(1.2))
-    the pressure is 1.20 times what the boundary's tension could carry
+    the pressure is 1.20 times what the boundary's tension could carry on any smooth surface
     """
 
     ratio: float
@@ -23,7 +31,10 @@ class Overload:
 
     def __str__(self) -> str:
         digits = ".3f" if self.ratio < 1.1 else ".2f" if self.ratio < 1e4 else ".3g"
-        return f"the {self.load} is {self.ratio:{digits}} times what the boundary's tension could carry"
+        return (
+            f"the {self.load} is {self.ratio:{digits}} times what the boundary's tension could carry on any"
+            " smooth surface"
+        )
 
 
 @dataclass(frozen=True)
@@ -68,73 +79,131 @@ class UnbalancedJunction:
 
 
 @dataclass(frozen=True)
-class Fold:
-    """A fold on the way from an equilibrium: a branch of equilibria that turns back before it arrives.
+class WeakCable:
+    """A cable that is too weak for the free edge of a flat sail; see ``pcmc.certificate.cables.weak_cable``.
 
     Attributes
     ----------
-    parameter : what grows along the branch: ``"pressure"``, all pressures in proportion, or
-        ``"net pressure"``, that less the snow; ``"distance"``, that of the held curves from each other;
-        ``"tensions"``, the share of the way from equal tensions of the patches under pressure.
-    value : the parameter at the fold; 1 is what the surface asks for.
-    start : the parameter where the branch starts.
-    tensions : names and tensions at the fold, where these vary.
+    cable : its name. tension, least : its tension, and the least at which it could be at rest, force.
+    chord : distance of its ends, length. angle : φ, the most that its arc can turn by, radians.
 
-    >>> print(Fold("pressure", 0.8, 0.4))  # doctest: +ELLIPSIS
-    the equilibria end at a fold at 0.800 of the pressure (followed from 0.4 of it): lower all ...
-    >>> print(Fold("distance", 0.95, 0.5))  # doctest: +ELLIPSIS
-    the film ends at a fold at 0.950 of the distance between the held curves (followed from 0.5 ...
+    >>> print(WeakCable("east", 1.0, 2.0**0.5, 2.0, 0.5 * math.pi))
+    cable 'east' is too weak for a flat sail: 1 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°
     """
 
-    parameter: str
-    value: float
-    start: float
-    tensions: tuple[tuple[str, float], ...] = ()
+    cable: str
+    tension: float
+    least: float
+    chord: float
+    angle: float
 
     def __str__(self) -> str:
-        if self.parameter == "tensions":
-            at = ", ".join(f"{name} {tension:.4g}" for name, tension in self.tensions)
-            return (
-                f"from equal tensions the equilibria end at a fold at {at}, {_three(self.value)} of the way:"
-                " stay on that side of it"
-            )
-        value, start = _three(self.value), f"{self.start:.3g}"
-        if self.parameter == "distance":
-            return (
-                f"the film ends at a fold at {value} of the distance between the held curves (followed from"
-                f" {start} of it): bring them nearer to each other"
-            )
         return (
-            f"the equilibria end at a fold at {value} of the {self.parameter} (followed from {start} of it):"
-            f" lower all {self.parameter}s below {value} of theirs, or raise all tensions above"
-            f" {_three(1.0 / self.value)} times theirs"
+            f"cable {self.cable!r} is too weak for a flat sail: {self.tension:.4g} < α L / (2 sin(φ/2)) ="
+            f" {self.least:.4g}, L = {self.chord:.4g}, φ = {math.degrees(self.angle):.3g}°"
         )
 
 
 @dataclass(frozen=True)
 class Unheld:
-    """A part that no vertex fixes has no stable equilibrium, and none at all without pressure.
+    """A part that no support holds: without pressure it shrinks, with a weight it falls.
 
-    Its homotheties about Π's point are free, so that E(s) = s² T - s³ P with T = Σ α A and P = Σ p V.
-    At rest 2 T = 3 P, and there E'' = -2 T < 0.
+    Without pressure its homotheties about Π's point have E(s) = s T, or s² T and cables s C, all of which
+    grow with s. Of a part on no support E(X + t n) = E(X) + t Σ w A, where the pressures cancel.
 
     Attributes
     ----------
     vertex : one of its vertices.
-    pressed : whether any of its patches is under pressure.
+    falls : whether it falls; otherwise it shrinks.
     """
 
     vertex: int
-    pressed: bool
+    falls: bool = False
 
     def __str__(self) -> str:
-        part = f"nothing fixes the part of the surface around vertex {self.vertex}"
-        if self.pressed:
-            return f"{part}: from every equilibrium it grows or shrinks to nothing, so that none is stable"
-        return f"{part}, which has no pressure: it shrinks to nothing"
+        why = (
+            "and it has a weight: it falls" if self.falls else "which has no pressure: it shrinks to nothing"
+        )
+        return f"nothing holds the part of the surface around vertex {self.vertex}, {why}"
 
 
-Proof = Overload | UnbalancedJunction | Fold | Unheld
+Proof = Overload | UnbalancedJunction | Unheld | WeakCable
+
+STARTS = {
+    "given start": "from the given start",
+    "low start": "from a low start",
+    "stationary point": "sought as any stationary point",
+}
+ENDINGS = {
+    "diverged": "the surface grows without bound",
+    "vanished": "the surface shrinks to nothing",
+    "degenerate": "triangles collapse",
+    "stalled": "no step helps any more",
+    "iteration_limit": "the limit of iterations is reached",
+    "non_finite": "a number is not finite",
+    "saddle": "the way leads to a saddle",
+    "lost": "the branch of equilibria cannot be followed beyond {at}",
+    "no start": "no equilibrium is found to begin with",
+    "fold": "the branch of equilibria folds at {at}",
+}
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What a search for an equilibrium has tried, and how that ended. It proves nothing about other shapes.
+
+    Attributes
+    ----------
+    way : ``"given start"``, ``"low start"``, ``"stationary point"``; or what grows along a branch of
+        equilibria: ``"pressure"``, ``"net pressure"``, ``"weight"``, ``"load"`` (pressure and weight), of all
+        patches in proportion; ``"distance"``, that of the held curves from each other; ``"tensions"``, the
+        share of the way from equal tensions of the patches under pressure.
+    end : a key of ``ENDINGS``: a branch folds, is lost, or has no start; the solver's status where it failed.
+    value : what grows, at the end of the branch; 1 is what the surface asks for. None without a branch.
+    start : where the branch begins.
+    tensions : names and tensions at the end, where these vary.
+
+    >>> print(Attempt("pressure", "fold", 0.8, 0.4))  # doctest: +ELLIPSIS
+    the branch of equilibria folds at 0.800 of the pressure (followed from 0.4 of it): lower all ...
+    >>> print(Attempt("given start", "diverged"))
+    from the given start the surface grows without bound
+    """
+
+    way: str
+    end: str
+    value: float | None = None
+    start: float | None = None
+    tensions: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def folds(self) -> bool:
+        """Whether a branch of equilibria has turned back."""
+        return self.end == "fold"
+
+    def __str__(self) -> str:
+        if self.way in STARTS:
+            return f"{STARTS[self.way]} {ENDINGS[self.end]}"
+        if self.value is None:
+            along = {"distance": "moved apart", "tensions": "from equal tensions"}
+            return f"{along.get(self.way, f'raising the {self.way}')}: {ENDINGS[self.end]}"
+        name = "distance between the held curves" if self.way == "distance" else self.way
+        at = f"{_three(self.value)} of the {name} (followed from {self.start:.3g} of it)"
+        if self.way == "tensions":
+            reached = ", ".join(f"{patch} {tension:.4g}" for patch, tension in self.tensions)
+            at = f"{reached}, {_three(self.value)} of the way from equal tensions"
+        return ENDINGS[self.end].format(at=at) + (f": {self.remedy}" if self.folds else "")
+
+    @property
+    def remedy(self) -> str:
+        """What brings a surface to where the branch still is."""
+        if self.way == "distance":
+            return "bring the held curves nearer to each other"
+        value = self.value or 0.0
+        if self.way == "tensions" or not value:
+            return "stay on that side of it"
+        loads = "pressures and weights" if self.way == "load" else f"{self.way}s"
+        below, above = _three(value), _three(1.0 / value)
+        return f"lower all {loads} below {below} of theirs, or raise all tensions above {above} times theirs"
 
 
 def _three(value: float) -> str:

@@ -1,4 +1,14 @@
-"""The forces of the supports, and how they act: along lines, at points, and across mirror planes."""
+"""The forces of the supports, and how they act: along lines, at points, and across mirror planes.
+
+Along a line a support holds the pull of the sheets there, Σ (α + w z) n per length with their outward
+co-normals n, as far as it can: a plane holds the part across itself. The forces at the vertices are
+
+    f_v = Σ ½ L_e Σ (α + w z) n_e over the held edges e at v + the ends of cables + r_v,
+
+with r_v half the same sums over the other edges at v, less ⅓ Σ p A_T ν_T. Where sheets are smooth r_v is
+O(h²), as curvature balances pressure, and beside corners and where junctions end O(h): nothing of it is
+left in the limit. Forces at points are those of cables that end, and of points held alone.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +25,9 @@ from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.supports import symmetric_part
 from .cables import cable_ends
+from .curve_tables import conormal_sum
 
 SPAN = 1e-9  # of the largest force: what planes leave of the forces that they carry
-
-
-def held_lengths(surface: Surface) -> Floats:
-    """(n,) half the length of the boundary edges at each vertex that are held at both ends, length.
-
-    In a mirror plane nothing is held.
-    """
-    return _half_lengths(surface, np.tile(_held_boundary(surface)[:, None], 2))
 
 
 def reactions(surface: Surface) -> Floats:
@@ -58,6 +61,7 @@ class SupportForces(NamedTuple):
     lines : (e,2) the ends of edges that are held as lines: of the boundary, of lines inside the surface, and
         of junctions that a plane holds, as on an upright wall, or that rest on Π.
     lengths : (n,) half the length of the edges of ``lines`` at each vertex; 0 where there is none.
+    pulls : (e,3) force per length that holds the sheets along the edges of ``lines``; 0 at the others.
     clamped : (n,) the vertices that cannot move, or only along a line that was given.
     single : (n,) those of them that are in no line.
     on_boundary : (n,) the vertices of the held boundary.
@@ -73,6 +77,7 @@ class SupportForces(NamedTuple):
     mirrors: Floats
     lines: Bools
     lengths: Floats
+    pulls: Floats
     clamped: Bools
     single: Bools
     on_boundary: Bools
@@ -81,25 +86,32 @@ class SupportForces(NamedTuple):
 
     @property
     def per_length(self) -> Floats:
-        """(n,3) ``along`` over ``lengths``, force/length; NaN where there is no line.
-
-        Each end of an edge gets half of its length.
-        """
+        """(n,3) the mean of ``pulls`` along the lines at a vertex, force/length; NaN where there is none."""
+        edges, force = self.surface.topology.edges, np.zeros_like(self.forces)
+        half = 0.5 * segment_lengths(self.surface.vertices, edges)[:, None] * self.pulls
+        for side in (0, 1):
+            np.add.at(force, edges[:, side], half * self.lines[:, [side]])
         share = self.lengths[:, None]
-        return np.divide(self.along, share, out=np.full(self.along.shape, np.nan), where=share > 0.0)
+        return np.divide(force, share, out=np.full(force.shape, np.nan), where=share > 0.0)
 
-    def of_patch(self, patch: int | None) -> Bools:
-        """(n,) the vertices of lines at the edges of a patch, or of all lines."""
-        topo, mask = self.surface.topology, np.zeros(self.surface.n, dtype=bool)
+    @property
+    def left(self) -> Floats:
+        """(n,3) at vertices of lines r_v: ``along`` less the pulls; a mesh leaves it, the limit does not."""
+        return np.where(
+            self.lengths[:, None] > 0.0, self.along - self.lengths[:, None] * self.per_length, 0.0
+        )
+
+    def along_patch(self, patch: int | None) -> Bools:
+        """(e,) the edges of lines that belong to a patch, or all of them."""
+        topo = self.surface.topology
         own = np.full(len(topo.edges), patch is None)
         own[topo.edge_of_face[self.surface.patch_of_face == patch]] = True
-        mask[topo.edges[self.lines & own[:, None]]] = True
-        return mask & (self.lengths > 0.0)
+        return own & self.lines.any(axis=1)
 
     def largest_per_length(self, patch: int | None = None) -> float | None:
-        """The largest force per length on lines at the edges of a patch, or on all; None without any."""
-        chosen = self.of_patch(patch)
-        return float(np.linalg.norm(self.per_length[chosen], axis=1).max()) if chosen.any() else None
+        """The largest of ``pulls`` on lines at the edges of a patch, or on all; None without any."""
+        sizes = np.linalg.norm(self.pulls[self.along_patch(patch)], axis=1)
+        return float(sizes.max()) if len(sizes) else None
 
 
 def support_forces(
@@ -115,8 +127,9 @@ def support_forces(
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
     ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
-    >>> (3 * support_forces(square).per_length).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
-    [-1.5, 1.5, -1.0]
+    >>> acting = support_forces(square)
+    >>> acting.forces[1].tolist()[:2], acting.pulls[0].tolist()  # the edge from (1, 1) to (-1, 1)
+    ([-1.0, 1.0], [0.0, 1.0, 0.0])
     """
     standing = standing_part(surface).surface if standing is None else standing
     forces = reactions(standing) if forces is None else forces
@@ -125,7 +138,7 @@ def support_forces(
     for _, vertex, force in cable_ends(standing):
         ends[vertex] += force
     ends -= apply_supports(standing, ends.copy())
-    clamped, by_plane, cables = _divided(standing, forces, ends)
+    clamped, on, by_plane, cables = _divided(standing, forces, ends)
     mirror = [False, *(plane.mirror for plane, _ in planes)]
     mirrors = by_plane[mirror].sum(axis=0)
     boundary, held = _held_boundary(surface), standing.fixed | standing.on_plane
@@ -135,10 +148,21 @@ def support_forces(
     for plane, mask in planes:
         held = held | (mask & (not plane.mirror))
     single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
-    junction = (topo.junction_edge | topo.seam_edge) & at_both_ends(held, topo.edges)
-    inner = at_both_ends(single, topo.edges)
+    between = topo.junction_edge | topo.seam_edge
+    junction = between & at_both_ends(held, topo.edges)
+    drawn = (between | surface.edges_on_curves.drawn) & ~topo.boundary_edge
+    inner = at_both_ends(single, topo.edges) | (drawn & at_both_ends(clamped, topo.edges))
     lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
     lengths = _half_lengths(surface, lines)
+    pulls, normals = (
+        np.zeros((len(lines), 3)),
+        np.array([standing.plane.normal, *(p.normal for p, _ in planes)]),
+    )
+    some = np.flatnonzero(lines.any(axis=1))
+    pulls[some] = sheet_pulls(standing, topo.edges[some])
+    common = (on | clamped)[:, topo.edges[some]].all(axis=2) & ~np.array(mirror)[:, None]
+    part = some[~at_both_ends(clamped, topo.edges[some])]
+    pulls[part] = _by_normal(normals, common[:, np.isin(some, part)], pulls[part]).sum(axis=0)
     points = np.where(lengths[:, None] > 0.0, ends - cables[mirror].sum(axis=0), 0.0)
     inside = forces - mirrors
     alone = single & (lengths == 0.0)
@@ -153,6 +177,7 @@ def support_forces(
         mirrors,
         lines,
         lengths,
+        pulls,
         clamped,
         alone,
         on_boundary,
@@ -180,9 +205,16 @@ def _half_lengths(surface: Surface, ends: Bools) -> Floats:
     return np.asarray(np.bincount(edges[ends], half[ends], surface.n), dtype=float)
 
 
-def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Floats, Floats]:
-    """The vertices (n,) that lines and points hold, and what Π and the other planes, (1 + planes,n,3), carry
-    of the reactions (n,3), and of those at the ends of cables.
+def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
+    """(k,3) Σ (α + w z) n of the sheets at edges, given by their ends (k,2); 0 where there is no edge."""
+    numbers, pulls = surface.topology.edge_numbers(ends), np.zeros((len(ends), 3))
+    pulls[numbers >= 0] = conormal_sum(surface, numbers[numbers >= 0])
+    return pulls
+
+
+def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Bools, Floats, Floats]:
+    """The vertices (n,) that lines and points hold, those on Π and each of the other planes (1 + planes,n),
+    and what these, (1 + planes,n,3), carry of the reactions (n,3), and of those at the ends of cables.
     """
     planes = (surface.plane, *(plane for plane, _ in surface.on_planes))
     normals = np.array([plane.normal for plane in planes])
@@ -202,7 +234,7 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Flo
             for part in (forces, ends)
         )
         clamped = clamped | (np.linalg.norm(forces - carried.sum(axis=0), axis=1) > least)
-    return clamped, carried, of_cables
+    return clamped, on, carried, of_cables
 
 
 def _by_normal(normals: Floats, on: Bools, vectors: Floats) -> Floats:

@@ -14,7 +14,7 @@ from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, Curve, vertex_kind
 from .cables import cable_ends
 from .curve_tables import middle
-from .reactions import SupportForces, at_both_ends
+from .reactions import SupportForces, at_both_ends, sheet_pulls
 
 COLUMNS = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 COLUMNS += ["moment_x", "moment_y", "moment_z", "per_length_max"]
@@ -23,7 +23,9 @@ STEEP = 1e-9  # of a normal's part along that of Π, up to which a plane is upri
 
 
 class _Part(NamedTuple):
-    """A support: name and kind, its vertices (k,), its share of the force at each (k,3), length, place."""
+    """A support: name and kind, its vertices (k,), its share of the force at each (k,3), length, place,
+    and its edges (j,) with the pull along each (j,3).
+    """
 
     name: str
     kind: str
@@ -31,13 +33,14 @@ class _Part(NamedTuple):
     forces: Floats
     length: float
     place: Floats
-    per_length: float = np.nan
+    edges: Ints = np.empty(0, dtype=np.int64)
+    pulls: Floats = np.empty((0, 3))
 
 
 def support_table(acting: SupportForces) -> pd.DataFrame:
     """A row per support of the part of a surface that stands; together they carry all its reactions.
 
-    Where curves meet in a corner, they share its force equally; per length it counts in full in each.
+    Where curves meet in a corner, they share its force equally.
 
     Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
     for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
@@ -46,16 +49,33 @@ def support_table(acting: SupportForces) -> pd.DataFrame:
     upright); "mirror", the pull of the image across a mirror plane; "point", a single fixed point with the
     cables that end there; "cable end", the force of cables that end on a line, which has no part in it.
     ``length``, 0 for points; ``x``, ``y``, ``z``, the middle; ``force_x``, …, of the support on the surface;
-    ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest force per length.
+    ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest of the
+    ``pulls`` along its edges, NaN for points.
     """
     rows, surface = [], acting.surface
     size = surface.size
     for label, part in _labelled(acting):
         at = np.where(np.abs(part.place) <= 1e-12 * size, 0.0, part.place)
         moment = np.cross(surface.vertices[part.vertices] - at, part.forces).sum(axis=0)
-        numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, part.per_length]
+        numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, _most(part.pulls)]
         rows.append([label, part.name or label, part.kind, *map(float, numbers)])
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def pull_table(acting: SupportForces) -> pd.DataFrame:
+    """A row per edge of the supports that are as long as a curve: where it is, and how it is pulled.
+
+    Columns: ``support``, as in the table of supports; ``x``, ``y``, ``z``, the middle of the edge;
+    ``length``; ``pull_x``, ``pull_y``, ``pull_z``, the force per length with which the support holds the
+    sheets there, Σ (α + w z) n with their outward co-normals n: of a plane the part across it.
+    """
+    topo, X = acting.surface.topology, acting.surface.vertices
+    rows: list[tuple[object, ...]] = []
+    for label, part in _labelled(acting):
+        ends = topo.edges[part.edges]
+        numbers = [*X[ends].mean(axis=1).T, segment_lengths(X, ends), *part.pulls.T]
+        rows += zip([label] * len(ends), *numbers, strict=True)
+    return pd.DataFrame(rows, columns=["support", *"xyz", "length", "pull_x", "pull_y", "pull_z"])
 
 
 def support_vertices(acting: SupportForces) -> dict[str, Ints]:
@@ -135,23 +155,22 @@ def _mirrors(acting: SupportForces) -> Iterator[_Part]:
             continue
         edges = surface.mirror_edge & at_both_ends(mask, topo.edges)
         curves = [c for p in np.unique(patch[edges]) for c in topo.curves_among(edges & (patch == p))]
-        ends = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[edges]), 2)
-        share = np.asarray(np.bincount(topo.edges[edges].ravel(), ends, surface.n), dtype=float)
-        pull, even = acting.by_plane[k], acting.by_plane[k] - acting.cables[k]
+        pull = acting.by_plane[k]
         groups = [curve.vertices for curve in curves]
         for curve, forces in zip(curves, _shared(pull, groups), strict=True):
             name = f"{_names(surface, curve.sheets)} in the {plane}"
-            yield _line(acting, "mirror", curve, forces, name, even, share)
+            normal = np.array(plane.normal)
+            across = np.outer(sheet_pulls(acting.standing, curve.pairs) @ normal, normal)
+            yield _line(acting, "mirror", curve, forces, name, across)
         yield from _others(acting, "mirror", pull, mask, groups, f"single points in the {plane}")
 
 
 def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
     """The lines inside the surface that are held."""
     surface, topo = acting.surface, acting.surface.topology
-    inside = acting.clamped & ~acting.on_boundary
-    chosen = acting.lines[:, 0] & acting.lines[:, 1] & at_both_ends(inside, topo.edges)
-    curves = topo.curves_among(chosen)
-    for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
+    chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
+    curves, along = topo.curves_among(chosen), np.where(acting.on_boundary[:, None], 0.0, acting.along)
+    for curve, forces in zip(curves, _shared(along, [c.vertices for c in curves]), strict=True):
         yield _line(acting, "line", curve, forces, f"{_names(surface, curve.sheets)}, inside")
 
 
@@ -192,8 +211,17 @@ def _planes(acting: SupportForces) -> Iterator[_Part]:
             lengths = segment_lengths(surface.vertices, ends)
             points = surface.vertices[ends].mean(axis=1) if edges.any() else surface.vertices[vertices]
             place = np.average(points, axis=0, weights=lengths if lengths.sum() > 0.0 else None)
-            most = _most(acting.per_length, vertices[inside[vertices]])
-            yield _Part(name + where, kind, vertices, forces, float(lengths.sum()), place, most)
+            pulled = np.flatnonzero(edges & acting.lines.any(axis=1))
+            yield _Part(
+                name + where,
+                kind,
+                vertices,
+                forces,
+                float(lengths.sum()),
+                place,
+                pulled,
+                acting.pulls[pulled],
+            )
         name = f"single points{where}"
         yield from _others(acting, kind, pull, mask & inside, [vertices for _, vertices, _ in groups], name)
 
@@ -223,22 +251,20 @@ def _line(
     curve: Curve,
     forces: Floats,
     name: str,
-    field: Floats | None = None,
-    share: Floats | None = None,
+    pulls: Floats | None = None,
 ) -> _Part:
-    """A support along a curve; the largest force per length is that of ``field`` over ``share``."""
-    surface, per_length = acting.surface, acting.per_length
-    if field is not None and share is not None:
-        per_length = np.divide(field, share[:, None], out=np.zeros_like(field), where=share[:, None] > 0.0)
+    """A support along a curve; the ``pulls`` (k,3) along its edges are those of the lines if not given."""
+    surface = acting.surface
+    edges = surface.topology.edge_numbers(curve.pairs)
+    pulls = acting.pulls[edges] if pulls is None else pulls
     length = float(segment_lengths(surface.vertices, curve.pairs).sum())
-    place, most = np.array(list(middle(surface, curve).values())), _most(per_length, curve.vertices)
-    return _Part(name, kind, curve.vertices, forces, length, place, most)
+    place = np.array(list(middle(surface, curve).values()))
+    return _Part(name, kind, curve.vertices, forces, length, place, edges, pulls)
 
 
-def _most(per_length: Floats, vertices: Ints) -> float:
-    """The largest of forces per length (n,3) at the vertices; NaN where there is none."""
-    sizes = np.linalg.norm(per_length[vertices], axis=1)
-    return float(np.nanmax(sizes)) if np.isfinite(sizes).any() else np.nan
+def _most(pulls: Floats) -> float:
+    """The largest of pulls (k,3); NaN where there is none."""
+    return float(np.linalg.norm(pulls, axis=1).max()) if len(pulls) else np.nan
 
 
 def _shared(forces: Floats, groups: Sequence[Ints]) -> list[Floats]:

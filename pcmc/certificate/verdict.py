@@ -13,15 +13,19 @@ from ..base.arrays import Bools, Floats
 from ..energy.weight import compressed, effective_tensions
 from ..stability.softness import Spectrum
 from ..surface import Surface
-from .balance import coarseness, hardly_balanced, load_is_given, load_name, unbalanced, unheld
-from .cables import too_long
+from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
+from .cables import too_long, weak_cable
 from .collapse import held_wall_down, where_collapsed
 from .neck import Neck, pinched_neck
-from .proof import Overload, Proof
+from .proof import Attempt, Overload, Proof
 from .slipping import describe_saddle
 
 NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
+# |λ| size²/α up to which the detail names a fold. A mesh's own branch folds where the derivative of the
+# forces left is singular, which is not quite the second variation: at reported folds of coarse caps,
+# catenoids and pairs of caps |λ| is 0.003 to 0.55. A flat film over a disc has 46.
+NEAR = 1.0
 NEUTRAL = 1e-2  # |λ| size²/α up to which a motion counts as neutral, α the tension of what it moves
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
@@ -34,7 +38,10 @@ class Verdict(Enum):
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
-    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance, as the detail proves"
+    NO_EQUILIBRIUM = "no equilibrium: no smooth surface is at rest here, as the detail proves"
+    NONE_FOUND = (
+        "none found: no equilibrium was found, nor a proof that there is none; the detail has what was tried"
+    )
     RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
     UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail has the reason"
     WALL_DOWN = "wall down: a junction comes down on the held bottom of its wall, where it cannot rest"
@@ -62,9 +69,8 @@ class Findings:
     spectrum : how many eigenvalues are negative, and how many nearly zero; see ``Spectrum``.
     own_residuals : (patches,) each patch's forces left, relative to its own.
     rounding : what rounding of the coordinates alone leaves of the residual, about.
-    load_ratio : pressure over the most that the boundary's tension could carry.
     evidence : what happened on the way, if a solver was there to see it.
-    given : proofs that there is no equilibrium, which a solver brought.
+    tried : what a search has tried; empty if there was none.
     mode : (n,3) displacements of the lowest mode; empty where none is known.
     rigid : number of rigid motions that nothing resists, where rooms prescribe volumes.
     """
@@ -76,10 +82,9 @@ class Findings:
     quality: float
     spectrum: Spectrum
     own_residuals: Floats
-    load_ratio: float
     rounding: float = 0.0
     evidence: Evidence | None = None
-    given: tuple[Proof, ...] = ()
+    tried: tuple[Attempt, ...] = ()
     mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
     rigid: int = 0
 
@@ -89,35 +94,41 @@ class Findings:
         return self.residual > self.tolerance
 
     @cached_property
+    def overload(self) -> Overload | None:
+        """The load that no smooth surface could carry, while forces are left."""
+        return overload(self.surface) if self.moving else None
+
+    @cached_property
     def proofs(self) -> tuple[Proof, ...]:
-        """Why there is no equilibrium, while forces are left; those of the shape first."""
+        """Why there is no equilibrium, while forces are left.
+
+        A mesh may come to rest under a load a little above what a smooth surface carries: where no solver saw
+        it inflate or collapse, an overload within ``coarseness`` is left out.
+        """
         if not self.moving:
             return ()
-        of_shape = (
+        settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
+        load = self.overload
+        if load and not settled and load.ratio <= 1.0 + coarseness(self.surface):
+            load = None
+        proofs = (
             unbalanced(self.surface, self.pinchable),
-            Overload(self.load_ratio, load_name(self.surface)) if self.overloaded else None,
-            unheld(self.surface, stable=False),
+            load,
+            unheld(self.surface),
+            weak_cable(self.surface),
         )
-        proofs = [proof for proof in of_shape if proof is not None]
-        kinds = {type(proof) for proof in proofs}
-        return (*proofs, *(proof for proof in self.given if type(proof) not in kinds))
+        return tuple(proof for proof in proofs if proof is not None)
+
+    @property
+    def lost(self) -> bool:
+        """Whether a solver saw the surface run away, or a branch of equilibria fold."""
+        away = self.evidence in (Evidence.INFLATED, Evidence.VANISHED) or self.neck is not None
+        return self.moving and (away or any(attempt.folds for attempt in self.tried))
 
     @cached_property
     def hardly_balanced(self) -> str:
         """Names a junction whose tensions can hardly balance, while forces are left; else empty."""
         return hardly_balanced(self.surface, self.pinchable) if self.moving else ""
-
-    @property
-    def overloaded(self) -> bool:
-        """Whether the pressure is more than the boundary can carry, beyond what the mesh leaves open.
-
-        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open. Where the load
-        depends on the shape (``load_is_given``), the ratio proves nothing.
-        """
-        if not load_is_given(self.surface):
-            return False
-        settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
-        return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
 
     @cached_property
     def neck(self) -> Neck | None:
@@ -145,6 +156,17 @@ def judge(findings: Findings) -> tuple[Verdict, str]:
     return rule.verdict, rule.reason(findings)
 
 
+def _disproved(f: Findings) -> str:
+    folds = (attempt for attempt in f.tried if attempt.folds)
+    return "; ".join(map(str, (*f.proofs, *folds, *([f.neck] if f.neck else []))))
+
+
+def _none_found(f: Findings) -> str:
+    vertex = growing_part(f.surface)
+    alone = "" if vertex is None else describe_growing(vertex)
+    return "; ".join(filter(None, (alone, *map(str, f.tried), str(f.neck or ""), _compressed(f))))
+
+
 def _ran_away(f: Findings) -> str:
     if f.neck is not None:
         return f"{f.neck}; bring the held curves nearer to each other, or raise the pressure"
@@ -159,7 +181,7 @@ def _ran_away(f: Findings) -> str:
 
 def _collapse(f: Findings) -> str:
     reasons = f.hardly_balanced, too_long(f.surface), where_collapsed(f.surface, f.pinchable)
-    return "; ".join(filter(None, reasons))
+    return "; ".join(filter(None, (*reasons, *map(str, f.tried[1:]))))
 
 
 def _forces_left(f: Findings) -> str:
@@ -167,12 +189,9 @@ def _forces_left(f: Findings) -> str:
     if f.hardly_balanced:
         reason += f"; {f.hardly_balanced}"
     reason = "; ".join(filter(None, (reason, too_long(f.surface), _compressed(f))))
-    if f.load_ratio > 1.0 and load_is_given(f.surface):
-        reason += (
-            f"; the {load_name(f.surface)} is {f.load_ratio:.3f} times what the boundary's tension could"
-            " carry: only a mesh as coarse as this may come to rest, a finer one cannot"
-        )
-    return reason
+    if f.overload:
+        reason += f"; {f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"
+    return "; ".join((reason, *map(str, f.tried[1:])))
 
 
 def _weak_patch(f: Findings) -> str:
@@ -219,16 +238,19 @@ def _compressed(f: Findings) -> str:
 
 
 def _ways_down(f: Findings) -> str:
-    return describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode)
+    saddle = describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode)
+    return "; ".join(filter(None, (saddle, _near_fold(f))))
 
 
-def _soft(f: Findings) -> str:
-    count, index = f.spectrum.soft, f.spectrum.index
-    signs = "of signs that rounding hides" if index is None else f"{index} of them negative"
-    return (
-        f"at a fold or a branching, or beside one: {count} softest mode{'s'[: count > 1]} within"
-        f" ±{NEUTRAL:g} α/size², {signs}"
-    )
+def _near_fold(f: Findings) -> str:
+    """Names what nearly lets go, so that the certificate of a fold says where it is; else empty."""
+    count, band = (f.spectrum.soft, NEUTRAL) if f.spectrum.soft else (f.spectrum.near, NEAR)
+    if not count:
+        return ""
+    index = f.spectrum.index
+    signs = "of signs that rounding hides" if index is None else f"index {index}"
+    modes = "1 softest mode" if count == 1 else f"{count} softest modes"
+    return f"at a fold or a branching, or near one: {modes} within ±{band:g} α/size², {signs}"
 
 
 RULES = (
@@ -240,13 +262,10 @@ RULES = (
     Rule(
         Verdict.NO_EQUILIBRIUM,
         lambda f: bool(f.proofs),
-        lambda f: "; ".join([*map(str, f.proofs), *([str(f.neck)] if f.neck else [])]),
+        _disproved,
     ),
-    Rule(
-        Verdict.RAN_AWAY,
-        lambda f: f.moving and (f.evidence in (Evidence.INFLATED, Evidence.VANISHED) or f.neck is not None),
-        _ran_away,
-    ),
+    Rule(Verdict.NONE_FOUND, lambda f: f.lost and bool(f.tried), _none_found),
+    Rule(Verdict.RAN_AWAY, lambda f: f.lost, _ran_away),
     Rule(
         Verdict.WALL_DOWN,
         lambda f: f.moving and f.collapsed and held_wall_down(f.surface, f.pinchable),
@@ -267,7 +286,7 @@ RULES = (
     Rule(
         Verdict.NEUTRAL,
         lambda f: bool(f.spectrum.soft),
-        _soft,
+        _near_fold,
     ),
-    Rule(Verdict.STABLE, lambda f: True, lambda f: ""),
+    Rule(Verdict.STABLE, lambda f: True, _near_fold),
 )

@@ -48,6 +48,7 @@ WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that a
 RISE = "Find the tension with which the whole roof rises so much over its outline."
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
+VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -74,6 +75,7 @@ def solve_(
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF, "--accuracy-of")] = None,
     most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
+    verify: Annotated[bool, typer.Option("--verify", help=VERIFY)] = False,
     cache: Cache = True,
     whole: Whole = False,
     units: FileUnits = "",
@@ -101,7 +103,8 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    project = replace(project, mesh_check=wanted, whole=whole or project.whole)
+    verify = verify or project.verify
+    project = replace(project, mesh_check=wanted, verify=verify, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
@@ -110,6 +113,8 @@ def solve_(
         how: dict[str, Any] = {"anyway": anyway, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, say, changed=changed, **how)
     report(outcome)
+    if verify:
+        print(outcome.theorem.text(outcome.units))
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
     if check := checking.mesh_check(outcome):
@@ -138,6 +143,7 @@ def certify_(
     start: Start = False,
     cache: Cache = True,
     whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
+    verify: Annotated[bool, typer.Option("--verify", help=VERIFY)] = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
@@ -146,6 +152,7 @@ def certify_(
       pcmc certify roof.pcmc
       pcmc certify roof.toml
       pcmc certify roof.pcmc --meshes 3
+      pcmc certify roof.pcmc --verify
     """
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
@@ -159,6 +166,8 @@ def certify_(
     if roof.result is not None:
         report(roof, verdict=False)
     print(certificate.text(roof.units))
+    if verify or (roof.project is not None and roof.project.verify):
+        print(roof.theorem.text(roof.units))
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as say:

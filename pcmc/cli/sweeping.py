@@ -19,7 +19,7 @@ from .arguments import DXF, TOML, integer, number, option, values_of
 from .progress import sweeping
 
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
-SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
+SEARCH = "Try further starts where the first leads to no equilibrium: slower, but tells what ends each way."
 PLOT = "Picture over one varied number or two: of the first --show, else apexes or the rise."
 SHOW = "What the table has: apex, area, volume, force, ..., or of one part: west.area. Repeat for several."
 STORE = "File for finished cases. The same command again runs only the missing ones."

@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..base.errors import OptionError, SurfaceError
+from ..base.errors import NoBranch, SurfaceError
+from ..base.interrupts import stop_requested
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
@@ -88,10 +89,10 @@ class Tracer:
         if free:
             message = f"follow: nothing holds the surface against {free} rigid motions"
             hint = "it would drift instead of following the parameter; hold it with fixed= or on_plane="
-            raise SurfaceError(f"{message}; {hint}", what="surface", found=free, expected=0)
+            raise NoBranch(f"{message}; {hint}", what="surface", found=free, expected=0)
         if not (start.parameter_derivative.any() or mesh.resting.any()):  # a wall may come back
             reasons = "its patches have no free vertex, or they are flat and only their tension varies"
-            raise OptionError(f"the parameter changes no force: {reasons}", what="parameter")
+            raise NoBranch(f"the parameter changes no force: {reasons}", what="parameter")
         try:
             if not start.residual <= START_RESIDUAL:
                 raise NotOnBranch(f"relative residual {start.residual:.1e}")
@@ -104,7 +105,7 @@ class Tracer:
             message = f"follow: the surface is not at rest ({reason}); solve it first, with"
             message += " pcmc.solve(surface, target='stationary').surface where it is a saddle"
             found = start.residual
-            raise SurfaceError(message, what="surface", found=found, expected=START_RESIDUAL) from None
+            raise NoBranch(message, what="surface", found=found, expected=START_RESIDUAL) from None
 
     def run(self) -> tuple[Ending, str]:
         """Follow the branch to its end; why it ends, and the last difficulty."""
@@ -113,7 +114,8 @@ class Tracer:
             if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
                 return Ending.REACHED, ""
             return self.advance()
-        except (StopIteration, KeyboardInterrupt):
+        except (StopIteration, KeyboardInterrupt) as error:
+            stop_requested(error)
             return Ending.STOPPED, ""
 
     def advance(self) -> tuple[Ending, str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import OptionError
+from ..certificate.cables import chord
 from ..energy.cables import add_pull
 from ..surface import Surface
-from .measurement import Measurement
+from .measurement import Branches, Measurement, largest
 
 
 def sag(surface: Surface, of: str) -> Measurement:
@@ -17,20 +17,18 @@ def sag(surface: Surface, of: str) -> Measurement:
     With the chord from a to b and x at the share s of it, the distance along the unit vector e changes by
     ⟨e, dx - (1 - s) da - s db⟩.
     """
-    order = _ends_last(surface, of)
-    X = surface.vertices[order]
-    a, b = X[-2], X[-1]
-    chord = b - a
-    share = (X - a) @ chord / (chord @ chord)
-    out = X - a - share[:, None] * chord
+    order, share, out = chord(surface, of)
     distance = np.linalg.norm(out, axis=1)
-    top = int(distance.argmax())
-    slope = np.zeros_like(surface.vertices)
-    direction = out[top] / (distance[top] or 1.0)
-    slope[order[top]] = direction
-    slope[order[-2]] -= (1.0 - share[top]) * direction
-    slope[order[-1]] -= share[top] * direction
-    return Measurement(float(distance[top]), slope)
+    size = float(np.linalg.norm(np.diff(surface.vertices[order[-2:]], axis=0)))
+    direction = out / np.where(distance > 0.0, distance, 1.0)[:, None]
+
+    def branches(near: Ints) -> Branches:
+        along, e = share[near][:, None], direction[near]
+        ends = np.tile(order[-2:], (len(near), 1))
+        slopes = np.stack([e, (along - 1.0) * e, -along * e], axis=1)
+        return Branches.of(np.column_stack([order[near], ends]), slopes, surface.n)
+
+    return largest(distance, size, branches)
 
 
 def length(surface: Surface, of: str) -> Measurement:
@@ -48,12 +46,3 @@ def force(surface: Surface, of: str) -> Measurement:
     return Measurement(
         surface.cables[index].tension, np.zeros_like(surface.vertices), by_load={"cable": by_cable}
     )
-
-
-def _ends_last(surface: Surface, of: str) -> Ints:
-    """The vertices of a cable, its two ends last."""
-    vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
-    if (count > 2).any() or (count == 1).sum() != 2:
-        message = f"sag of {of}: the cable is closed, branched or in several parts, so it has no chord"
-        raise OptionError(f"{message}; give each span a cable of its own", what="of", found=of)
-    return np.asarray(vertices[np.argsort(count == 1, kind="stable")])

@@ -11,21 +11,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..certificate.cables import cable_ends
-from ..certificate.reactions import support_forces
-from ..energy import kernels
-from ..energy.functional import gradient_by, weighted
-from ..energy.second_variation import add_products
+from ..certificate.curve_tables import sides_at
+from ..certificate.reactions import SupportForces, support_forces
+from ..energy.functional import weighted
 from ..energy.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
-from ..surface.geometry import area_vectors, cross_2d, vertex_sums
+from ..surface.geometry import area_vectors, cross_2d
 from . import cable_quantities
 from .lean import lean
-from .measurement import Measurement
+from .measurement import Branches, Measurement, largest
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,13 @@ class Measure:
 
 def _apex(surface: Surface, of: str | None) -> Measurement:
     """Greatest height over Π: that of the highest vertex, for triangles are flat."""
-    top = int(vertices_up(surface, of)[-1])
-    slope = np.zeros_like(surface.vertices)
-    slope[top] = surface.plane.normal
-    return Measurement(float(surface.plane.height(surface.vertices[top])), slope)
+    vertices = vertices_up(surface, of)
+    up = np.array(surface.plane.normal)
+    return largest(
+        surface.plane.height(surface.vertices[vertices]),
+        surface.size,
+        lambda near: Branches.of(vertices[near, None], np.tile(up, (len(near), 1, 1)), surface.n),
+    )
 
 
 def vertices_up(surface: Surface, of: str | None) -> Ints:
@@ -119,65 +121,61 @@ def room_index(surface: Surface, name: str) -> int:
 
 
 def _reaction(surface: Surface, of: str | None) -> Measurement:
-    """max |f_v| / ℓ_v over the lines that hold a patch, ℓ_v half the length of the held edges at v.
+    """The largest pull along an edge of the lines that hold a patch: |Σ (α + w z) n| of the sheets there.
 
-    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T over all triangles at v, and the forces of weights and of cables that run
-    through v, as in the certificate's table of supports: at a corner the patches' pulls along their junction
-    cancel, and cables that end there are apart. A vertex that slides takes only the force across its plane.
-    Force/length.
+    As in the certificate's table of supports; an edge that slides pulls across its plane. Force/length.
     """
     acting = support_forces(surface)
-    vertices = np.flatnonzero(acting.of_patch(None if of is None else surface.patch_index(of)))
-    if not len(vertices):
+    edges = acting.along_patch(None if of is None else surface.patch_index(of))
+    if not edges.any():
         raise OptionError(f"reaction of {of}: nothing holds the edges of that patch", what="of", found=of)
-    force, share = acting.along, acting.lengths
-    size = np.linalg.norm(force[vertices], axis=1) / share[vertices]
-    v, value = int(vertices[size.argmax()]), float(size.max())
-    pull = force[v] / (float(np.linalg.norm(force[v])) or 1.0) / share[v]
-    standing, topo = acting.standing, surface.topology
-    ending = {cable.name: 0.0 for cable, vertex, _ in cable_ends(standing) if vertex == v}
-    slope = _force_gradient(standing.retensioned(cables=ending), v, pull)
-    ends = topo.edges[(acting.lines & (topo.edges == v)).any(axis=1)]
-    side = surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]]
-    along = (0.5 * value / share[v] / np.linalg.norm(side, axis=1))[:, None] * side
-    np.add.at(slope, ends[:, 0], along)
-    np.add.at(slope, ends[:, 1], -along)
-    by_tension, by_pressure = _force_by_patch(standing, v)
-    by_load = {}
-    for kind, parts in (("weight", surface.patches), ("cable", surface.cables)):
-        slopes = np.array([gradient_by(surface, kind, i)[v] @ pull for i in range(len(parts))])
-        apart = np.array([kind == "cable" and part.name in ending for part in parts], dtype=bool)
-        by_load[kind] = np.where(apart, 0.0, slopes)
-    return Measurement(value, slope, by_tension @ pull, by_pressure @ pull, by_load)
+    return largest_pull(acting, edges)
 
 
-def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
-    """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v with cables and weights."""
-    around = np.flatnonzero((surface.faces == v).any(axis=1))
-    F, patch = surface.faces[around], surface.patch_of_face[around]
-    slope, unit = np.zeros_like(surface.vertices), np.zeros_like(surface.vertices)
-    unit[v] = pull  # the second derivatives are symmetric
-    mesh = kernels.energy_mesh(surface, pressure=0.0 * surface.pressures)
-    add_products(surface, mesh._replace(faces=F, patch=patch), surface.vertices, unit, slope)
-    # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
-    X, sixth = surface.vertices, surface.net_pressures[surface.patch_of_face[around]] / 6.0
-    for c in range(3):
-        opposite = X[F[:, c - 2]] - X[F[:, c - 1]]
-        np.add.at(slope, F[:, c], -sixth[:, None] * np.cross(opposite, pull))
-    return slope
+def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
+    """The largest pull along some of the edges (e,) of a surface, force/length.
+
+    A side from a to b of length L, with the unit tangent t, has in a triangle of normal ν the co-normal n;
+    the foot of its corner c, at the distance h, is s of the way along. While the corners move by d,
+
+        dn = -⟨n, d_b - d_a⟩/L t + ⟨ν, (1 - s) d_a + s d_b - d_c⟩/h ν.
+    """
+    surface, numbers = acting.standing, np.flatnonzero(edges)
+    pulls = acting.pulls[numbers]
+    sizes = np.linalg.norm(pulls, axis=1)
+    up, patches = np.array(surface.plane.normal), len(surface.patches)
+
+    def branches(near: Ints) -> Branches:
+        ends = acting.surface.topology.edges[numbers[near]]
+        at, face, corners = sides_at(surface, surface.topology.edge_numbers(ends))
+        c, a, b = surface.vertices[corners].transpose(1, 0, 2)
+        k, pull = surface.patch_of_face[face], (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][at]
+        length = np.linalg.norm(b - a, axis=1)[:, None]
+        t = (b - a) / length
+        foot = _dot(c - a, t)
+        out = a - c + foot * t
+        h = np.linalg.norm(out, axis=1)[:, None]
+        n, z = out / h, surface.plane.height(0.5 * (a + b))
+        weight = surface.weights[k]
+        tension = (surface.tensions[k] + weight * z)[:, None]
+        turn, tilt = tension * _dot(pull, t) / length * n, np.cross(t, n)
+        tilt = tension * _dot(pull, tilt) / h * tilt
+        rise = 0.5 * weight[:, None] * _dot(pull, n) * up
+        foot = foot / length
+        slopes = np.stack([-tilt, turn + (1.0 - foot) * tilt + rise, foot * tilt - turn + rise], axis=1)
+        sheet = Branches.of(corners, slopes, surface.n).by_position
+        together = csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(near), len(at)))
+        along = csr_array((_dot(pull, n)[:, 0], (np.arange(len(at)), k)), shape=(len(at), patches))
+        raised = csr_array(along.multiply(z[:, None]))
+        by = {kind: (together @ m).toarray() for kind, m in (("tension", along), ("weight", raised))}
+        return Branches(csr_array(together @ sheet), by)
+
+    return largest(sizes, float(surface.tensions.max()), branches)
 
 
-def _force_by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
-    """(k,3) derivatives of f_v by each patch's tension and pressure: ∇A_i and -⅓ Σ A_T ν_T at v."""
-    by_tension, by_pressure = np.zeros((2, len(surface.patches), 3))
-    for i in np.unique(surface.patch_of_face[(surface.faces == v).any(axis=1)]):
-        one = np.zeros(len(surface.patches))
-        one[i] = 1.0
-        by_tension[i] = weighted(surface, one)[2][v]
-        # not ∇V_i: at a boundary that includes the sides of the cone, which are no part of the surface
-        pushes = area_vectors(surface.vertices[surface.faces]) / 3.0 * one[surface.patch_of_face, None]
-        by_pressure[i] = -vertex_sums(pushes, surface.faces, surface.n)[v]
-    return by_tension, by_pressure
+def _dot(u: Floats, v: Floats) -> Floats:
+    """(s,1) the products of vectors (s,3)."""
+    return np.asarray(np.einsum("ij,ij->i", u, v)[:, None])
 
 
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:

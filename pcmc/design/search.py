@@ -20,7 +20,8 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..certificate.balance import coarseness, load_is_given, load_name, load_ratio
+from ..base.interrupts import stop_requested
+from ..certificate.balance import coarseness, overload
 from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
@@ -28,7 +29,7 @@ from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus, NoStart
 from .quantities import vertices_up
-from .sensitivity import sensitivities
+from .sensitivity import slopes
 from .steps import Iterate, StepPlan, Trial
 from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
 
@@ -166,7 +167,8 @@ class Search:
         """Search to the end; if asked to stop, end with the best so far."""
         try:
             return self.search()
-        except (StopIteration, KeyboardInterrupt):
+        except (StopIteration, KeyboardInterrupt) as error:
+            stop_requested(error)
             if self.best is None:
                 given = self.trial(self.initial_unknowns(), _unsolved(self.surface))
                 return self.design(DesignStatus.STOPPED, given)
@@ -218,8 +220,9 @@ class Search:
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
         surface = self.with_unknowns(start, x)
-        if load_is_given(surface) and load_ratio(surface) > 1.0 + coarseness(surface):
-            self.failed = Overload(load_ratio(surface), load_name(surface))
+        load = overload(surface)
+        if load is not None and load.ratio > 1.0 + coarseness(surface):
+            self.failed = load
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
@@ -274,10 +277,10 @@ class Search:
     def with_jacobian(self, at: Trial) -> Iterate | None:
         """The trial with its derivatives; None at a fold."""
         try:
-            slopes = sensitivities(at.result.surface, at.aims, self.parameters).to_numpy()
+            found = np.array([own for own, *_ in slopes(at.result.surface, at.aims, self.parameters)])
         except SurfaceError:
             return None
-        jacobian = slopes * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
+        jacobian = found * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
         jacobian = jacobian * (at.r != 0.0)[:, None] / self.scale[:, None]
         return Iterate(at.x, at.result, at.quantities, at.r, at.phi, at.aims, jacobian)
 

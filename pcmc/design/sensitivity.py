@@ -44,6 +44,7 @@ from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 ACCURACY = 1e-9  # relative residual to which J s = b is solved
 NO_SOLUTION = 1e-6  # relative residual above which J is singular
+SAME = 1e-6  # of q/λ and of themselves: derivatives this near on both sides of a kink are one
 AT_FOLD = "sensitivities: the surface is at a fold, where they are infinite"
 
 
@@ -64,7 +65,9 @@ def sensitivities(
     Returns
     -------
     DataFrame : a row per quantity, a column per parameter, by their labels; units of q over those
-        of λ.
+        of λ. A largest lean, pull, height or sag that several places share has a kink: while λ grows the
+        place where it grows most leads, while λ falls another. Where both differ there are two rows,
+        "… as they fall" and "… as they grow", with the derivatives on either side.
 
     Raises
     ------
@@ -90,12 +93,23 @@ def sensitivities(
     targets, parameters = as_targets(of), as_parameters(to)
     for parameter in parameters:
         parameter.check(surface)
+    rows: dict[str, Floats] = {}
+    for target, (slope, falling, growing) in zip(targets, slopes(surface, targets, parameters), strict=True):
+        if np.array_equal(falling, growing):
+            rows[target.label] = slope
+        else:
+            rows |= {f"{target.label} as they fall": falling, f"{target.label} as they grow": growing}
+    return pd.DataFrame.from_dict(rows, orient="index", columns=[p.label for p in parameters], dtype=float)
+
+
+def slopes(
+    surface: Surface, targets: Sequence[Target], parameters: Sequence[Parameter]
+) -> list[tuple[Floats, Floats, Floats]]:
+    """dq/dλ (parameters,) of each target: of one branch, and of those leading while λ falls and grows."""
     response = _LinearResponse.of(surface)
     shown = response.part.surface
     changes = [response.motion(p, parameters) for p in parameters]
-    slopes = [_slopes(shown, measure(shown, t), parameters, changes) for t in targets]
-    rows, columns = [t.label for t in targets], [p.label for p in parameters]
-    return pd.DataFrame(slopes, rows, columns, dtype=float)
+    return [_slopes(shown, measure(shown, target), parameters, changes) for target in targets]
 
 
 def _slopes(
@@ -103,17 +117,26 @@ def _slopes(
     quantity: Measurement,
     parameters: Sequence[Parameter],
     changes: Sequence[tuple[Floats, Floats]],
-) -> Floats:
-    """(parameters,) dq/dλ of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) of each parameter."""
+) -> tuple[Floats, Floats, Floats]:
+    """``slopes`` of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) of each parameter."""
     motions = np.stack([motion for motion, _ in changes])
     slope = np.einsum("pnd,nd->p", motions, quantity.by_position)
+    falling, growing = np.zeros((2, len(parameters)))
     for k, parameter in enumerate(parameters):
         by_part = quantity.by(parameter.kind)
         if by_part is not None:
             slope[k] += by_part @ _rates(surface, parameter, parameters)
         if quantity.by_pressure is not None and surface.rooms:
             slope[k] += quantity.by_pressure @ (changes[k][1] @ surface.room_signs)
-    return slope
+        falling[k] = growing[k] = slope[k]
+        if quantity.ties is not None:
+            each = quantity.ties.by_position @ motions[k].ravel()
+            if parameter.kind in quantity.ties.by:
+                each += quantity.ties.by[parameter.kind] @ _rates(surface, parameter, parameters)
+            rounding = SAME * (np.abs(each).max() + abs(quantity.value / (parameter.value(surface) or 1.0)))
+            if np.ptp(each) > rounding:
+                falling[k], growing[k] = each.min(), each.max()
+    return slope, falling, growing
 
 
 def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:

@@ -63,22 +63,22 @@ class DrawingSet:
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
-        works: list[tuple[Path, Callable[[Path], None]]] = []
+        jobs: list[tuple[Path, Callable[[Path], None]]] = []
         document: Any = None
         for path in map(Path, paths):
             suffix = check_suffix(path)
             if document is None:
                 document = dxf.document(self)
             if suffix == ".dxf":
-                works.append((path, document.saveas))
+                jobs.append((path, document.saveas))
             elif suffix == ".pdf":
-                works.append((path, partial(pdf.write_pdf, self.sheets)))
+                jobs.append((path, partial(pdf.write_pdf, self.sheets)))
             else:
                 many = len(self.sheets) > 1
                 for k in range(len(self.sheets)):
                     one = path.with_name(f"{path.stem}-{k + 1}{path.suffix}") if many else path
-                    works.append((one, partial(dxf.write_svg, document, k)))
-        return works
+                    jobs.append((one, partial(dxf.write_svg, document, k)))
+        return jobs
 
     def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
         """Write .dxf, .pdf (a page per sheet) and .svg (a file NAME-1.svg and so on per sheet).
@@ -89,12 +89,12 @@ class DrawingSet:
         ------
         FileError : for another suffix, or a file that cannot be written.
         """
-        works = self.files(*paths)
-        with atomic_writes([path for path, _ in works]) as temporaries:
-            for (path, write), temporary in zip(works, temporaries, strict=True):
+        jobs = self.files(*paths)
+        with atomic_writes([path for path, _ in jobs]) as temporaries:
+            for (path, write), temporary in zip(jobs, temporaries, strict=True):
                 with writing(path):
                     write(temporary)
-        return [path for path, _ in works]
+        return [path for path, _ in jobs]
 
 
 def drawing_set(
@@ -204,10 +204,13 @@ def drawing_set(
         sheets += table_sheets("Supports", *_rows(listed, decimals, forces), sheet)
     flat = None
     if schedule is not None:
-        sheets += table_sheets("Families of panels", *_rows(_families(schedule), decimals), sheet)
-    if schedule is not None and panel_sheets:
-        flat = flat_panels(schedule, millimetres)
-        sheets += panels_at_true_size(schedule, sheet, millimetres)
+        listed = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
+        listed = listed.assign(family=[f"F{k}" for k in listed["family"]])
+        listed = listed.rename(columns={"count": "panels", "mirrored": "turned over"})
+        sheets += table_sheets("Families of panels", *_rows(listed, decimals), sheet)
+        if panel_sheets:
+            flat = flat_panels(schedule, millimetres)
+            sheets += panels_at_true_size(schedule, sheet, millimetres)
     part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
     add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
@@ -266,13 +269,6 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
         profiles.append((views.profile(surface, title, ends[0], along, found), found))
     return profiles
-
-
-def _families(schedule: Panels) -> pd.DataFrame:
-    """The families as they are listed."""
-    listed = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
-    shown = listed.assign(family=[f"F{k}" for k in listed["family"]])
-    return shown.rename(columns={"count": "panels", "mirrored": "turned over"})
 
 
 def _rows(

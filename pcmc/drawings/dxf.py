@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra
 from ..base.units import TABLE, length_factor
-from .sheet import LAYERS, SMALL, Dimension, Sheet
+from .sheet import LAYERS, SMALL, Sheet
 from .views import section_layer
 
 VERSION = "R2018"
@@ -107,22 +107,16 @@ def _add_sheet(space: Any, sheet: Sheet, scale: float = 1.0, shift: Floats | flo
         plain = text.text.replace("%%", 2 * "%%%").replace("^", "^ ")  # else %%c is ⌀, and ^J a line break
         entity = space.add_text(plain, height=scale * text.height, dxfattribs=look)
         entity.set_placement((scale * np.array(text.at) + shift).tolist(), align=TextEntityAlignment[align])
-    for dimension in sheet.dimensions:
-        _add_dimension(space, dimension)
-
-
-def _add_dimension(layout: Any, dimension: Dimension) -> None:
-    """A dimension that measures in the unit of the roof."""
-    override = {"dimlfac": dimension.unit, "dimdec": dimension.decimals}
-    layout.add_linear_dim(
-        base=[dimension.at, dimension.at],
-        p1=dimension.start.tolist(),
-        p2=dimension.end.tolist(),
-        angle=90.0 * dimension.axis,
-        dimstyle="PCMC",
-        override=override,
-        dxfattribs={"layer": "PCMC-DIM"},
-    ).render()
+    for dimension in sheet.dimensions:  # they measure in the unit of the roof
+        space.add_linear_dim(
+            base=[dimension.at, dimension.at],
+            p1=dimension.start.tolist(),
+            p2=dimension.end.tolist(),
+            angle=90.0 * dimension.axis,
+            dimstyle="PCMC",
+            override={"dimlfac": dimension.unit, "dimdec": dimension.decimals},
+            dxfattribs={"layer": "PCMC-DIM"},
+        ).render()
 
 
 def write_svg(doc: Any, number: int, path: Path) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..panels import Panels
-from ..panels.nesting import packed, turned_to_fit
-from .sheet import WIDTH, Line, Sheet, Text, corner, room, table_sheets
+from ..panels.flat import packed, turned_to_fit
+from .sheet import WIDTH, Line, Sheet, Text, corner, drawing_area, table_sheets
 
 
 def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]:
@@ -17,7 +17,7 @@ def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]
 
     Those that fit no sheet at true size are listed on sheets of their own; ``flat_panels`` has them.
     """
-    labels, (wide, high) = _labels(schedule), room(name)
+    labels, (wide, high) = _labels(schedule), drawing_area(name)
     turned = {k: turned_to_fit(panel, wide, high) for k, panel in enumerate(schedule.flat * millimetres)}
     fit = {k: panel for k, panel in turned.items() if panel is not None}
     sheets: list[Sheet] = []
@@ -72,9 +72,8 @@ def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: 
     family = f"F{schedule.panels['family'].iloc[k]}"
     most = 1.2 * radius / (WIDTH * max(len(number), len(family)))
     height = min(max(12.0, 0.15 * radius), 0.4 * radius, most)
-    x, y = map(float, middle)
-    sheet.texts.append(Text((x, y + 0.2 * height), number, height, align="C"))
-    sheet.texts.append(Text((x, y - 0.9 * height), family, 0.6 * height, align="C"))
+    sheet.texts.append(Text(middle + np.array([0.0, 0.2 * height]), number, height, align="C"))
+    sheet.texts.append(Text(middle - np.array([0.0, 0.9 * height]), family, 0.6 * height, align="C"))
     for j in range(3):
         small = min(4.0, 0.25 * radius, 0.7 * lengths[j] / (WIDTH * len(labels[j])))
         along = edges[j] / lengths[j]
@@ -82,5 +81,4 @@ def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: 
         at = 0.5 * (corners[j - 1] + corners[j - 2]) + small * inward
         turn = float(np.degrees(np.arctan2(along[1], along[0])))
         turn += 180.0 if not -90.0 < turn <= 90.0 else 0.0
-        x, y = map(float, at)
-        sheet.texts.append(Text((x, y), labels[j], float(small), "PCMC-LABEL", "C", turn))
+        sheet.texts.append(Text(at, labels[j], float(small), "PCMC-LABEL", "C", turn))

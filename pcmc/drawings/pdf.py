@@ -78,6 +78,6 @@ def paint(canvas: Any, lines: Sequence[Line], texts: Sequence[Text], boxed: bool
             canvas.rect(-0.5 * wide, -0.7 * high, wide, 1.4 * high, stroke=0, fill=1)
         canvas.setFillColor(HexColor(COLORS[LAYERS[text.layer].color]))
         canvas.setFont(FONT, size)
-        ways = {"L": canvas.drawString, "C": canvas.drawCentredString, "R": canvas.drawRightString}
-        ways[text.align](0.0, -0.5 * high, text.text)
+        draw = {"L": canvas.drawString, "C": canvas.drawCentredString, "R": canvas.drawRightString}
+        draw[text.align](0.0, -0.5 * high, text.text)
         canvas.restoreState()

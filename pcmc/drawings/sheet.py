@@ -59,9 +59,9 @@ class Line(NamedTuple):
 
 
 class Text(NamedTuple):
-    """A line of text: the middle of its line at ``at``, mm, ``turn`` in degrees; align L, C or R."""
+    """A line of text: the middle of its line at ``at`` (2,), mm, ``turn`` in degrees; align L, C or R."""
 
-    at: tuple[float, float]
+    at: Sequence[float] | Floats
     text: str
     height: float = SMALL
     layer: str = "PCMC-TEXT"
@@ -98,8 +98,9 @@ class Dimension(NamedTuple):
         away = np.sign(feet - ends)
         lines = [feet, *np.stack([ends + away, feet + away], axis=1), *(feet[:, None] + TICK)]
         beside[other] = SMALL if self.axis == 0 else -SMALL
-        x, y = map(float, feet.mean(axis=0) + 0.8 * beside)
-        text = Text((x, y), self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis)
+        text = Text(
+            feet.mean(axis=0) + 0.8 * beside, self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis
+        )
         return [Line(line, "PCMC-DIM") for line in lines], text
 
 
@@ -128,7 +129,9 @@ class Sheet:
         return self.lines + [line for lines, _ in parts for line in lines], self.texts + [t for _, t in parts]
 
 
-def apart(labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed: bool = True) -> list[Text]:
+def place_labels(
+    labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed: bool = True
+) -> list[Text]:
     """Labels at or beside their places, so that none covers another text.
 
     One without room within ``rings`` steps of its height stays at its place if it is needed, else it is left
@@ -146,8 +149,7 @@ def apart(labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed
         covers = ((tries[:, None, 0] < near[:, 1]) & (near[:, 0] < tries[:, None, 1])).all(axis=2).any(axis=1)
         if needed or not covers.all():
             k = int(covers.argmin())
-            x, y = (label.at + tries[k, 0] - box(label)[0]).tolist()
-            placed.append(label._replace(at=(x, y)))
+            placed.append(label._replace(at=label.at + tries[k, 0] - box(label)[0]))
             boxes[count], count = tries[k], count + 1
     return placed
 
@@ -164,17 +166,17 @@ def box(text: Text) -> Floats:
     corners = np.array([[-left - 0.3, -0.7 * text.height], [wide - left + 0.3, 0.7 * text.height]])
     if text.turn == 90.0:
         corners = np.array([[corners[0, 1], corners[0, 0]], [corners[1, 1], corners[1, 0]]])
-    return np.asarray(text.at + corners)
+    return np.asarray(text.at) + corners
 
 
-def room(name: str) -> tuple[float, float]:
+def drawing_area(name: str) -> tuple[float, float]:
     """Width and height, mm, that a format leaves for drawing."""
     width, height = FORMATS[name]
     return width - 2 * MARGIN - 2 * GAP, height - 2 * MARGIN - STRIP - 2 * GAP
 
 
 def corner() -> Floats:
-    """(2,) the lower left corner of that room, mm."""
+    """(2,) the lower left corner of that drawing_area, mm."""
     return np.array([MARGIN + GAP, MARGIN + STRIP + GAP])
 
 
@@ -205,14 +207,14 @@ def fits(size: Floats, name: str) -> bool:
     >>> fits(np.array([500.0, 300.0]), "A2"), fits(np.array([500.0, 300.0]), "A3")
     (True, False)
     """
-    return bool((np.asarray(size) <= np.array(room(name)) + 1e-9).all())
+    return bool((np.asarray(size) <= np.array(drawing_area(name)) + 1e-9).all())
 
 
 def table_sheets(title: str, head: list[str], rows: list[list[str]], name: str) -> list[Sheet]:
     """A table in as many columns and sheets as it needs."""
     widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
     across = np.append(0.0, np.cumsum([(w + 2.0) * WIDTH * SMALL for w in widths]))
-    wide, high = room(name)
+    wide, high = drawing_area(name)
     step = 1.8 * SMALL
     per_column = int(high / step) - 1
     columns = max(1, int((wide + GAP) // (across[-1] + GAP)))
@@ -223,23 +225,12 @@ def table_sheets(title: str, head: list[str], rows: list[list[str]], name: str) 
             first = start + column * per_column
             part = rows[first : first + per_column]
             if part or not column:
-                low, bottom = corner()
-                _add_column(
-                    sheet, [head, *part], across, low + column * (across[-1] + GAP), bottom + high, step
-                )
+                left, top = corner() + np.array([column * (across[-1] + GAP), high])
+                for k, row in enumerate([head, *part]):
+                    ends = left + across[1:] - 2.0 * WIDTH * SMALL
+                    places = np.stack([ends, np.full(len(ends), top - (k + 0.5) * step)], axis=1)
+                    sheet.texts += [Text(at, text, align="R") for at, text in zip(places, row, strict=True)]
+                rule = np.array([[left, top - step], [left + across[-1] - 2.0 * WIDTH * SMALL, top - step]])
+                sheet.lines.append(Line(rule, "PCMC-FRAME"))
         sheets.append(sheet)
     return sheets
-
-
-def _add_column(
-    sheet: Sheet, rows: list[list[str]], across: Floats, left: float, top: float, step: float
-) -> None:
-    """Rows of a table below one another, the first of them its head; ``across`` are the columns' sides."""
-    for k, row in enumerate(rows):
-        y = float(top - (k + 0.5) * step)
-        sheet.texts += [
-            Text((float(left + right - 2.0 * WIDTH * SMALL), y), text, align="R")
-            for right, text in zip(across[1:], row, strict=True)
-        ]
-    rule = np.array([[left, top - step], [left + across[-1] - 2.0 * WIDTH * SMALL, top - step]])
-    sheet.lines.append(Line(rule, "PCMC-FRAME"))

@@ -24,10 +24,10 @@ from .sheet import (
     Line,
     Sheet,
     Text,
-    apart,
     corner,
+    drawing_area,
     fits,
-    room,
+    place_labels,
     width,
 )
 
@@ -148,10 +148,8 @@ def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
 def contours(surface: Surface, curves: Sequence[Curve], cuts: Sequence[tuple[float, list[Polyline]]]) -> View:
     """Sections at heights, seen from above, each with its height."""
     view = plan(surface, curves, ())
-    view.title, view.lines = (
-        "sections at heights",
-        [line for line in view.lines if line.layer != "PCMC-PANEL"],
-    )
+    view.title = "sections at heights"
+    view.lines = [line for line in view.lines if line.layer != "PCMC-PANEL"]
     for height, lines in cuts:
         view.lines += [Line(one.points[:, :2], section_layer(surface, one), one.closed) for one in lines]
         top = max((one.points for one in lines), key=lambda points: float(points[:, 1].max()))
@@ -195,7 +193,7 @@ def placed(
     sheet = Sheet(title, name, f"1:{scale}")
     factor = millimetres / scale
     cell = extent * factor + BEFORE + BEHIND
-    origin = corner() + 0.5 * (np.array(room(name)) - np.array([columns, rows]) * cell) + BEFORE
+    origin = corner() + 0.5 * (np.array(drawing_area(name)) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
         spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
@@ -233,11 +231,11 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
         for line in sorted(view.lines, key=lambda line: line.layer != "PCMC-PANEL")
     ]
     small: list[Text] = []
-    large: list[Text] = []
     marks: list[Text] = []
-    for at, text, way in view.texts:
-        x, y = (factor * at + shift + way * [0.5 * width(text) + 1.0, SMALL]).tolist()
-        large.append(Text((x, y), text, align="C"))
+    large = [
+        Text(factor * at + shift + direction * [0.5 * width(text) + 1.0, SMALL], text, align="C")
+        for at, text, direction in view.texts
+    ]
     for at, name, layer in view.points:
         place = factor * at + shift
         half, height = (0.8, TINY) if layer == "PCMC-POINT" else (1.5, SMALL)
@@ -245,11 +243,11 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
         if layer != "PCMC-POINT":
             square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
             sheet.lines.append(Line(place + half * square, layer, True))
-            marks.append(Text((float(place[0]), float(place[1])), "##", align="C"))  # kept free of names
-        x, y = (place + np.array([half + 0.3, half + 0.6 * height])).tolist()
-        (small if layer == "PCMC-POINT" else large).append(Text((x, y), name, height, layer))
-    sheet.texts += apart(large, sheet.drawn()[1])
-    sheet.texts += apart(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
+            marks.append(Text(place, "##", align="C"))  # kept free of names
+        beside = place + np.array([half + 0.3, half + 0.6 * height])
+        (small if layer == "PCMC-POINT" else large).append(Text(beside, name, height, layer))
+    sheet.texts += place_labels(large, sheet.drawn()[1])
+    sheet.texts += place_labels(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
 
 
 def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, decimals: int) -> None:
@@ -268,10 +266,8 @@ def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, deci
     for y in _spaced(places, 2.0 * SMALL).tolist():
         x, z = float(high[0]) + 3.0, (y - shift[1]) / factor
         mark = np.array([[x, y], [x + 1.2, y + 2.0], [x - 1.2, y + 2.0]])
-        sheet.lines += [
-            Line(mark, "PCMC-DIM", True),
-            Line(np.array([[x - 2.0, y], [x + 18.0, y]]), "PCMC-DIM"),
-        ]
+        rule = np.array([[x - 2.0, y], [x + 18.0, y]])
+        sheet.lines += [Line(mark, "PCMC-DIM", True), Line(rule, "PCMC-DIM")]
         text = f"{z:+.{decimals}f}"
         text = text if float(text) else f"±{abs(z):.{decimals}f}"
         sheet.texts.append(Text((x + 2.0, y + 0.7 * SMALL), text, layer="PCMC-DIM"))

@@ -1,4 +1,4 @@
-"""Whether there is an equilibrium: further starts if the first leads to none, and the proof that none exists.
+"""Whether there is an equilibrium: further starts if the first leads to none, and proofs that none exists.
 
 Gives ``solve``, the package's own, and the parts of its search. May import ``continuation`` and below.
 """
@@ -21,10 +21,11 @@ def solve(
 ) -> Result:
     """Find an equilibrium, first from the given surface; if that leads to none, from further starts.
 
-    With ``method="newton"``, a surface that inflates, pinches off, collapses or does not converge is
-    solved again: from a low start; by raising the pressure along the branch of equilibria; and, for a film
-    between several held curves, by moving these apart. Where such a branch folds before it arrives,
-    the fold is the proof that it holds no equilibrium, and its value is part of the result.
+    With ``method="newton"``, a surface that inflates, pinches off, collapses or stalls is solved again: from
+    a low start; by raising pressure and weight along the branch of equilibria; from equal tensions; and, for
+    a film between several held curves, by moving these apart. A branch that folds before it arrives says
+    where it ends, not that there is no equilibrium on another. A part that nothing fixes, under pressure, is
+    at rest only at a saddle; where a minimum is sought, that saddle is the result.
 
     Parameters
     ----------
@@ -32,14 +33,15 @@ def solve(
     method : ``"newton"``, the geometric solver; ``"nesterov"``, the paper's flow; ``"lbfgs"``,
         NLopt's L-BFGS. Only the first tries further starts.
     callback : called with a Progress after each iteration (each evaluation for ``"lbfgs"``). Raise
-        StopIteration in it to stop; any other exception passes through.
+        StopIteration in it to stop; any other exception passes through, and as a RuntimeError also the
+        StopIteration of a ``next()`` in it.
     options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``, ``LbfgsOptions``.
 
     Returns
     -------
     Result
-        Not converging is a status there, never an exception. Its ``proofs`` say why there is no
-        equilibrium, if that was proved. Ctrl-C stops as StopIteration does.
+        Not converging is a status there, never an exception: NO_EQUILIBRIUM with ``proofs`` that no smooth
+        surface is at rest, or NONE_FOUND with what was ``tried``. Ctrl-C stops as StopIteration does.
 
     Raises
     ------
@@ -66,7 +68,7 @@ def solve(
     >>> result.status.name, result.certificate.verdict.name
     ('NO_EQUILIBRIUM', 'NO_EQUILIBRIUM')
     >>> print(result.proofs[0])
-    the pressure is 2.50 times what the boundary's tension could carry
+    the pressure is 2.50 times what the boundary's tension could carry on any smooth surface
     """
     first = solvers.solve(surface, method, callback, **options)
     if method != "newton" or first.converged:

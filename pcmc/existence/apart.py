@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..certificate.neck import held_groups
-from ..certificate.proof import Fold
+from ..certificate.proof import Attempt
 from ..continuation import BoundaryMotion
 from ..surface import Surface
 from .attempts import Attempts
@@ -97,16 +97,14 @@ def move_apart(surface: Surface, attempts: Attempts) -> Further:
         if result.converged:
             break
     else:
-        return Further()
+        return Further(attempt=Attempt("distance", "no start"))
     motion = BoundaryMotion(spread.boundary, start=begin)
     branch = attempts.follow(result.surface, motion, 1.0, steps=STEPS, smallest=SMALLEST)
     if branch is None:
-        return Further()
+        return Further(attempt=Attempt("distance", "no start"))
     end = way(branch)
     if end.arrival is Arrival.REACHED:
         X = branch.last.vertices.copy()
         X[spread.held] = surface.vertices[spread.held]
-        return Further(surface.moved(X), "by moving the held curves apart")
-    if end.arrival is Arrival.FOLD:
-        return Further(fold=Fold("distance", end.farthest, begin))
-    return Further()
+        return Further(surface.moved(X), "by moving the held curves apart", "distance")
+    return Further(attempt=Attempt("distance", end.arrival.name.lower(), end.farthest, begin))

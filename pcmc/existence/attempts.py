@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .. import solvers
-from ..base.errors import OptionError, SurfaceError
+from ..base.errors import NoBranch
 from ..continuation import BoundaryMotion, Branch, Direction, follow
 from ..energy.functional import gradient
 from ..solvers.result import Callback, Progress, Result, Status
@@ -15,6 +15,14 @@ from ..surface import Surface
 from .folding import until_turned
 
 MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
+
+
+class LimitReached(Exception):
+    """A solve of the search has taken as many steps as it may; ``result`` is its end."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__()
+        self.result = result
 
 
 @dataclass
@@ -34,7 +42,7 @@ class Attempts:
     evaluations: int = 0
 
     def solve(self, surface: Surface, **changes: Any) -> Result:
-        """Solve from one start; StopIteration if that was stopped."""
+        """Solve from one start; StopIteration if stopped, LimitReached at the limit asked for."""
         before = self.steps
 
         def count(progress: Progress) -> None:
@@ -46,7 +54,10 @@ class Attempts:
         if result.status is Status.STOPPED:
             raise StopIteration
         rows = [{**row, "iteration": before + row["iteration"]} for row in result.rows]
-        return replace(result, rows=rows)
+        result = replace(result, rows=rows)
+        if result.status is Status.ITERATION_LIMIT and "iterations" in self.options:
+            raise LimitReached(result)
+        return result
 
     def follow(
         self,
@@ -54,13 +65,16 @@ class Attempts:
         direction: Direction | BoundaryMotion,
         stop: float,
         back: float | None = None,
-        **options: Any,
+        *,
+        steps: int,
+        smallest: float,
     ) -> Branch | None:
         """Follow a branch until it arrives or turns; StopIteration if that was stopped.
 
         None where no branch starts: rigid motions are free, or the parameter moves nothing. ``back`` is as in
-        ``way``.
+        ``way``. It has at most ``steps`` points, or as many as a solve may take steps.
         """
+        steps = min(steps, self.options.get("iterations", steps))
         interrupted: list[BaseException] = []
 
         def count(progress: Progress) -> None:
@@ -75,13 +89,20 @@ class Attempts:
 
         watch = until_turned(count, back)
         try:
-            branch = follow(surface, direction, stop, callback=watch, min_quality=MIN_QUALITY, **options)
-        except (OptionError, SurfaceError):
-            branch = None
+            branch = follow(
+                surface,
+                direction,
+                stop,
+                callback=watch,
+                min_quality=MIN_QUALITY,
+                steps=steps,
+                smallest=smallest,
+            )
+        except NoBranch:
+            return None
         if interrupted:  # by the callback, whatever it raised
             raise interrupted[0]
-        if branch is not None:
-            self.evaluations += int(branch.points.iterations.sum())
+        self.evaluations += int(branch.points.iterations.sum())
         return branch
 
     def show(self, surface: Any, row: Mapping[str, Any]) -> None:

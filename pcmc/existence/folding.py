@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from ..certificate.proof import Fold
+from ..certificate.proof import Attempt
 from ..continuation import Branch, Ending
 from ..solvers.result import Progress
 from ..surface import Surface
@@ -35,11 +35,15 @@ class Way:
 
 @dataclass(frozen=True, eq=False)
 class Further:
-    """What a further way has shown: a surface to solve from and ``how`` it was reached, or a fold."""
+    """What a further way has shown: a surface to solve from and ``how`` it was reached, or how the way ended.
+
+    Without either the way does not apply. ``way`` is as in Attempt.
+    """
 
     surface: Surface | None = None
     how: str = ""
-    fold: Fold | None = None
+    way: str = ""
+    attempt: Attempt | None = None
 
 
 def until_turned(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 from ..certificate.balance import load_ratio
-from ..certificate.proof import Fold
+from ..certificate.proof import Attempt
 from ..continuation import Direction
 from ..surface import Surface
 from .attempts import Attempts
@@ -33,16 +33,14 @@ def relax_tensions(low: Surface, attempts: Attempts) -> Further:
         if result.converged:
             break
     else:
-        return Further()
+        return Further(attempt=Attempt("tensions", "no start"))
     change = {name: asked[name] - start[name] for name in asked if asked[name] != start[name]}
     direction = Direction(change, relative=True)
     branch = attempts.follow(result.surface, direction, 1.0, back=BACK, steps=STEPS, smallest=SMALLEST)
     if branch is None:
-        return Further()
+        return Further(attempt=Attempt("tensions", "no start"))
     end = way(branch, back=BACK)
     if end.arrival is Arrival.REACHED:
-        return Further(branch.last.retensioned(asked), "along the branch from equal tensions")
-    if end.arrival is Arrival.FOLD:
-        at = tuple((name, start[name] + end.farthest * change.get(name, 0.0)) for name in asked)
-        return Further(fold=Fold("tensions", end.farthest, 0.0, at))
-    return Further()
+        return Further(branch.last.retensioned(asked), "along the branch from equal tensions", "tensions")
+    at = tuple((name, start[name] + end.farthest * change.get(name, 0.0)) for name in asked)
+    return Further(attempt=Attempt("tensions", end.arrival.name.lower(), end.farthest, 0.0, at))

@@ -66,7 +66,7 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
 }
-OTHERS = ("check", "families", "news", "save")  # acts that answer with no surface
+OTHERS = ("check", "verify", "families", "news", "save")  # acts that answer with no surface
 
 
 class Explorer:
@@ -284,6 +284,9 @@ class _Handler(BaseHTTPRequestHandler):
             check = session.check_mesh(self._gone)
             found = None if check is None else mesh_findings(check, explorer.roof.units)
             self._send_header({"superseded": True} if found is None else {"check": found})
+        elif act == "verify":
+            theorem, units = session.verify(), explorer.roof.units
+            self._send_header({"badge": theorem.brief(units), "text": theorem.text(units)})
         elif act == "families":
             self._send(pack({}, {"family": families_drawn(session.state())}), "application/octet-stream")
         elif act == "news":

@@ -26,6 +26,7 @@ from ..solvers import solve
 from ..solvers.result import Progress
 from ..surface import Patch, Surface
 from ..surface.geometry import segment_lengths
+from ..verification import Theorem, verify
 from .following import AT_REST, Values, attempt, reach, until, wanted
 from .own_way import OwnWay
 from .variants import MOST_VARIANTS, Variant
@@ -322,6 +323,11 @@ class Session:
                 return check_mesh(checked, callback=check)
             except KeyboardInterrupt:
                 return None
+
+    def verify(self) -> Theorem:
+        """What is proved of the surface shown."""
+        with self._checks:
+            return verify(self.surface)
 
     def undo(self) -> State:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""

@@ -21,10 +21,9 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
 from ..base.names import names_from_file
 from ..surface import Cable, Patch, Plane, Room
-from .expressions import constant, linear
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
 from .polygons import triangulate
-from .text import numbers
+from .text import constant, linear, numbers
 
 WRITTEN = "written by pcmc"
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences

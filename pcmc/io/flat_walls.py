@@ -17,7 +17,7 @@ from ..base.arrays import Bools
 from ..base.errors import FileError
 from ..surface import Patch, Surface
 from ..surface.geometry import bounding_size
-from .mesh_data import ROUNDING, MeshData, support_of, without_unused
+from .mesh_data import ROUNDING, MeshData, checked, support_of, without_unused
 from .metadata import row_of
 
 KEY = "pcmc walls"
@@ -85,19 +85,17 @@ def _parsed(text: str) -> tuple[MeshData, Bools, int]:
     """The walls, which of their vertices lie on other patches, and how many of their faces are shown."""
     try:
         values = json.loads(text)
-        walls = MeshData(
-            np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
-            np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
-            np.array(values["patch"], dtype=np.int64),
-            tuple(Patch(*p) for p in values["patches"]),
-            support := np.array(values["support"], dtype=np.int8),
+        walls = checked(
+            MeshData(
+                np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
+                np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
+                np.array(values["patch"], dtype=np.int64),
+                tuple(Patch(*p) for p in values["patches"]),
+                np.array(values["support"], dtype=np.int8),
+            )
         )
         above, shown = np.array(values["above"], dtype=bool), int(values["shown"])
-        if not len(walls.vertices) == len(support) == len(above) > walls.faces.max():
-            raise ValueError
-        if not len(walls.faces) == len(walls.patch_of_face) or walls.patch_of_face.max() >= len(
-            walls.patches
-        ):
+        if len(above) != len(walls.vertices):
             raise ValueError
     except (ValueError, KeyError, TypeError):
         raise FileError(f"the description of walls in it is damaged: {text!r:.60}", where=KEY) from None

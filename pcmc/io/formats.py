@@ -99,7 +99,7 @@ FORMATS = {
 """The formats by suffix."""
 METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")
 """Formats whose lengths are metres without a unit."""
-READ_ONLY = {suffix: Format("meshlab") for suffix in (".off", ".3ds", ".dae", ".x3d")}
+READ_ONLY = {suffix: Format("repairing") for suffix in (".off", ".3ds", ".dae", ".x3d")}
 """Formats that are read, by MeshLab, but not written."""
 
 

@@ -24,13 +24,13 @@ from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
 from ..surface import Surface
-from ..surface.colours import linear, patch_colors, scalar_colors
+from ..surface.colours import linear, scalar_colors
 from ..surface.origin import file_origin
 from .flat_walls import KEY
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata
-from .trimesh_scene import from_meshes
+from .patch_meshes import from_scene, patch_meshes
 
 SUPPORT = "_SUPPORT"
 NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does not allow
@@ -62,21 +62,18 @@ def write(
     if colour:
         shades, least, most = scalar_colors(scalars[colour])
         scene.metadata["pcmc colours"] = {"scalar": colour, "least": least, "most": most}
-    for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
-        faces = surface.faces[surface.patch_of_face == k]
-        if not len(faces):
-            continue
-        used, local = np.unique(faces, return_inverse=True)
-        mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
+    for k, color, used, faces in patch_meshes(surface):
+        name = surface.patches[k].name
+        mesh = trimesh.Trimesh(turned[used], faces, process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
         shine = {"metallicFactor": 0.0, "roughnessFactor": 0.9, "doubleSided": True}
         base = [1.0] * 4 if shades is not None else [*linear(color), 1.0]
-        material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=base, **shine)
+        material = trimesh.visual.material.PBRMaterial(name, baseColorFactor=base, **shine)
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
         if shades is not None:
             rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
             mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
-        scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
+        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
     scene.metadata["pcmc"] = metadata
     if walls is not None:
         scene.metadata[KEY] = walls
@@ -97,7 +94,7 @@ def read(path: Path) -> MeshData:
         except FileNotFoundError as error:
             text = f"its part {error} is missing; keep the files of a .gltf in one folder"
             raise FileError(text, where=str(error)) from None
-    mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
+    mesh = from_scene(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
     scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}

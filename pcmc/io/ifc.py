@@ -18,15 +18,16 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
 from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..energy.functional import patch_areas
 from ..surface import Cable, Surface
-from ..surface.colours import patch_colors
 from ..surface.origin import file_origin
 from .libraries import load_library
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
+from .patch_meshes import patch_meshes
 from .reading_process import read_arrays
 
 SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
@@ -56,9 +57,8 @@ def write(
     roof = model.add_roof(certificate, walls)
     areas = patch_areas(surface) * length_factor(units.length, "m") ** 2
     parts = []
-    for k, color in enumerate(patch_colors(surface).tolist()):
-        if (surface.patch_of_face == k).any():
-            parts.append(model.add_part(k, color, float(areas[k]), roof.ObjectPlacement))
+    for k, color, used, faces in patch_meshes(surface):
+        parts.append(model.add_part(k, color, used, faces, float(areas[k]), roof.ObjectPlacement))
     parts += [model.add_cable(cable, roof.ObjectPlacement) for cable in surface.cables]
     model.aggregate("roof's parts", roof, parts)
     path.write_text(model.text(), encoding="ascii")
@@ -143,17 +143,16 @@ class _Model:
         self.add_properties("Pcmc_Surface", roof, texts)
         return roof
 
-    def add_part(self, k: int, color: list[float], area: float, place: Any) -> Any:
-        """The element of patch k."""
+    def add_part(self, k: int, color: Floats, used: Ints, faces: Ints, area: float, place: Any) -> Any:
+        """The element of patch k, with its vertices and triangles as in ``patch_meshes``."""
         surface, patch = self.surface, self.surface.patches[k]
-        used, local = np.unique(surface.faces[surface.patch_of_face == k], return_inverse=True)
         points = (surface.vertices[used] - self.middle).tolist()
         mesh = self.add(
             "IfcTriangulatedFaceSet",
             Coordinates=self.add("IfcCartesianPointList3D", CoordList=points),
-            CoordIndex=(local.reshape(-1, 3) + 1).tolist(),
+            CoordIndex=(faces + 1).tolist(),
         )
-        rgb = self.add("IfcColourRgb", Red=color[0], Green=color[1], Blue=color[2])
+        rgb = self.add("IfcColourRgb", None, *color.tolist())
         shading = self.add("IfcSurfaceStyleShading", SurfaceColour=rgb, Transparency=0.0)
         style = self.add("IfcSurfaceStyle", Name=patch.name, Side="BOTH", Styles=[shading])
         self.add("IfcStyledItem", Item=mesh, Styles=[style])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy.typing as npt
 
 from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
-from ..base.files import check_regular, system_error
+from ..base.files import as_path, check_regular, system_error
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
@@ -98,8 +98,12 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
     if not given:
         some = f" of {', '.join(map(repr, data.bare))}" if len(data.bare) < len(data.patches) else ""
         values = f"tensions and pressures{some} are 1 unless given"
-        said = {NO_SUPPORTS: data.support is None, values: data.bare, NO_UNIT: data.bare and not data.units}
-        notes = (*notes, *(text for text, true in said.items() if true))
+        hints = {
+            NO_SUPPORTS: data.support is None,
+            values: data.bare,
+            NO_UNIT: data.bare and not data.units,
+        }
+        notes = (*notes, *(text for text, true in hints.items() if true))
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
@@ -107,7 +111,7 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
 
 def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
-    path = Path(path)
+    path = as_path(path)
     with opened(path) as form:
         data = without_unused(checked(contents(form, path)))
         return with_parts(data if form.shared else restore_walls(merged(data)))

@@ -32,18 +32,32 @@ def meshlab_arrays(path: str) -> dict[str, Any]:
 
 def repaired_arrays(path: str) -> dict[str, Any]:
     """The repaired mesh of an .npz with points, faces, patch and options, and what was changed."""
+    import pymeshlab
+
     with np.load(path, allow_pickle=False) as data:
         X, F, patch = data["points"], data["faces"], data["patch"]
         weld, holes, edge_length = float(data["weld"]), int(data["holes"]), float(data["edge_length"])
     changes: dict[str, int] = {}
     X, F, patch = _cleaned(X, F, patch, weld, changes)
-    single = _edges_of_one_face(F)
+    size = int(F.max()) + 1
+    keys, count = np.unique(_edge_keys(F, size), return_counts=True)
+
+    def single(faces: Any) -> Any:
+        """(m,3) the edges that belong to one face of the whole mesh."""
+        return np.isin(_edge_keys(faces, size), keys[count == 1])
+
     n, points, faces, owner = len(X), [X], [], []
     for number in np.unique(patch):
         local, vertex = _repaired_patch(X, F[patch == number], single, holes, changes)
         if edge_length > 0.0:  # the only patch: the curves between patches would tear
-            local, X = _remeshed(X, vertex[local], edge_length)
-            return {"points": X, "faces": local, "patch": np.full(len(local), number), "changes": changes}
+            meshes = _meshset(X, vertex[local])
+            meshes.meshing_remove_unreferenced_vertices()
+            length = pymeshlab.PureValue(edge_length)
+            meshes.meshing_isotropic_explicit_remeshing(
+                iterations=ROUNDS, targetlen=length, checksurfdist=False
+            )
+            X, F = meshes.current_mesh().vertex_matrix(), meshes.current_mesh().face_matrix()
+            return {"points": X, "faces": F, "patch": np.full(len(F), number), "changes": changes}
         first = np.zeros(len(vertex), dtype=bool)
         first[np.unique(vertex, return_index=True)[1]] = True
         new = np.where(first, vertex, 0)
@@ -102,14 +116,6 @@ def _edge_keys(F: Any, n: int) -> Any:
     """(m,3) a number for each edge of each face."""
     ends = np.stack([F, np.roll(F, -1, axis=1)])
     return ends.min(axis=0).astype(np.int64) * n + ends.max(axis=0)
-
-
-def _edges_of_one_face(F: Any) -> Any:
-    """A function that tells which edges of faces belong to one face of the whole mesh."""
-    n = int(F.max()) + 1
-    keys, count = np.unique(_edge_keys(F, n), return_counts=True)
-    single = keys[count == 1]
-    return lambda faces: np.isin(_edge_keys(faces, n), single)
 
 
 def _area_vectors(X: Any, F: Any) -> Any:
@@ -191,16 +197,3 @@ def _without_large_fills(mesh: Any, size: int, vertex: Any, single: Any, add: An
     add("holes closed", np.count_nonzero(good))
     add("triangles added in holes", np.count_nonzero(good[part]))
     return np.concatenate([faces[:size], fill[good[part]]])
-
-
-def _remeshed(X: Any, F: Any, edge_length: float) -> tuple[Any, Any]:
-    """Triangles of an edge length; faces and points."""
-    import pymeshlab
-
-    meshes = _meshset(X, F)
-    meshes.meshing_remove_unreferenced_vertices()
-    meshes.meshing_isotropic_explicit_remeshing(
-        iterations=ROUNDS, targetlen=pymeshlab.PureValue(edge_length), checksurfdist=False
-    )
-    mesh = meshes.current_mesh()
-    return mesh.face_matrix(), mesh.vertex_matrix()

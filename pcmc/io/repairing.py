@@ -1,4 +1,7 @@
-"""Repair of meshes that other programs left dirty, with MeshLab (pymeshlab, licence GPL)."""
+"""Meshes of other programs through MeshLab (pymeshlab, licence GPL): it reads formats, and repairs them.
+
+It reads .off, .3ds, .dae and .x3d, which are not written.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +19,13 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, OptionError, PcmcError
+from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
+from ..base.files import as_path
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
-from . import meshlab
 from .libraries import unreadable
 from .mesh_data import MeshData, to_surface, within
+from .metadata import Metadata
 from .reading import contents, opened
 from .reading_process import read_arrays
 from .scaling import converted, stated
@@ -105,8 +110,8 @@ def repair(
     if edge_length is not None:
         validate.positive("edge_length", edge_length)
     validate.choice("up", up, tuple(TURNS))
-    meshlab.require_meshlab()
-    path = Path(path)
+    require_meshlab()
+    path = as_path(path)
     data = converted(stated(_read(path), units), units)
     turn = np.array(TURNS[up], dtype=float)
     plane = data.plane and Plane(tuple(turn @ data.plane.point), tuple(turn @ data.plane.normal))
@@ -177,7 +182,21 @@ def _read(path: Path) -> MeshData:
             if path.suffix.lower() not in MESHLAB_READS:
                 raise refused from None
             with suppress(FileError):
-                data = meshlab.read(path)
+                data = read(path)
                 note = f"read by MeshLab, without groups, as pcmc's reader stops ({refused})"
                 return replace(data, notes=(*data.notes, note))
             raise refused from None
+
+
+def read(path: Path) -> MeshData:
+    """Every mesh of the file; meshes of one name are one patch."""
+    require_meshlab()
+    found = enumerate(read_arrays("meshlab", path)["meshes"], 1)
+    meshes = [(Path(m["name"]).stem or f"mesh {k}", m["points"], m["faces"]) for k, m in found]
+    return Metadata().of_meshes(meshes, path.stem)
+
+
+def require_meshlab() -> None:
+    """MissingExtra without pymeshlab."""
+    if find_spec("pymeshlab") is None:
+        raise MissingExtra("pymeshlab", "repair")

@@ -22,13 +22,13 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
 from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
-from ..surface.colours import patch_colors
 from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import bounding_size
 from . import flat_walls
 from .libraries import load_library
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, parse_metadata
+from .patch_meshes import patch_meshes
 from .polygons import triangulate
 from .reading_process import read_arrays
 
@@ -44,18 +44,14 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, metadat
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
     model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[units.length or UNIT].rhino)
-    for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
-        faces = surface.faces[surface.patch_of_face == k]
-        if not len(faces):
-            continue
+    for k, color, used, faces in patch_meshes(surface):
         rgba = (*(round(255 * float(c)) for c in color), 255)
-        attributes = _layer(rhino, model, patch.name, rgba, metadata)
-        used, local = np.unique(faces, return_inverse=True)
+        attributes = _layer(rhino, model, surface.patches[k].name, rgba, metadata)
         mesh = rhino.Mesh()
         mesh.Vertices.UseDoublePrecisionVertices = True
         for point in surface.vertices[used].tolist():  # the library takes them one by one
             mesh.Vertices.AddPoint3d(*point)
-        for corners in local.reshape(-1, 3).tolist():
+        for corners in faces.tolist():
             mesh.Faces.AddFace(*corners)
         mesh.Normals.ComputeNormals()
         model.Objects.AddMesh(mesh, attributes)

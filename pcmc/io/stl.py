@@ -20,8 +20,8 @@ from ..surface.origin import file_origin
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata
+from .patch_meshes import from_scene
 from .text import format_rows
-from .trimesh_scene import from_meshes
 
 SPECIAL = re.compile("solid|vertex", re.I)  # readers look for these words, in names too
 FACET = (
@@ -62,7 +62,7 @@ def read(path: Path) -> MeshData:
     _complete(path)
     with translated_errors("STL"):
         scene = trimesh.load_scene(path, file_type="stl", process=False)
-    return from_meshes(scene, path.stem, Metadata())
+    return from_scene(scene, path.stem, Metadata())
 
 
 def _complete(path: Path) -> None:

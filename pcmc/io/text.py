@@ -1,12 +1,23 @@
-"""Lines of text from columns of numbers."""
+"""Numbers, names and expressions such as "sqrt(2)/2" or "z - 0.5*x" in files of text."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ast
+import math
+import operator
+import re
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+
+from ..base.arrays import Floats
+from ..base.errors import FileError
+
+LONGEST = 500  # characters: Python's parser cannot bear any depth of brackets and signs
+Fail = Callable[[str], FileError]
 
 
 def format_rows(template: str, *columns: np.ndarray) -> str:
@@ -32,3 +43,67 @@ def escaped(name: str, special: str) -> str:
     '50 %25 of %2A'
     """
     return "".join(quote(c, safe="") if c in special or c == "%" else c for c in name)
+
+
+def constant(expression: str, known: Mapping[str, float], fail: Fail) -> float:
+    """Value of an expression of numbers and known names (lower case).
+
+    >>> constant("2*(h - 1)^2", {"h": 4.0}, FileError)
+    18.0
+    """
+    value = linear(expression, known, fail)
+    if value[1:].any():
+        raise fail(f"expected a number, found {expression.strip()!r}")
+    return float(value[0])
+
+
+def linear(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
+    """(4,) constant and coefficients of x, y, z of an expression that is linear in them.
+
+    >>> linear("z - 0.5*(x + 1)", {}, FileError).tolist()
+    [-0.5, -0.5, 0.0, 1.0]
+    """
+    source = expression.strip().replace("^", "**")
+    if odd := re.search(r"\b\d[\w.]*_\w*", source):  # a number to Python
+        raise fail(f"{odd[0][:60]!r} is not a number")
+    if len(source) > LONGEST:
+        raise fail(f"{source[:40]!r}... has {len(source)} characters, more than {LONGEST}")
+    try:
+        with np.errstate(all="raise"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's own, about what it would not write so
+            return _term(ast.parse(source, mode="eval").body, known)
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
+        raise fail(
+            f"{expression.strip()[:60]!r} ({error.args[0] if error.args else type(error).__name__})"
+        ) from None
+
+
+SUM: Mapping[type, Callable[[Any, Any], Any]] = {ast.Add: operator.add, ast.Sub: operator.sub}
+AXES = {"x": 1, "y": 2, "z": 3, "x1": 1, "x2": 2, "x3": 3}
+
+
+def _term(node: ast.expr, known: Mapping[str, float]) -> Floats:
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return float(number) * np.eye(4)[0]
+        case ast.Name(id=name) if name.lower() in AXES:
+            return np.eye(4)[AXES[name.lower()]]
+        case ast.Name(id=name) if name.lower() in known:
+            return known[name.lower()] * np.eye(4)[0]
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):
+            return _term(inner, known) * (-1.0 if isinstance(sign, ast.USub) else 1.0)
+        case ast.BinOp(left=left, op=op, right=right):
+            a, b = _term(left, known), _term(right, known)
+            if type(op) in SUM:
+                return SUM[type(op)](a, b)
+            if isinstance(op, ast.Mult) and not (a[1:].any() and b[1:].any()):
+                return a[0] * b if not a[1:].any() else b[0] * a
+            if isinstance(op, ast.Div) and not b[1:].any():
+                return a / b[0]
+            if isinstance(op, ast.Pow) and not (a[1:].any() or b[1:].any()):
+                return a[0] ** b[0] * np.eye(4)[0]
+        case ast.Call(func=ast.Name(id="sqrt"), args=[inner]):
+            value = _term(inner, known)
+            if not value[1:].any() and value[0] >= 0.0:
+                return math.sqrt(value[0]) * np.eye(4)[0]
+    raise ValueError(f"{ast.unparse(node)!r} is not a number, a parameter or linear in x, y, z")

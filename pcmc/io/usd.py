@@ -19,9 +19,10 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra
 from ..base.units import Units, length_factor
 from ..surface import Surface
-from ..surface.colours import linear, patch_colors, scalar_colors
+from ..surface.colours import linear, scalar_colors
 from ..surface.origin import file_origin
 from .mesh_data import support_of
+from .patch_meshes import patch_meshes
 
 ROOF = "/Roof"
 SUPPORT = "support"
@@ -39,7 +40,7 @@ def write(
 ) -> None:
     """One layer."""
     try:
-        from pxr import Usd, UsdGeom, Vt
+        from pxr import Sdf, Usd, UsdGeom, Vt
     except ImportError:
         raise MissingExtra("usd-core", "usd") from None
 
@@ -57,18 +58,15 @@ def write(
     at_vertices = {SUPPORT: support_of(surface).astype(float)}
     at_vertices |= {name: values for name, values in scalars.items() if len(values) == surface.n}
     shades = linear(scalar_colors(scalars[colour])[0]) if colour else None
-    for k, color in enumerate(linear(patch_colors(surface))):
-        faces = surface.faces[surface.patch_of_face == k]
-        if not len(faces):
-            continue
-        used, local = np.unique(faces, return_inverse=True)
+    for k, patch_color, used, faces in patch_meshes(surface):
+        color = linear(patch_color)
         mesh: Any = UsdGeom.Mesh.Define(stage, f"{ROOF}/patch_{k}")
         mesh.GetPrim().SetDisplayName(surface.patches[k].name)
         points = Vt.Vec3fArray.FromNumpy((surface.vertices[used] - middle).astype(np.float32))
         mesh.CreatePointsAttr(points)
         mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
         mesh.CreateFaceVertexCountsAttr([3] * len(faces))
-        mesh.CreateFaceVertexIndicesAttr(local.ravel().tolist())
+        mesh.CreateFaceVertexIndicesAttr(faces.ravel().tolist())
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
         mesh.CreateDoubleSidedAttr(True)
         shown = color[None] if shades is None else shades[used]
@@ -77,17 +75,11 @@ def write(
         colors.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(shown, dtype=np.float32)))
         primvars = UsdGeom.PrimvarsAPI(mesh)
         for name, values in at_vertices.items():
-            primvar = _primvar(primvars, re.sub(r"\W+", "_", name))
+            key = re.sub(r"\W+", "_", name)
+            primvar = primvars.CreatePrimvar(key, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
             primvar.Set(Vt.FloatArray.FromNumpy(values[used].astype(np.float32)))
         _bind_material(stage, mesh, k, color, vertex_colors=shades is not None)
     path.write_text(stage.GetRootLayer().ExportToString(), encoding="utf-8")
-
-
-def _primvar(primvars: Any, name: str) -> Any:
-    """An array of numbers at vertices."""
-    from pxr import Sdf, UsdGeom
-
-    return primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
 
 
 def _bind_material(stage: Any, mesh: Any, k: int, color: Floats, vertex_colors: bool) -> None:

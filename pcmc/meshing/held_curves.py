@@ -49,9 +49,9 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     """(k,3) other places for the same vertices, about as far from those as the curve that was meant may be.
 
     Each lies nearer to the middle of its edge, or farther from it. With r, s the rises of the two arcs over
-    an edge, r the smaller one, it moves by (r - s) |r - s| / 2 |r + s|: of second order beside the rise, as
-    is the error; all the way to r where s is three times as high, as there may be a corner. Beside a corner
-    that is known the only arc has the curvature at the edge's other end in place of its
+    an edge, r the smaller one, it moves by (r - s) |r - s| / |r + s|: of second order beside the rise, as is
+    the error; but not beyond r, which it reaches where s is three times as high, as there may be a corner.
+    Beside a corner that is known there is one arc, with the curvature at the edge's other end in place of its
     middle: an error of first order, half of what the arcs over the next edge differ by, to the scale of the
     edges; where that has no two arcs, all of the rise. None where nothing moves: on circles and lines.
 
@@ -64,7 +64,7 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     ...                 [Patch("plate", 1.0)], fixed=range(1, 25))
     >>> [float(np.abs(np.hypot(*(x[:, :2] / [2, 1]).T) - 1).max().round(5))
     ...  for x in (smooth_midpoints(plate), doubted_midpoints(plate))]
-    [0.00067, 0.0008]
+    [0.00067, 0.00104]
     """
     X, edges = surface.vertices, held_edges(surface)
     rises, arcs = arcs_over(X, edges, corner, corners)
@@ -72,8 +72,8 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     square = ((X[edges[:, 1]] - X[edges[:, 0]]) ** 2).sum(axis=1)
     apart, heights = rises[:, 1] - rises[:, 0], np.linalg.norm(rises, axis=2)
     size, total = np.linalg.norm(apart, axis=1), np.linalg.norm(rises.sum(axis=1), axis=1)
-    share = np.divide(size, total, out=np.ones_like(size), where=total > 2.0 * size)
-    share = two * np.copysign(0.5 * share, heights[:, 0] - heights[:, 1])
+    share = np.divide(size, total, out=np.full_like(size, 0.5), where=total > 2.0 * size)
+    share = two * np.copysign(share, heights[:, 0] - heights[:, 1])
     moves = share[:, None] * apart
     change, known = np.zeros_like(X), np.zeros(len(X), dtype=bool)  # of s - r from a vertex on, over length²
     for end, sign in ((0, 1.0), (1, -1.0)):

@@ -54,13 +54,16 @@ def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families
     >>> families(triangles, 0.01, apart=True).family.tolist()
     [0, 0, 1]
     """
-    orders = _canonical_orders(lengths, apart)  # (m,w,3)
+    orders = np.argsort(lengths, axis=1, kind="stable")[:, None]  # (m,w,3) that are tried: these differ least
+    if apart:  # the three turns, the least one first
+        turned = lengths[:, TURNS]
+        orders = TURNS[np.lexsort((turned[..., 2], turned[..., 1], turned[..., 0]), axis=1)]
     points = np.take_along_axis(lengths[:, None], orders, axis=2)
     rank = np.lexsort(points[:, 0].T[::-1])  # equal triangles are interchangeable
     at_least = _incompatible(points[rank], tolerance)
-    family, way = np.empty((2, len(rank)), dtype=np.int64)
-    family[rank], way[rank] = _cover(points[rank], tolerance, at_least)
-    order = orders[np.arange(len(rank)), way]
+    family, turn = np.empty((2, len(rank)), dtype=np.int64)
+    family[rank], turn[rank] = _cover(points[rank], tolerance, at_least)
+    order = orders[np.arange(len(rank)), turn]
     aligned = np.take_along_axis(lengths, order, axis=1)
     return Families(_numbered(family, aligned), order, at_least)
 
@@ -83,15 +86,6 @@ def family_of_face(surface: Surface) -> Floats:
     return family
 
 
-def _canonical_orders(lengths: Floats, apart: bool) -> Ints:
-    """(m,w,3) the orders of edges that are tried: ascending; or the three turns, the least one first."""
-    if not apart:  # sorted lengths differ least
-        return np.argsort(lengths, axis=1, kind="stable")[:, None]
-    turned = lengths[:, TURNS]
-    by_length = np.lexsort((turned[..., 2], turned[..., 1], turned[..., 0]), axis=1)
-    return TURNS[by_length]
-
-
 def _numbered(family: Ints, aligned: Floats) -> Ints:
     """Numbers from 0, by descending size; among families of one size by their smallest lengths."""
     count = np.bincount(family)
@@ -103,13 +97,13 @@ def _numbered(family: Ints, aligned: Floats) -> Ints:
 
 
 def _cover(points: Floats, tolerance: float, at_least: int) -> tuple[Ints, Ints]:
-    """The family (m,) of each triangle, and its way (m,), from points (m,w,3) in canonical order.
+    """The family (m,) of each triangle, and its turn (m,), from points (m,w,3) in canonical order.
 
     The best of several greedy covers, swept along different axes, is improved by search: families near one
     another are dissolved and covered anew, along another axis.
     """
-    count, ways, _ = points.shape
-    axes = (0, 1, 2) if ways == 1 else (0,)  # turning makes the axes alike
+    count, turns, _ = points.shape
+    axes = (0, 1, 2) if turns == 1 else (0,)  # turning makes the axes alike
     sweeps = [(axis, side) for axis in axes for side in (1.0, -1.0)]
     found = [_sweep(points, np.arange(count), axis, side, tolerance) for axis, side in sweeps]
     best = min(found, key=lambda cover: int(cover[0].max()))
@@ -129,34 +123,34 @@ def _improved(
     random: np.random.Generator,
 ) -> tuple[Ints, Ints]:
     """A cover with as many families or fewer: those around a random one are dissolved and covered anew."""
-    family, way = cover
+    family, turn = cover
     count = int(family.max()) + 1
-    placed = points[np.arange(len(points)), way]
+    placed = points[np.arange(len(points)), turn]
     total = np.stack([np.bincount(family, column) for column in placed.T], axis=1)
     centre = total / np.bincount(family)[:, None]
     middle = centre[random.integers(count)]
     distance = np.abs(centre - middle).max(axis=1)
     away = distance > np.sort(distance)[max(1, int(SHARE * random.random() * count))]
     number = np.where(away, np.cumsum(away) - 1, -1)
-    kept, kept_way = number[family], way.copy()
-    _absorb(points, kept, kept_way, int(away.sum()), tolerance)
+    kept, kept_turn = number[family], turn.copy()
+    _absorb(points, kept, kept_turn, int(away.sum()), tolerance)
     loose = np.flatnonzero(kept < 0)
     new = int(away.sum())
     if len(loose):
         again, turned = _sweep(points, loose, *sweep, tolerance)
-        kept[loose], kept_way[loose] = again + new, turned
+        kept[loose], kept_turn[loose] = again + new, turned
         new += int(again.max()) + 1
-    return (kept, kept_way) if new <= count else cover
+    return (kept, kept_turn) if new <= count else cover
 
 
 def _sweep(points: Floats, chosen: Ints, axis: int, side: float, tolerance: float) -> tuple[Ints, Ints]:
     """A greedy cover of the chosen triangles, swept along an axis from its lower or upper side."""
     axes = [axis, (axis + 1) % 3, (axis + 2) % 3]
-    count, ways = len(chosen), points.shape[1]
+    count, turns = len(chosen), points.shape[1]
     P = side * points[chosen][..., axes].reshape(-1, 3)
     order = np.lexsort(P.T[::-1])
-    family, place = _greedy(np.ascontiguousarray(P[order]), order // ways, count, tolerance)
-    return family, order[place] % ways
+    family, place = _greedy(np.ascontiguousarray(P[order]), order // turns, count, tolerance)
+    return family, order[place] % turns
 
 
 @compiled
@@ -225,14 +219,14 @@ def _best_window(P: Floats, group: Ints, i: int, tolerance: float) -> tuple[floa
 
 
 @compiled
-def _absorb(points: Floats, family: Ints, way: Ints, count: int, tolerance: float) -> None:
+def _absorb(points: Floats, family: Ints, turn: Ints, count: int, tolerance: float) -> None:
     """Put each triangle without a family into the first family that has room for it, in place."""
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     for f in range(len(points)):
         if family[f] >= 0:
             for d in range(3):
-                low[family[f], d] = min(low[family[f], d], points[f, way[f], d])
-                high[family[f], d] = max(high[family[f], d], points[f, way[f], d])
+                low[family[f], d] = min(low[family[f], d], points[f, turn[f], d])
+                high[family[f], d] = max(high[family[f], d], points[f, turn[f], d])
     for f in range(len(points)):
         if family[f] >= 0:
             continue
@@ -243,7 +237,7 @@ def _absorb(points: Floats, family: Ints, way: Ints, count: int, tolerance: floa
                     x = points[f, w, d]
                     fits = fits and max(high[g, d], x) - min(low[g, d], x) <= tolerance
                 if fits:
-                    family[f], way[f] = g, w
+                    family[f], turn[f] = g, w
                     for d in range(3):
                         low[g, d] = min(low[g, d], points[f, w, d])
                         high[g, d] = max(high[g, d], points[f, w, d])

@@ -144,17 +144,17 @@ class _Search:
         self.quality = QUALITY * worst_quality(self.start.vertices, self.faces)
 
     def run(self, rounds: int, callback: OnRound | None) -> int:
-        """Try the ways to join families in turn; keep to one as long as it helps. Returns the rounds made."""
-        ways = list(product(WIDER, INSIDE))
-        way = misses = made = 0
-        while made < rounds and misses < len(ways):
-            surface = self._round(*ways[way])
+        """Try the settings in turn; keep to one as long as it helps. Returns the rounds made."""
+        settings = list(product(WIDER, INSIDE))
+        current = misses = made = 0
+        while made < rounds and misses < len(settings):
+            surface = self._round(*settings[current])
             made += 1
             count = self.count if surface is None else self._families(surface.vertices)
             if surface is not None and count < self.count:
                 self.best, self.count, misses = surface, count, 0
             else:
-                way, misses = (way + 1) % len(ways), misses + 1
+                current, misses = (current + 1) % len(settings), misses + 1
             if callback is not None:
                 callback(made, self.count)
         return made

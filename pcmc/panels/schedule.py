@@ -15,7 +15,7 @@ from ..certificate.required import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from .families import families
-from .unfolding import joints, unfolded
+from .flat import joints, unfolded
 
 MIRROR_IMAGES = ("alike", "apart")
 SHOWN = 12  # families that ``print`` shows

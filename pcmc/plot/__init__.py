@@ -5,10 +5,8 @@ With a path every function writes a PNG; each returns the picture as an (h,w,3) 
 """
 
 from .arrows import reactions, vectors
-from .curves import convergence, heatmap, histories, lines
-from .diagrams import diagram
-from .families import families
-from .pictures import draw, panel
+from .curves import convergence, diagram, heatmap, histories, lines
+from .pictures import draw, families, panel
 
 __all__ = [
     "convergence",

@@ -13,8 +13,8 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate.reactions import support_forces
 from ..surface import Surface
-from .figure import INK, SMALL, TEXT, Image, finish
-from .pictures import DOTS_FROM, EDGES_FROM, Path, ViewName, fit_frames, frame_axes, frames_of
+from .figure import INK, SMALL, TEXT, Image, Path, finish
+from .pictures import DOTS_FROM, EDGES_FROM, ViewName, fit_frames, frame_axes, frames_of
 from .raster import paint
 from .scene import mean_edge, scene, view_of
 

@@ -22,6 +22,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 Image = npt.NDArray[np.uint8]
+Path = str | os.PathLike[str]
 
 
 def new(width: float, height: float, pad: float = 4.0) -> Any:
@@ -107,12 +108,12 @@ def overlap_style(k: int, count: int) -> dict[str, Any]:
     return {"linewidth": width, "linestyle": (3.0 * (k % 2), (3.0, 3.0))}
 
 
-def check_suffix(path: str | os.PathLike[str]) -> None:
+def check_suffix(path: Path) -> None:
     """Refuse a path that is not a picture's."""
     suffix_of(path, SUFFIXES, "a picture")
 
 
-def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
+def finish(figure: Any, path: Path | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG, SVG or PDF if there is a path.
 
     The file has no date and no program's name: the same figure gives the same bytes. In SVG and PDF, text
@@ -125,13 +126,14 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
         return image
     check_suffix(path)
     kind = os.path.splitext(path)[1].lower()
-    content = _png(image) if kind == ".png" else _vector(figure, kind.removeprefix("."))
+    content = png(image) if kind == ".png" else _vector(figure, kind.removeprefix("."))
     with writing(path), atomic_write(path) as temporary:
         temporary.write_bytes(content)
     return image
 
 
-def _png(image: Image) -> bytes:
+def png(image: Image) -> bytes:
+    """The content of a PNG file."""
     from PIL import Image as Pillow
 
     stream = io.BytesIO()

@@ -2,52 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats
-from ..surface import Surface
+from ..base.arrays import Floats
 from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL, Image
-from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT
+from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Drawing
 
 IN_A_LINE = 6
 ALIKE = 0.03  # difference of two colours' directions up to which one may be the other in a shade
 SHADES = (0.5, 1.06)  # brightness of a sheet, lit or not, of its colour's
 
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """A surface in a picture: the patches drawn, the values that colour it, whether supports are dots."""
-
-    surface: Surface
-    patches: Sequence[str] | None
-    values: Floats | None
-    dots: bool
-    image: Image  # (h,w,3), as painted
+Picture = tuple[Drawing, bool, Image]  # with whether its supports are dots, and (h,w,3) as painted
 
 
-def shown_vertices(surface: Surface, patches: Sequence[str] | None) -> Bools:
-    """(n,) vertices of the patches drawn; None: all."""
-    shown = np.full(surface.n, patches is None)
-    faces = surface.patch_faces([surface.patch_index(name) for name in patches or ()])
-    shown[surface.faces[faces]] = True
-    return shown
-
-
-def entries(pictures: Iterable[Shown]) -> tuple[dict[str, Any], dict[str, Any]]:
+def entries(pictures: Iterable[Picture]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Colours of areas by name, and of dots by name, that can be seen in all the pictures together."""
     colors: dict[str, Any] = {}
     dots: dict[str, Any] = {}
-    for picture in pictures:
-        surface, values, names = picture.surface, picture.values, picture.patches
-        shown = shown_vertices(surface, names)
+    for drawing, dotted, image in pictures:
+        surface, values, names, shown = drawing.surface, drawing.values, drawing.patches, drawing.shown
         if values is None:
             for patch, color in zip(surface.patches, patch_colors(surface), strict=True):
-                if (names is None or patch.name in names) and _visible(picture.image, color):
+                if (names is None or patch.name in names) and _visible(image, color):
                     colors.setdefault(patch.name, tuple(color))
         elif np.isnan(values[shown] if len(values) == surface.n else values).any():
             colors["no value"] = NO_VALUE
@@ -55,7 +35,7 @@ def entries(pictures: Iterable[Shown]) -> tuple[dict[str, Any], dict[str, Any]]:
             ("fixed", surface.pinned, FIXED_DOT),
             ("sliding", surface.held & ~surface.pinned, SLIDING_DOT),
         ):
-            if picture.dots and held[shown].any() and _visible(picture.image, rgb(dot)):
+            if dotted and held[shown].any() and _visible(image, rgb(dot)):
                 dots[name] = dot
     return colors, dots
 
@@ -71,7 +51,7 @@ def _visible(image: Image, color: Floats) -> bool:
     return bool((alike[1:, 1:] & alike[1:, :-1] & alike[:-1, 1:] & alike[:-1, :-1]).any())
 
 
-def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:
+def add_legend(figure: Any, pictures: Iterable[Picture]) -> None:
     """The legend at the foot of the figure."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch as Swatch

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import html
 from base64 import b64encode
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 from ..base.errors import MissingExtra
 from ..solvers.result import Result
 from ..surface import Surface
+from .figure import png
+from .pictures import draw
 
 if TYPE_CHECKING:
     from ..accuracy.adaptive import AccurateResult
@@ -28,16 +29,7 @@ def cell_html(value: Surface | Result | Design | AccurateResult) -> str:
     """
     text = f"<pre>{html.escape(repr(value))}</pre>"
     try:
-        return _picture(value if isinstance(value, Surface) else value.surface) + text
+        image = draw(value if isinstance(value, Surface) else value.surface, width=WIDTH, legend=True)
     except MissingExtra:
         return text
-
-
-def _picture(surface: Surface) -> str:
-    from PIL import Image
-
-    from .pictures import draw
-
-    stream = BytesIO()
-    Image.fromarray(draw(surface, width=WIDTH, legend=True)).save(stream, format="PNG", optimize=True)
-    return f'<img alt="surface" src="data:image/png;base64,{b64encode(stream.getvalue()).decode()}">'
+    return f'<img alt="surface" src="data:image/png;base64,{b64encode(png(image)).decode()}">{text}'

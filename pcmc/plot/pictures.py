@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import color_scale
-from .figure import INK, SMALL, TEXT, Image, finish, fit_height, grid, new
-from .legend import Shown, add_legend, shown_vertices
+from .figure import INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new
+from .legend import add_legend
 from .raster import paint
-from .scene import View, mean_edge, scene, view_of
+from .scene import Drawing, View, mean_edge, scene, view_of
 
-Path = str | os.PathLike[str]
+if TYPE_CHECKING:
+    from ..panels import Panels
+
 ViewName = str | tuple[float, float]
 
 MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
@@ -143,8 +144,7 @@ def panel(
         painted = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
         images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
     if legend:
-        seen = zip(drawings, dotted, images, strict=True)
-        add_legend(figure, [Shown(d.surface, d.patches, d.values, dots, image) for d, dots, image in seen])
+        add_legend(figure, list(zip(drawings, dotted, images, strict=True)))
     fit_frames(figure, axes, frames, columns)
     for drawing, frame, image, place in zip(drawings, frames, images, axes, strict=True):
         frame.show(place, image)
@@ -153,21 +153,32 @@ def panel(
     return finish(figure, path)
 
 
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """One surface of a picture: where it is seen from and what is shown on it."""
+def families(schedule: Panels, path: Path | None = None, **options: Any) -> Image:
+    """The panels of a roof, each in the colour of its family.
 
-    surface: Surface
-    view: View
-    title: str
-    values: Floats | None  # (n,) or (m,), shown as colours
-    numbers: Floats | None  # (n,), printed at the vertices
-    patches: Sequence[str] | None  # the names of those to draw; None: all
+    Parameters
+    ----------
+    schedule : what ``pcmc.panels`` returns.
+    path : PNG file to write, or None.
+    options : as in ``draw``, such as ``view`` and ``width``.
 
-    def points(self, every: bool) -> Floats:
-        """(k,2) picture coordinates of every vertex, or of those on the patches drawn."""
-        X = self.surface.vertices
-        return self.view.project(X if every else X[shown_vertices(self.surface, self.patches)])
+    Returns
+    -------
+    (h,w,3) uint8 array, the picture.
+
+    >>> from pcmc import Patch, Surface, panels
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> families(panels(roof, tolerance=0.01), width=200).shape[1]
+    200
+    """
+    label = f"family of {schedule.count}, the largest first; within {schedule.tolerance:g}"
+    look: dict[str, Any] = {"label": label, "cmap": "turbo", "edges": True, "supports": False} | options
+    if schedule.count > 1:
+        look.setdefault("limits", (1.0, float(schedule.count)))
+    names = sorted(set(schedule.panels["patch"]))
+    return draw(schedule.surface, path, scalars=schedule.family_of_face, patches=names, **look)
 
 
 def _drawings(
@@ -177,7 +188,8 @@ def _drawings(
     count = len(surfaces)
     if not count:
         validate.refuse("surfaces", 0, "at least one surface")
-    if _is_view(views):
+    angles = isinstance(views, Sequence) and len(views) == 2 and not isinstance(views[0], str | Sequence)
+    if angles or isinstance(views, str):
         views = [views] * count
     if patches is None or all(isinstance(entry, str) for entry in patches):
         patches = [patches] * count
@@ -254,27 +266,16 @@ def fit_frames(figure: Any, axes: Sequence[Any], frames: Sequence[Frame], column
 
 
 def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, form: str) -> None:
+    """Numbers at the vertices whose sheet turns its upper side, along the normal of Π, to the viewer."""
     from matplotlib.patheffects import withStroke
 
-    shown = np.flatnonzero(np.isfinite(numbers) & _facing(surface, view))
+    area = area_vectors(surface.vertices[surface.faces])
+    area *= np.where(area @ np.array(surface.plane.normal) < 0.0, -1.0, 1.0)[:, None]
+    facing = np.bincount(surface.faces.ravel(), np.repeat(area @ view.axes[2], 3), surface.n) > 0.0
+    shown = np.flatnonzero(np.isfinite(numbers) & facing)
     for (x, y), number in zip(view.project(surface.vertices[shown]), numbers[shown], strict=True):
         text = axes.text(x, y, format(number, form), fontsize=SMALL, color=INK, ha="center", va="center")
         text.set_path_effects([withStroke(linewidth=1.4, foreground="white")])
-
-
-def _facing(surface: Surface, view: View) -> Bools:
-    """(n,) vertices whose sheet turns its upper side, along the normal of Π, to the viewer."""
-    X, F = surface.vertices, surface.faces
-    area = area_vectors(X[F])
-    area *= np.where(area @ np.array(surface.plane.normal) < 0.0, -1.0, 1.0)[:, None]
-    towards = np.repeat(area @ view.axes[2], 3)
-    return np.bincount(F.ravel(), towards, surface.n) > 0.0
-
-
-def _is_view(view: object) -> bool:
-    return isinstance(view, str) or (
-        isinstance(view, Sequence) and len(view) == 2 and not isinstance(view[0], str | Sequence)
-    )
 
 
 def _per_surface(name: str, entries: Any, count: int) -> list[Any]:

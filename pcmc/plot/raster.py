@@ -80,25 +80,21 @@ def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]
             dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
             round_dots = {"style": "points", "render_points_as_spheres": True, "point_size": SAMPLES * DOT}
             plotter.add_mesh(dots, **plain, **round_dots)
-        _aim(plotter, scene, low, scale, size)
+        axes, depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
+        centre = low + np.array(size) / (2.0 * scale)
+        near, far = depth.max(), depth.min()
+        reach = max(near - far, np.array(size).max() / scale)
+        focus = centre @ axes[:2] + near * axes[2]
+        camera = plotter.camera
+        camera.position = focus + reach * axes[2]
+        camera.focal_point = focus
+        camera.up = axes[1]
+        camera.parallel_projection = True
+        camera.parallel_scale = size[1] / (2.0 * scale)
+        camera.clipping_range = (0.5 * reach, reach + (near - far) + 0.5 * reach)
         image = plotter.screenshot(return_img=True)
         plotter.close()
     return image[..., :3]
-
-
-def _aim(plotter: Any, scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> None:
-    axes, depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
-    centre = low + np.array(size) / (2.0 * scale)
-    near, far = depth.max(), depth.min()
-    reach = max(near - far, np.array(size).max() / scale)
-    focus = centre @ axes[:2] + near * axes[2]
-    camera = plotter.camera
-    camera.position = focus + reach * axes[2]
-    camera.focal_point = focus
-    camera.up = axes[1]
-    camera.parallel_projection = True
-    camera.parallel_scale = size[1] / (2.0 * scale)
-    camera.clipping_range = (0.5 * reach, reach + (near - far) + 0.5 * reach)
 
 
 def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:

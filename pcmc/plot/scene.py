@@ -63,6 +63,38 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
 
 
 @dataclass(frozen=True, eq=False)
+class Drawing:
+    """One surface of a picture: where it is seen from and what is shown on it.
+
+    Attributes
+    ----------
+    values : (n,) or (m,), shown as colours.
+    numbers : (n,), printed at the vertices.
+    patches : the names of those to draw; None: all.
+    """
+
+    surface: Surface
+    view: View
+    title: str
+    values: Floats | None
+    numbers: Floats | None
+    patches: Sequence[str] | None
+
+    @property
+    def shown(self) -> Bools:
+        """(n,) vertices of the patches drawn."""
+        shown = np.full(self.surface.n, self.patches is None)
+        faces = self.surface.patch_faces([self.surface.patch_index(name) for name in self.patches or ()])
+        shown[self.surface.faces[faces]] = True
+        return shown
+
+    def points(self, every: bool) -> Floats:
+        """(k,2) picture coordinates of every vertex, or of those on the patches drawn."""
+        X = self.surface.vertices
+        return self.view.project(X if every else X[self.shown])
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """Everything that a painter needs.
 

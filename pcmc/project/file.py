@@ -18,7 +18,7 @@ from ..advice.masts import mast_note
 from ..advice.rises import Rise, take_rises, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
-from ..base.files import check_name, check_regular, system_error
+from ..base.files import as_path, check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
@@ -58,6 +58,7 @@ class Project:
     method, options : as in ``pcmc.solve``.
     wanted : the accuracy asked for.
     mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
+    verify : whether it is to be proved that an exact equilibrium is near.
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
@@ -83,6 +84,7 @@ class Project:
     options: Mapping[str, Any] = field(default_factory=dict)
     wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
     mesh_check: bool | None = None
+    verify: bool = False
     search: bool = True
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
@@ -150,7 +152,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
         For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
         and for a roof held at single points inside.
     """
-    path = Path(path)
+    path = as_path(path)
     if not is_project(path):
         return Project(path, mesh=mesh_file(path), units=Units(units))
     text, data = read_data(path, units)
@@ -259,6 +261,7 @@ def project_of(
     data, drawing, chosen = with_drawing(path, data) if mesh is None else (data, None, Chosen())
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
+    proved = options.pop("verify", False)
     files, picture = output.get("files", []), output.get("picture")
     colour = output.get("colour", "patches")
     with in_file(path, FileError):
@@ -294,6 +297,7 @@ def project_of(
             options=options,
             wanted=wanted,
             mesh_check=mesh_check,
+            verify=proved,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             targets=targets,
             vary=vary,

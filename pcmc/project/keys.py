@@ -27,6 +27,7 @@ from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
+PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
 WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
 FIRST = "First lines"  # the keys before any table
 WALL = 'a number, "balanced" or false'
@@ -270,6 +271,7 @@ def solve_section(method: str) -> Section:
     known = (
         Key("method", "a text", "newton", "the solver", tuple(METHODS)),
         Key("mesh_check", "true or false", None, CHECKED),
+        Key("verify", "true or false", False, PROVED),
     )
     if method not in METHODS:
         return Section("solve", "The solver and its options.", known)

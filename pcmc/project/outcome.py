@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..quantities import Figure
     from ..report import RoofReport
     from ..structure import StructuralModel
+    from ..verification import Theorem
     from .file import Project
     from .output import OnStep
 
@@ -62,8 +63,8 @@ class Outcome:
     unfold : whether the whole roof is shown that ``surface`` is the part of between its mirror planes.
     data : all that the file of ``start`` holds, such as scalars; None without a file.
 
-    ``certificate``, ``whole``, ``figures``, ``panels``, ``check_mesh`` and ``model`` are computed when first
-    asked for, and kept.
+    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh`` and ``model`` are
+    computed when first asked for, and kept.
     """
 
     result: Result | None
@@ -132,6 +133,13 @@ class Outcome:
 
         return figures(*self.shown)
 
+    @cached_property
+    def theorem(self) -> Theorem:
+        """What ``pcmc.verify`` proves of what is shown."""
+        from ..verification import verify
+
+        return verify(self.shown.surface)
+
     @property
     def certified(self) -> bool:
         """Whether the surface, and the whole if that is asked for, is certified."""
@@ -164,7 +172,7 @@ class Outcome:
     def _same(self, **changes: Any) -> Outcome:
         other = replace(self, **changes)
         other._known.update(self._known)
-        kept = ("certificate",) if "unfold" in changes else ("certificate", "whole", "figures")
+        kept = ("certificate",) if "unfold" in changes else ("certificate", "whole", "figures", "theorem")
         vars(other).update({name: vars(self)[name] for name in kept if name in vars(self)})
         return other
 
@@ -219,6 +227,7 @@ class Outcome:
             tolerance=tolerance,
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
+            theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
             date=documents.date,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from .. import io
 from ..base.errors import OptionError, unknown
-from ..base.files import read_bytes
+from ..base.files import as_path, read_bytes
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
 from ..surface.renewed import KINDS, all_values
@@ -46,7 +46,7 @@ class _Source(NamedTuple):
 
 
 def _source(path: PathLike) -> _Source:
-    path = Path(path)
+    path = as_path(path)
     text, data = read_data(path) if is_project(path) else ("", {})
     return _Source(path, text, data, numbers(data) if data else {})
 

@@ -47,7 +47,7 @@ _ROWS = (
     Quantity("load", "force", ("roof",), "pressure, snow and weight along Π's normal"),
     Quantity("reaction", "force", ("roof", "boundary"), "force of the supports along Π's normal"),
     Quantity("thrust", "force", ("boundary",), "force of the supports along Π"),
-    Quantity("reaction per length", "tension", ("roof", "patch", "boundary"), "largest |f_v| / ℓ_v"),
+    Quantity("reaction per length", "tension", ("roof", "patch", "boundary"), "largest |Σ (α + w z) n|"),
     Quantity("lowest eigenvalue", "eigenvalue", ("roof",), "smallest second variation per unit area"),
 )
 

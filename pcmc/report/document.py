@@ -28,6 +28,7 @@ from .plan import PaperPlan, paper_plan
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..verification import Theorem
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -43,7 +44,7 @@ class RoofReport:
     name, date : in the head and the foot of the pages; empty for none.
     plan : to scale.
     schedule : the panels, if a tolerance was given; else None.
-    mesh_check, mesh_failure, targets : as given to ``roof_report``.
+    mesh_check, mesh_failure, targets, theorem : as given to ``roof_report``.
     figures : the key figures.
     files : name of each file that belongs to the roof, and what it is.
     """
@@ -60,6 +61,7 @@ class RoofReport:
     targets: pd.DataFrame | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     figures: Sequence[Figure] = ()
+    theorem: Theorem | None = None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the report as a PDF file; the same report gives the same bytes.
@@ -101,7 +103,7 @@ class RoofReport:
         surface, certificate, units = self.surface, self.certificate, self.units
         story = [
             pages.heading("Verdict"),
-            *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check)),
+            *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check, self.theorem, units)),
             *pages.table(tables.key_figures(surface, self.figures, units)),
             *pages.picture("View from above", pictures["The roof"]),
             pages.new_page(),
@@ -183,6 +185,7 @@ def roof_report(
     tolerance: float | None = None,
     mesh_check: MeshCheck | None = None,
     mesh_failure: str = "",
+    theorem: Theorem | None = None,
     targets: pd.DataFrame | None = None,
     files: Mapping[str, str] | None = None,
     date: str = "",
@@ -201,6 +204,7 @@ def roof_report(
     tolerance : of the panels' families, length; None for no panels.
     mesh_check : of the surface, for error bars; None for none.
     mesh_failure : why it was asked for and failed; empty otherwise.
+    theorem : of the surface; None for none.
     targets : ``Design.targets``; None for none.
     files : name of each file that belongs to the roof, and what it is.
     date : of the report, as it is to be printed; no clock is read.
@@ -242,6 +246,7 @@ def roof_report(
         targets,
         dict(files or {}),
         quantities.figures(surface, certificate) if figures is None else figures,
+        theorem,
     )
 
 

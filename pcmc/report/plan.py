@@ -11,7 +11,7 @@ from ..base.arrays import Floats
 from ..base.units import Units, length_factor
 from ..certificate import Certificate
 from ..drawings import views
-from ..drawings.sheet import Line, Text, apart, box
+from ..drawings.sheet import Line, Text, box, place_labels
 from ..surface import Surface
 
 FORMAT = "A4"
@@ -58,15 +58,15 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     supports = zip(certificate.supports["support"], certificate.supports[["x", "y"]].to_numpy(), strict=True)
     labels = [(name, at, "PCMC-RIDGE") for name, at in _labels("J", certificate.junctions)]
     labels += [(name, at, "PCMC-SUPPORT") for name, at in supports]
-    places = [(name, (factor * at + shift).tolist(), layer) for name, at, layer in labels]
-    texts += apart([Text((x, y), name, layer=layer, align="C") for name, (x, y), layer in places], texts)
+    names = [Text(factor * at + shift, name, layer=layer, align="C") for name, at, layer in labels]
+    texts += place_labels(names, texts)
     boxes = np.array([*(box(text) for text in texts), *(_extent(line) for line in lines)])
     corner, top = boxes[:, 0].min(axis=0) - AROUND, boxes[:, 1].max(axis=0) + AROUND
     width, height = map(float, top - corner)
     return PaperPlan(
         sheet.scale,
         [line._replace(points=line.points - corner) for line in lines],
-        [text._replace(at=(text.at[0] - float(corner[0]), text.at[1] - float(corner[1]))) for text in texts],
+        [text._replace(at=text.at - corner) for text in texts],
         (width, height),
     )
 

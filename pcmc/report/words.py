@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..base.units import Units
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
 from ..certificate.balance import balance_sentence
 from .tables import small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..verification import Theorem
 
 VERDICTS = {
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
@@ -20,7 +21,8 @@ VERDICTS = {
     Verdict.SADDLE: "The roof is in equilibrium, but leaves this shape at the smallest disturbance. Do not"
     " build it like this.",
     Verdict.NOT_CONVERGED: "The roof is not in equilibrium yet: the forces do not balance. Solve it further.",
-    Verdict.NO_EQUILIBRIUM: "There is no equilibrium: no shape balances these tensions and pressures.",
+    Verdict.NO_EQUILIBRIUM: "There is no equilibrium: no smooth shape balances these tensions and loads.",
+    Verdict.NONE_FOUND: "No equilibrium was found; that there is none is not proved.",
     Verdict.RAN_AWAY: "No equilibrium is known: the shape moved away without coming to rest.",
     Verdict.UNDECIDED: "Rounding of numbers hides whether the roof is in equilibrium, or stable.",
     Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
@@ -37,7 +39,12 @@ LEGEND = (
 """How to read the plan."""
 
 
-def verdict_sentences(certificate: Certificate, check: MeshCheck | None = None) -> list[str]:
+def verdict_sentences(
+    certificate: Certificate,
+    check: MeshCheck | None = None,
+    theorem: Theorem | None = None,
+    units: Units = NO_UNITS,
+) -> list[str]:
     """The verdict, its reason, and how exactly the roof keeps what it promises.
 
     >>> from pcmc import Patch, Surface, certify
@@ -63,6 +70,9 @@ def verdict_sentences(certificate: Certificate, check: MeshCheck | None = None) 
         sentences.append(f"{balance[:1].upper()}{balance[1:]}.")
     if check is not None:
         sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
+    if theorem is not None:
+        words = theorem.text(units)
+        sentences.append(f"{words[:1].upper()}{words[1:]}.")
     if certificate.symmetric_in:
         planes = ", ".join(certificate.symmetric_in)
         sentences.append(

@@ -37,7 +37,8 @@ class NewtonOptions:
     ----------
     tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when it
         is below 1e-10 of that norm and rounding lets no step lower it further.
-    iterations : the most steps of any kind, on each level and in each attempt.
+    iterations : the most steps of any kind, on each level and in each attempt. ``pcmc.solve`` ends its search
+        where one takes as many as were asked for: with ``iterations=1`` there is one step in all.
     target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
     levels : number of 1→4 refinements; the surface is solved before the first and after each.
     min_quality : vertices are redistributed along the shape while the worst triangle has less quality.

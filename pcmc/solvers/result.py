@@ -8,13 +8,14 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..base.interrupts import stop_requested
 from ..surface import Plane, Surface
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from ..certificate import Certificate
-    from ..certificate.proof import Proof
+    from ..certificate.proof import Attempt, Proof
 
 
 class Status(Enum):
@@ -47,13 +48,13 @@ class Status(Enum):
         "stopped at a saddle: the way down from it leads to no minimum; hold what slips, or accept the"
         " saddle with target='stationary'"
     )
-    PINCHED = (
-        "stopped because a neck pinches off; bring the held curves nearer to each other, or raise the"
-        " pressure"
-    )
     NO_EQUILIBRIUM = (
-        "ended without an equilibrium, as there is none; change the tensions, the pressures or the"
+        "ended without an equilibrium, as no smooth surface has one; change the tensions, the loads or the"
         " supports, as the proof says"
+    )
+    NONE_FOUND = (
+        "ended without an equilibrium: the search found none, and no proof that there is none; raise the"
+        " tensions, lower the loads, or start from another shape"
     )
 
 
@@ -74,6 +75,7 @@ class Result:
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
     note : a further finding of the solver, shown in the message.
     proofs : why there is no equilibrium, where that was proved.
+    tried : what the search has tried, the given start first, if it found none.
     room_changes : δ of each room of prescribed volume, by which its pressure has changed, force/length².
     """
 
@@ -86,6 +88,7 @@ class Result:
     rows: Sequence[Mapping[str, Any]]
     note: str = ""
     proofs: tuple[Proof, ...] = ()
+    tried: tuple[Attempt, ...] = ()
     room_changes: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
@@ -110,19 +113,19 @@ class Result:
         from ..certificate import Evidence, certify
         from ..certificate.certificate import TOLERANCE
 
+        first = Status[self.tried[0].end.upper()] if self.tried else self.status  # before the search
         evidence = {
             Status.DIVERGED: Evidence.INFLATED,
             Status.VANISHED: Evidence.VANISHED,
             Status.DEGENERATE: Evidence.COLLAPSED,
-            Status.PINCHED: Evidence.COLLAPSED,
-        }.get(self.status)
+        }.get(first)
         tolerance = TOLERANCE if tolerance is None else tolerance
         return certify(
             self.surface,
             modes=modes,
             tolerance=tolerance,
             evidence=evidence,
-            proofs=self.proofs,
+            tried=self.tried,
             whole=whole,
         )
 
@@ -168,8 +171,8 @@ class Progress:
 
 
 Callback = Callable[[Progress], None]
-"""Called after each iteration. Raise StopIteration to stop with the best surface so far; any other
-exception passes through to the caller of ``solve``."""
+"""Called after each iteration. Raise StopIteration to stop with the best surface so far; any other exception
+passes through to the caller of ``solve``, and so does StopIteration out of ``next()``, as a RuntimeError."""
 
 
 def until_stopped(run: Callable[[], Status]) -> Status:
@@ -182,5 +185,6 @@ def until_stopped(run: Callable[[], Status]) -> Status:
     """
     try:
         return run()
-    except (StopIteration, KeyboardInterrupt):
+    except (StopIteration, KeyboardInterrupt) as error:
+        stop_requested(error)
         return Status.STOPPED

@@ -2,8 +2,8 @@
 
 A motion v is soft if |v·A v| ≤ band · Σ α |v|² dA: beside the tension α of what it moves. The counts are
 those of the pencil A s = λ N s, N the lumped area times each triangle's tension: the negative eigenvalues of
-A - band·N and of A + band·N are those below ±band. With σ = band · max α and M the lumped area, A - σM is not
-above A - band·N: where it has no negative eigenvalue, none is negative nor soft.
+A - band·N and of A + band·N are those below ±band. With σ = near · max α, near ≥ band, and M the lumped area,
+A - σM is not above A - band·N: where it has no negative eigenvalue, none is negative nor soft.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ class Spectrum:
     ----------
     index : of the negative ones; None where rounding hides it.
     below : of those that are negative and not soft; None where rounding hides it.
-    soft : of the soft ones.
+    soft, near : of the soft ones, and of those in a wider band.
     hidden : what else of it could not be computed, as a sentence.
     """
 
     index: int | None = None
     below: int | None = None
     soft: int = 0
+    near: int = 0
     hidden: str = ""
 
     @property
@@ -38,26 +39,33 @@ class Spectrum:
         return self.below is None or bool(self.hidden)
 
 
-def count_soft(variation: SecondVariation, band: float) -> tuple[Spectrum, Stiffness | None]:
-    """The counts for a band in units of α, 1/length², and a factor for the modes; None if there is none.
+def count_soft(variation: SecondVariation, band: float, near: float) -> tuple[Spectrum, Stiffness | None]:
+    """The counts for two bands in units of α, 1/length², and a factor for the modes; None if there is none.
 
-    One factorisation where nothing is soft or negative, two where nothing is soft, else up to five.
+    One factorisation where nothing is near or negative, two where nothing is near, else up to seven.
     """
-    wide = band * variation.surface.tensions.max(initial=0.0) * variation.mass
+    wide = near * variation.surface.tensions.max(initial=0.0) * variation.mass
     above = _at(variation, wide)
     if above is not None and above.negative == 0:
         return Spectrum(0, 0), above
     below = _at(variation, -wide)
     if above is not None and below is not None and above.negative == below.negative:
         return Spectrum(below.negative, below.negative), below
-    narrow = band * variation.tension_mass
-    up, down, here = (_at(variation, shift) for shift in (narrow, -narrow, 0.0))
+    least, most = _between(variation, near)
+    near_count = 0 if least is None or most is None else most - least
+    down, up = _between(variation, band)
+    here = _at(variation, 0.0)  # the last: it has the modes
     index = None if here is None else here.negative
-    if up is None or down is None:
+    if down is None or up is None:
         return Spectrum(index), here
-    if up.negative == down.negative:
-        index = down.negative
-    return Spectrum(index, down.negative, up.negative - down.negative), here or _at(variation, wide)
+    index = down if down == up else index
+    return Spectrum(index, down, up - down, near_count), here or _at(variation, wide)
+
+
+def _between(variation: SecondVariation, band: float) -> tuple[int, int] | tuple[None, None]:
+    """The negative eigenvalues of A + band·N, and those of A - band·N; None where rounding hides one."""
+    ends = [_at(variation, shift * variation.tension_mass) for shift in (-band, band)]
+    return (None, None) if ends[0] is None or ends[1] is None else (ends[0].negative, ends[1].negative)
 
 
 def _at(variation: SecondVariation, shift: Floats | float) -> Stiffness | None:

@@ -1,4 +1,7 @@
-"""Cables of a structural model: beams of a square section with the tension of the cable."""
+"""Cables of a structural model: trusses with the tension of the cable.
+
+Beams would bend: beside a held end over a length √(EI/τ), which a thick cable feels over a whole bay.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from ..io.text import format_rows
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 
-POINTS = 8  # integration points of a B31 element
+POINTS = 8  # integration points of a T3D2 element, which is expanded to a brick
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
 
 
@@ -47,29 +50,16 @@ def directions(surface: Surface, edges: Ints) -> Floats:
 
 
 def cable_elements(surface: Surface, areas: tuple[float, ...], first: int) -> Iterator[str]:
-    """Elements from number ``first`` on, sections, and the set CABLES of all.
-
-    A section needs a direction across the beam: the axis of space farthest from it, so a set for each axis.
-    """
+    """Elements from number ``first`` on, sections, and the set CABLES of all."""
     if not surface.cables:
         return
-    sets = []
     for k, (cable, area) in enumerate(zip(surface.cables, areas, strict=True), 1):
         numbers = first + np.arange(len(cable.edges))
         first += len(cable.edges)
-        across = np.abs(directions(surface, cable.edges)).argmin(axis=1)
-        for axis in np.unique(across):
-            name, mine = f"CABLE_{k}_{'XYZ'[axis]}", across == axis
-            sets.append(name)
-            yield f"*ELEMENT, TYPE=B31, ELSET={name}\n"
-            yield format_rows("%d,%d,%d\n", numbers[mine], *(cable.edges[mine].T + 1))
-            yield f"*BEAM SECTION, ELSET={name}, MATERIAL=CABLE, SECTION=RECT\n"
-            yield (
-                f"{short(area**0.5)},{short(area**0.5)}\n"
-                + ",".join(f"{c:.1f}" for c in np.eye(3)[axis])
-                + "\n"
-            )
-    yield "*ELSET, ELSET=CABLES\n" + "".join(f"{name},\n" for name in sets)
+        yield f"*ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}\n"
+        yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))
+        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE\n{short(area)}\n"
+    yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k},\n" for k in range(1, len(surface.cables) + 1))
 
 
 def cable_stress(surface: Surface, areas: tuple[float, ...]) -> Floats:

@@ -39,7 +39,7 @@ def project_sweep(
     mesh_check : whether to check the mesh of each case, as ``solve_case`` does; the project's own key
         ``solve.mesh_check`` asks for it, too.
     search : whether a case whose start leads to no equilibrium tries further ones, as ``pcmc.solve`` does:
-        slower where there is none, with the proof as ``message``.
+        slower where there is none; ``message`` has what was tried, and any proof.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base import validate
 from ..base.errors import OptionError, SweepError
-from ..base.interrupts import interrupts_handled
+from ..base.interrupts import interrupts_handled, stop_requested
 from .grid import Sweep
 from .store import Record, open_store
 from .table import table
@@ -133,7 +133,8 @@ def run(
                     for record in new:
                         if on_record is not None:
                             on_record(progress(record))
-                except StopIteration:
+                except StopIteration as error:
+                    stop_requested(error)
                     break
     return table(records.values())
 

@@ -64,7 +64,7 @@ def solve_case(
     method : as of ``pcmc.solve``.
     mesh_check : whether to solve each surface at rest on two finer meshes, too (``pcmc.check_mesh``).
     search : whether further starts are tried where the first leads to no equilibrium, as ``pcmc.solve``
-        does: slower where there is none, with the proof as ``message``.
+        does: slower where there is none; ``message`` has what was tried, and any proof.
     arguments : parameters of the generator and options of the method. A name that both have is the
         generator's.
 

@@ -9,6 +9,10 @@ F is the gradient of E - Σ δ_r (V_r - V̄_r), so K is symmetric. κ is a power
 about as large as the diagonal of A. With K regular, C has full rank, and A has on the motions that keep the
 volumes (Cᵀ s = 0) as many negative eigenvalues as K less r (Haynsworth). If such a motion v has Av = μv + Cy,
 then K takes (v, y/κ) to (μ v, 0): so no μ is nearer to zero than the eigenvalues of K.
+
+Rigid motions that no support resists cost nothing. Their k columns Q in the motion space border K like the
+gradients of volumes, with the equations Qᵀ s = 0: a zero of F is stationary along all motions across Q, and
+along the rigid motions it is so by itself, as E does not change with them.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_array, csr_array, eye_array
+from scipy.sparse import block_array, csr_array
 
 from ..base.arrays import Floats
 from ..contact.pinching import StandingPart
@@ -42,7 +46,7 @@ class System:
     forces, forces_radius : (n,3) ∇E and the radii of its balls.
     matrix, matrix_error : (k,) values of K in the pattern, and a bound of ‖K - its values‖₂.
     residual : a bound of ‖F‖₂, force.
-    rooms : r.
+    borders : r + k.
     coupling : a bound of ‖Σ κ_r ζ_r B₀ᵀ∇²V_r B₀‖₂ for |ζ| = 1, per |ζ|; ``scales`` (r,) are κ.
     """
 
@@ -54,6 +58,7 @@ class System:
     matrix: Floats
     matrix_error: float
     residual: float
+    borders: int
     scales: Floats
     coupling: float
 
@@ -70,8 +75,8 @@ class System:
         return float((own + 6.0 * CUBIC * (self.coupling + shared * radius)) * SAFE)
 
 
-def system(part: StandingPart, space: MotionSpace) -> System:
-    """The system of a standing part in these frames."""
+def system(part: StandingPart, space: MotionSpace, rigid: Floats) -> System:
+    """The system of a standing part in these frames; ``rigid`` (N,k) is Q."""
     surface = part.surface
     pattern = hessian_pattern(part.classes, space)
     items = elements(surface, part.classes, pattern)
@@ -80,9 +85,10 @@ def system(part: StandingPart, space: MotionSpace) -> System:
     left, error = coordinates(space, force, force_radius)
     values, radii = second_variation(items, space, pattern)
     scales, coupling = np.empty(0), 0.0
+    diagonal = np.abs(values[pattern.indptr[:-1]]).mean()
+    columns = list(2.0 ** np.round(np.log2(diagonal)) * rigid.T)
+    column_errors, forms = list(0.0 * rigid.T), []
     if surface.rooms:
-        diagonal = np.abs(values[pattern.indptr[:-1]]).mean()
-        columns, column_errors, forms = [], [], []
         for signs in surface.room_signs:
             room = items.of_volume(signs)
             column, off = coordinates(space, *forces(room, -signs[patch_of_end]))
@@ -98,18 +104,21 @@ def system(part: StandingPart, space: MotionSpace) -> System:
         found = found + closing_volumes(surface)
         lacking = scales * (prescribed_volumes(surface) - found)
         left, error = np.append(left, lacking), np.append(error, scales * off + U * np.abs(lacking))
+    if columns:
         radii = _bordered(pattern, radii, np.stack(column_errors, axis=1))[1]
         pattern, values = _bordered(pattern, values, np.stack(columns, axis=1))
     residual = float(np.linalg.norm(np.abs(left) + error) * SAFE)
     error_norm = _norm(pattern, radii)
-    return System(items, space, pattern, force, force_radius, values, error_norm, residual, scales, coupling)
+    enclosed = force, force_radius, values, error_norm, residual
+    return System(items, space, pattern, *enclosed, len(columns), scales, coupling)
 
 
 def _bordered(pattern: Pattern, values: Floats, columns: Floats) -> tuple[Pattern, Floats]:
-    """The upper triangle of [[A, C], [Cᵀ, 0]] with the zeros of its last diagonal."""
-    corner = eye_array(columns.shape[1], format="csr")
-    corner.data[:] = 0.0
-    blocks: Any = [[pattern.matrix(values), csr_array(columns)], [None, corner]]
+    """The upper triangle of [[A, C], [Cᵀ, 0]], with all entries of C (N,k) and zeros on its last diagonal."""
+    size, k = columns.shape
+    corner = csr_array((np.zeros(k), np.arange(k), np.arange(k + 1)))
+    side = csr_array((columns.ravel(), np.tile(np.arange(k), size), k * np.arange(size + 1)))
+    blocks: Any = [[pattern.matrix(values), side], [None, corner]]
     upper = csr_array(block_array(blocks))
     upper.sort_indices()
     return Pattern(upper.indptr, upper.indices, pattern.offset), upper.data

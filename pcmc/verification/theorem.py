@@ -26,6 +26,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, standing_part
 from ..contact.pull import pull_and_capacity
@@ -44,17 +45,17 @@ STEPS = 8  # of inverse iteration for the least eigenvalue: within some tens of 
 SHARE = 0.5  # of that estimate is σ first; a quarter of it after each failure
 TRIES = 4
 REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
+LEVEL = 1e-9  # of a unit motion along Π: a part across it that is rounding
 MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
 
 
 @dataclass(frozen=True)
 class Theorem:
-    """What ``verify`` has proved of a surface, or why it has not. ``print`` shows it in words.
+    """What ``verify`` has proved of a surface, or why it has not. ``print`` and ``text`` have it in words.
 
     Attributes
     ----------
     proved, reason : whether all below is proved; if not, why.
-    text : the theorem in words; empty if it is not proved.
     radius : the exact equilibrium is at most this far from the given vertices, length: each vertex, and the
         root of the sum of the squares of all.
     unique_within : there is no other one within this distance, in the same norm and frames.
@@ -62,11 +63,14 @@ class Theorem:
     gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe
         volumes, among motions that keep these.
     beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
+    symmetric_in, volumes_kept : the mirror planes that motions are symmetric in, the rooms whose volumes they
+        keep: index and gap are about such motions.
+    rigid : the rigid motions that no support resists: it is alone, and so on, but for these.
+    spare : how much of their walls' capacity resting vertices have left, at least; None without any.
     """
 
     proved: bool
     reason: str = ""
-    text: str = ""
     radius: float = np.inf
     unique_within: float = 0.0
     index: int | None = None
@@ -74,9 +78,37 @@ class Theorem:
     beta: float = np.inf
     lipschitz: float = np.inf
     forces: float = np.inf
+    symmetric_in: tuple[str, ...] = ()
+    volumes_kept: tuple[str, ...] = ()
+    spare: float | None = None
+    rigid: int = 0
 
     def __str__(self) -> str:
-        return self.text or f"not proved: {self.reason}"
+        return self.text()
+
+    def brief(self, units: Units = NO_UNITS) -> str:
+        """The theorem in a line: "proved: index 0, within 1.3e-09 m"."""
+        if not self.proved:
+            return f"not proved: {self.reason}"
+        return f"proved: index {self.index}, within {self.radius:.1e}{units.behind('length')}"
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """The theorem in words, or why there is none."""
+        if not self.proved:
+            return self.brief()
+        length, tension = units.behind("length"), units.behind("tension")
+        planes = f"are symmetric in {', '.join(self.symmetric_in)}" if self.symmetric_in else ""
+        volumes = f"keep the volume of {', '.join(self.volumes_kept)}" if self.volumes_kept else ""
+        motions = " and ".join(filter(None, (planes, volumes)))
+        among = f", among motions that {motions}" if motions else ""
+        still = f", but for its {self.rigid} free rigid motions," if self.rigid else ""
+        rests = "" if self.spare is None else f"; walls rest where these do, with {self.spare:.1%} to spare"
+        return (
+            f"proved: an exact equilibrium of this mesh is within {self.radius:.1e}{length} of its vertices,"
+            f" and no other{still} within {self.unique_within:.1e}{length}; its Morse index is exactly"
+            f" {self.index}{among}, and no eigenvalue of its second variation is within"
+            f" {self.gap:.2g}{tension} of zero{rests}"
+        )
 
 
 class _Unproved(Exception):
@@ -111,8 +143,10 @@ def verify(surface: Surface) -> Theorem:
 def _proved(surface: Surface) -> Theorem:
     part = standing_part(surface)
     space = motion_space(part.surface, part.classes, part.surface.vertices)
-    _refuse(part, space)
-    found = system(part, space)
+    rigid = rigid_motions(part.surface)
+    free = rigid_modes(space, rigid, part.surface.vertices)
+    _refuse(part, space, rigid if free.shape[1] else rigid[:0])
+    found = system(part, space, free)
     _refuse_moving(part, found)
     index, gap = _inertia(found)
     beta = SAFE / gap
@@ -138,21 +172,37 @@ def _proved(surface: Surface) -> Theorem:
     left = (gap - rate * radius) / SAFE
     if not left > 0.0:
         raise _Unproved("no gap is left between the eigenvalues and zero at the exact equilibrium")
-    words = _words(surface, radius, unique, index, left, spare)
-    numbers = (float(x) for x in (left, beta, rate, found.residual))
-    return Theorem(True, "", words, float(radius), float(unique), index, *numbers)
+    mirrors = tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror)
+    rooms = tuple(room.name for room in surface.rooms)
+    return Theorem(
+        proved=True,
+        radius=float(radius),
+        unique_within=float(unique),
+        index=index,
+        gap=float(left),
+        beta=float(beta),
+        lipschitz=rate,
+        forces=found.residual,
+        symmetric_in=mirrors,
+        volumes_kept=rooms,
+        spare=spare,
+        rigid=free.shape[1],
+    )
 
 
-def _refuse(part: StandingPart, space: MotionSpace) -> None:
-    """Refuse what the theorem does not cover."""
+def _refuse(part: StandingPart, space: MotionSpace, rigid: Floats) -> None:
+    """Refuse what the theorem does not cover, such as free rigid motions (k,2,3) that change E."""
     surface = part.surface
     if not space.size:
         raise _Unproved("no vertex can move")
     if any(space.dimension[along].any() for _, along in surface.on_circle):
         raise _Unproved("vertices slide along a circle, and the frozen frames are straight")
-    free = rigid_modes(space, rigid_motions(surface), surface.vertices).shape[1]
-    if free:
-        raise _Unproved(f"no support resists {free} of its rigid motions, so equilibria are not isolated")
+    n = np.array(surface.plane.normal)
+    level = (
+        not len(rigid) or max(np.abs(rigid[:, 0] @ n).max(), np.abs(np.cross(rigid[:, 1], n)).max()) < LEVEL
+    )
+    if len(rigid) and (surface.uncancelled.any() or (surface.weights.any() and not level)):
+        raise _Unproved("its weight or pressure pushes along rigid motions that no support resists")
 
 
 def _refuse_moving(part: StandingPart, found: System) -> None:
@@ -168,7 +218,7 @@ def _refuse_moving(part: StandingPart, found: System) -> None:
 
 def _inertia(found: System) -> tuple[int, float]:
     """The Morse index, and g: no eigenvalue of K is within g of zero."""
-    pattern, data, rooms = found.pattern, found.matrix, len(found.scales)
+    pattern, data = found.pattern, found.matrix
     solver = factoriser(pattern, "superlu")
     rough = solver.factor(data)
     x = np.cos(1.618 * np.arange(pattern.size))
@@ -190,7 +240,7 @@ def _inertia(found: System) -> tuple[int, float]:
                 counts.append(int(np.count_nonzero(lu.U.diagonal() < 0.0)))
         gap = (sigma - (max(errors) + found.matrix_error) * SAFE) / SAFE
         if len(set(counts)) == 1 and gap > 0.0:
-            return counts[0] - rooms, gap
+            return counts[0] - found.borders, gap
         reason = f"{min(counts)} to {max(counts)} eigenvalues below ∓{sigma:.1e}"
         if gap <= 0.0:
             reason = f"rounding, {sigma - gap:.1e}, hides eigenvalues as near to zero as {sigma:.1e}"
@@ -226,17 +276,3 @@ def _rests(
             f"resting vertex {vertex} is on the verge of lifting off, so which rest is not certain"
         )
     return float((spare / capacity[resting]).min())
-
-
-def _words(
-    surface: Surface, radius: float, unique: float, index: int, gap: float, spare: float | None
-) -> str:
-    mirrors = [str(plane) for plane, _ in surface.on_planes if plane.mirror]
-    motions = f" among motions symmetric in {', '.join(mirrors)}" if mirrors else ""
-    kept = " that keep the volumes" if surface.rooms else ""
-    rest = "" if spare is None else f" Its walls rest where these do, with {100.0 * spare:.2g} % to spare."
-    return (
-        f"Proved: within {radius:.1e} of these vertices there is an exact equilibrium of the mesh, and no"
-        f" other within {unique:.1e}. Its Morse index is exactly {index}{motions}: no eigenvalue of B₀ᵀ∇²E B₀"
-        f"{', among motions' + kept if kept else ''} is within {gap:.2g} of zero.{rest}"
-    )

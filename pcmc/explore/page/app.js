@@ -1,5 +1,6 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
+import { capital } from "./elements.js";
 import {
   arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
@@ -197,7 +198,8 @@ class Page {
     if (header.findings.supports) showSupports(find("#supports"), header.findings, this.units);
     this.variants.show(header, this.units);
     find("#check-result").hidden = true; // it was about the last surface
-    find("#check").disabled = !header.at_rest;
+    find("#theorem").hidden = true;
+    for (const name of ["check", "verify"]) find(`#${name}`).disabled = !header.at_rest;
     if (!this.next) this.panel.show(header.values, values);
     find("#undo").disabled = !header.undo;
     find("#redo").disabled = !header.redo;
@@ -258,6 +260,20 @@ class Page {
     }
     button.textContent = label;
     button.disabled = !this.header.at_rest;
+  }
+
+  /** Prove that an exact equilibrium is near the surface shown; a newer surface leaves the answer behind. */
+  async verify() {
+    const { header: shown } = this;
+    find("#verify").disabled = true;
+    try {
+      const { header } = await ask(`api/${this.name}/verify`);
+      const badge = { hidden: false, textContent: capital(header.badge), title: capital(header.text) };
+      if (this.header === shown) Object.assign(find("#theorem"), badge);
+    } catch (error) {
+      this.notify(error.message);
+    }
+    find("#verify").disabled = !this.header.at_rest;
   }
 
   /** Move slowly along the softest mode and back. */
@@ -343,7 +359,7 @@ class Page {
     for (const name of ["undo", "redo", "reset", "stabilise", "remesh"]) {
       find(`#${name}`).addEventListener("click", () => this.act(name));
     }
-    find("#check").addEventListener("click", () => this.check());
+    for (const name of ["check", "verify"]) find(`#${name}`).addEventListener("click", () => this[name]());
     find("#back").addEventListener("click", () => this.act("undo"));
     find("#sway").addEventListener("click", () => {
       if (this.swaying) this.viewer.setVertices(this.arrays.vertices);

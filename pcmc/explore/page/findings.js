@@ -7,7 +7,7 @@ import { digits } from "./panel.js";
 
 const SIGNS = {
   stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", ran_away: "↗",
-  undecided: "?", wall_down: "⤓", degenerate: "△", opening: "…",
+  none_found: "↗", undecided: "?", wall_down: "⤓", degenerate: "△", opening: "…",
 };
 
 export const COLOURS = {
@@ -54,7 +54,7 @@ export function showFindings(body, findings, figures, units) {
     ["Volume", measured(findings.volume, "volume"), `Between the patches with pressure and the plane Π, ${units.volume}.`],
     ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
     ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],
-    ["Load over capacity", percentOf(findings.load_ratio), "The pressure's total push, as a part of the most that the tensions along the supports can carry, when all of them pull straight down. Above 100 % no equilibrium exists: raise tensions or lower pressures."],
+    ["Load over capacity", percentOf(findings.load_ratio), "The pressure's total push, as a part of the most that the tensions along the supports can carry, when all of them pull straight down. Above 100 % no smooth surface stands on fixed edges alone: raise tensions or lower pressures."],
     ["Largest error of H", percent(findings.curvature_error), "The mean curvature that balances the forces at each vertex, against H̄ = p / 2α. Exact at rest."],
     ["Error by Meyer's measure", percent(findings.curvature_error_cotangent), "Meyer's measure reads the mean curvature from the angles of the triangles, with Voronoi areas, as in the paper's figures. It differs from H̄ by an error of the mesh, which finer triangles reduce."],
     ["Worst triangle", digits(findings.quality, 3), "4√3 area / Σ edge²: 1 is equilateral, 0 degenerate."],

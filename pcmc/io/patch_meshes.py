@@ -1,16 +1,28 @@
-"""Read the meshes of a trimesh scene, each with its own vertices."""
+"""Meshes with vertices of their own: those of a surface's patches, and those of a trimesh scene."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Floats, Ints
+from ..surface import Surface
+from ..surface.colours import patch_colors
 from .mesh_data import MeshData
 from .metadata import Metadata
 
 
-def from_meshes(scene: Any, default: str, metadata: Metadata) -> MeshData:
+def patch_meshes(surface: Surface) -> Iterator[tuple[int, Floats, Ints, Ints]]:
+    """For each patch with triangles: its number, colour (3,), vertices (v,), and triangles (t,3) of these."""
+    for k, color in enumerate(patch_colors(surface)):
+        used, local = np.unique(surface.faces[surface.patch_of_face == k], return_inverse=True)
+        if len(used):
+            yield k, color, used, local.reshape(-1, 3)
+
+
+def from_scene(scene: Any, default: str, metadata: Metadata) -> MeshData:
     """Every mesh of the scene, placed by its node; meshes of one name are one patch."""
     data: dict[str, list[Any]] = {}
     meshes, order = [], list(scene.geometry)

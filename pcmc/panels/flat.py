@@ -1,0 +1,150 @@
+"""Triangles laid flat, the angles between neighbours, and panels side by side, to be cut from sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import pandas as pd
+
+from ..base.arrays import Floats, Ints
+from ..surface.geometry import area_vectors, edge_vectors
+
+SPACE, ROUNDING = 6.0, 1e-9  # mm: between panels; of their places
+TURNS = np.radians(np.arange(180.0))  # in which a panel is tried that does not fit as it lies
+
+
+def unfolded(P: Floats) -> Floats:
+    """(m,3,2) triangles with corners P (m,3,3) laid flat, their outside up: congruent, length.
+
+    The longest edge lies on the x axis and starts at the origin; the third corner is above it.
+
+    >>> unfolded(np.array([[[0, 0, 1], [0, 0, 5], [0, 3, 1.0]]])).round(12).tolist()
+    [[[3.2, 2.4], [0.0, 0.0], [5.0, 0.0]]]
+    """
+    edges = edge_vectors(P)
+    lengths = np.linalg.norm(edges, axis=2)
+    every, apex = np.arange(len(P)), lengths.argmax(axis=1)
+    first, second = (apex + 1) % 3, (apex + 2) % 3
+    base = lengths[every, apex]
+    along = edges[every, apex] / base[:, None]
+    flat = np.zeros((len(P), 3, 2))
+    flat[every, second, 0] = base
+    flat[every, apex, 0] = np.einsum("ij,ij->i", P[every, apex] - P[every, first], along)
+    flat[every, apex, 1] = 2.0 * np.linalg.norm(area_vectors(P), axis=1) / base
+    return flat
+
+
+def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
+    """A row for each pair of triangles that are neighbours at an edge, and for each edge of a single one.
+
+    Columns: ``edge``; ``first``, ``second``, rows of F (-1 for none); ``dihedral``, the angle between the two
+    on the inner side of the first, degrees: 180 where they are flat, less at a ridge, more at a valley. Where
+    k > 2 triangles meet, the edge has k rows, in turn around it.
+
+    >>> X = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, -1.0]])
+    >>> joints(X, np.array([[0, 1, 2], [1, 0, 3]]), np.array([[1, 2, 0], [3, 4, 0]])).dihedral.tolist()
+    [135.0, nan, nan, nan, nan]
+    """
+    sides = edge_of_face.ravel()
+    order = np.argsort(sides, kind="stable")
+    edge = sides[order]
+    start = np.flatnonzero(np.append(True, edge[1:] != edge[:-1]))
+    count = np.diff(np.append(start, len(edge)))
+    lead = np.repeat(start, count)  # the first triangle at each edge: angles are seen from it
+    inward, normal = _frames(X[F], order)
+    angle = np.arctan2(
+        -np.einsum("ij,ij->i", inward, normal[lead]), np.einsum("ij,ij->i", inward, inward[lead])
+    )
+    angle = np.degrees(angle) % 360.0
+    angle[start] = 0.0
+    turn = np.lexsort((angle, edge))
+    edge, face, angle = edge[turn], order[turn] // 3, angle[turn]
+    after = np.arange(len(edge)) + 1
+    last = start + count - 1
+    after[last] = start
+    between = (angle[after] - angle) % 360.0
+    between[count.repeat(count) == 1] = np.nan
+    second = np.where(np.isnan(between), -1, face[after])
+    once = np.ones(len(edge), dtype=bool)
+    once[last[count == 2]] = False  # two triangles are one pair
+    table = pd.DataFrame({"edge": edge, "first": face, "second": second, "dihedral": between})
+    return table[once].reset_index(drop=True)
+
+
+def _frames(P: Floats, sides: Ints) -> tuple[Floats, Floats]:
+    """Unit vectors (k,3) of sides 3 f + j: into the triangle, across its edge j; and its normal."""
+    face, side = sides // 3, sides % 3
+    along = edge_vectors(P)[face, side]
+    normal = area_vectors(P)[face]
+    inward = np.cross(normal, along)
+    return tuple(v / np.maximum(np.linalg.norm(v, axis=1), 1e-300)[:, None] for v in (inward, normal))
+
+
+def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple[int, Floats]]:
+    """The page of each panel (3,2), mm, and the panel placed on it: rows below one another, from y = 0 down.
+
+    >>> panel = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])
+    >>> [(page, placed[0].tolist()) for page, placed in packed([panel] * 3, 30.0, 12.0)]
+    [(0, [0.0, -10.0]), (0, [16.0, 0.0]), (1, [0.0, -10.0])]
+    """
+    page, y, depth = 0, 0.0, 0.0  # of the row that is filled: its top below the page's, and its height
+    row: list[Floats] = []
+    for panel in panels:
+        size, placed = np.ptp(panel, axis=0), _beside(row, panel)
+        if placed[:, 0].max() > wide + ROUNDING or y + size[1] > high + ROUNDING:
+            y, depth, row = y + depth + SPACE, 0.0, []
+            if y + size[1] > high + ROUNDING:
+                page, y = page + 1, 0.0
+            placed = _beside(row, panel)
+        row.append(placed)
+        depth = max(depth, float(size[1]))
+        yield page, placed - [0.0, y]
+
+
+def _beside(row: list[Floats], panel: Floats) -> Floats:
+    """The panel (3,2) to the right of those of a row, one side up or the other, as far left as possible.
+
+    Its highest point has y = 0, at the left end of a row its leftmost one x = 0.
+    """
+    placements = []
+    for turned in (panel, -panel):
+        at = turned - np.array([turned[:, 0].min(), turned[:, 1].max()])
+        shift = max((_gap(other, at) + SPACE for other in row[-3:]), default=0.0)
+        placements.append(at + np.array([max(shift, 0.0), 0.0]))
+    return min(placements, key=lambda placed: float(placed[:, 0].max()))
+
+
+def _gap(left: Floats, right: Floats) -> float:
+    """How far the right triangle must move along x until it only touches the left one.
+
+    Both sides are convex, so a corner of one of the two touches.
+    """
+    low, high = max(left[:, 1].min(), right[:, 1].min()), min(left[:, 1].max(), right[:, 1].max())
+    levels = np.clip(np.append(left[:, 1], right[:, 1]), low, high)
+    return float((_reach(left, levels).max(axis=0) - _reach(right, levels).min(axis=0)).max())
+
+
+def _reach(triangle: Floats, levels: Floats) -> Floats:
+    """(2,k) the least and the largest x of a triangle at each level y."""
+    x = []
+    for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+        low, high = sorted((a, b), key=lambda point: float(point[1]))
+        inside = (levels >= low[1]) & (levels <= high[1])
+        rise = high[1] - low[1]
+        share = (levels - low[1]) / rise if rise > 0.0 else np.zeros_like(levels)
+        at = low[0] + share * (high[0] - low[0])
+        x += [np.where(inside, at, np.nan), np.where(inside & (rise == 0.0), high[0], np.nan)]
+    return np.stack([np.nanmin(x, axis=0), np.nanmax(x, axis=0)])
+
+
+def turned_to_fit(corners: Floats, wide: float, high: float) -> Floats | None:
+    """A triangle (3,2) as it lies, or turned so that it is as low as possible; None if it fits in no way."""
+    if (np.ptp(corners, axis=0) <= np.array([wide, high]) + ROUNDING).all():
+        return corners
+    cosine, sine = np.cos(TURNS), np.sin(TURNS)
+    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
+    turned = corners @ turn.transpose(0, 2, 1)
+    sizes = np.ptp(turned, axis=1)
+    fit = np.flatnonzero((sizes <= np.array([wide, high]) + ROUNDING).all(axis=1))
+    return turned[fit[sizes[fit, 1].argmin()]] if len(fit) else None
