@@ -11,8 +11,9 @@ volumes (Cᵀ s = 0) as many negative eigenvalues as K less r (Haynsworth). If s
 then K takes (v, y/κ) to (μ v, 0): so no μ is nearer to zero than the eigenvalues of K.
 
 Rigid motions that no support resists cost nothing. Their k columns Q in the motion space border K like the
-gradients of volumes, with the equations Qᵀ s = 0: a zero of F is stationary along all motions across Q, and
-along the rigid motions it is so by itself, as E does not change with them.
+gradients of volumes, with the equations Qᵀ s = 0: at a zero of F, E is stationary along all motions across Q,
+and along the rigid motions themselves, which do not change it. B₀ Q is only their part in the frozen frames:
+along that alone E may change, as vertices then slide within the sheet.
 """
 
 from __future__ import annotations

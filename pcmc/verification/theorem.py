@@ -65,7 +65,8 @@ class Theorem:
     beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
     symmetric_in, volumes_kept : the mirror planes that motions are symmetric in, the rooms whose volumes they
         keep: index and gap are about such motions.
-    rigid : the rigid motions that no support resists: it is alone, and so on, but for these.
+    rigid : the rigid motions that no support resists: index and gap are about motions across these, and it is
+        alone but for them.
     spare : how much of their walls' capacity resting vertices have left, at least; None without any.
     """
 
@@ -99,14 +100,15 @@ class Theorem:
         length, tension = units.behind("length"), units.behind("tension")
         planes = f"are symmetric in {', '.join(self.symmetric_in)}" if self.symmetric_in else ""
         volumes = f"keep the volume of {', '.join(self.volumes_kept)}" if self.volumes_kept else ""
-        motions = " and ".join(filter(None, (planes, volumes)))
-        among = f", among motions that {motions}" if motions else ""
+        across = f"are across its {self.rigid} free rigid motions" if self.rigid else ""
+        motions = " and ".join(filter(None, (across, planes, volumes)))
+        among, these = (f", among motions that {motions}", " among these") if motions else ("", "")
         still = f", but for its {self.rigid} free rigid motions," if self.rigid else ""
         rests = "" if self.spare is None else f"; walls rest where these do, with {self.spare:.1%} to spare"
         return (
             f"proved: an exact equilibrium of this mesh is within {self.radius:.1e}{length} of its vertices,"
             f" and no other{still} within {self.unique_within:.1e}{length}; its Morse index is exactly"
-            f" {self.index}{among}, and no eigenvalue of its second variation is within"
+            f" {self.index}{among}, and no eigenvalue of its second variation{these} is within"
             f" {self.gap:.2g}{tension} of zero{rests}"
         )
 
