@@ -148,7 +148,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     >>> sail = Surface(corners + middles, [[*edge, 8] for edge in ring], [0] * 8, [Patch("sail", 1.0, 0.0)],
     ...                fixed=range(4), cables=[Cable("rope", 1.2, ring)])
     >>> print(weak_cable(sail))
-    cable 'rope' is too weak for a flat sail: 1.2 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°
+    cable 'rope' is too weak for a flat sail: 1.2 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°; raise it
     """
     plane = _plane_of_sail(surface)
     if plane is None:
