@@ -147,7 +147,8 @@ def figure(folder: Folder) -> None:
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=SMALL)
     axes.minorticks_off()
     axes.set_xlabel("times the present value (of what is 0: the value)", fontsize=TEXT, color=INK)
-    axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK, title="ends by", title_fontsize=SMALL)
+    handles, labels = axes.get_legend_handles_labels()
+    picture.legend(handles, labels, loc="outside right upper", fontsize=SMALL, frameon=False, labelcolor=INK)
     finish(picture, folder.figure("margins"))
 
 

@@ -170,6 +170,7 @@ def digest(path: PathLike) -> str:
     sha = hashlib.sha256(repr(about).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
         sha.update(getattr(surface, name).tobytes())
+    sha.update(repr([curve.plain() for curve in surface.curves]).encode() if surface.curves else b"")
     for cable in surface.cables:
         sha.update(repr((cable.name, cable.tension)).encode() + cable.edges.tobytes())
     for held, on in (*surface.on_planes, *surface.given_supports.on_line):
