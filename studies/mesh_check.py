@@ -164,7 +164,11 @@ def coverage(folder: Folder) -> tuple[pd.DataFrame, dict[str, Any]]:
 
 
 def _coverage(family: object, part: pd.DataFrame) -> dict[str, Any]:
-    """Of one family: bars on this mesh's value first, then the bars of the limit."""
+    """Of one family: bars on this mesh's value first, then the bars of the limit.
+
+    Widths are multiples of the bar's own true error, which may happen to be next to nothing; shares are the
+    bars of limits over the true error of the value on the mesh.
+    """
     bounded = np.isfinite(part["error"])
     row: dict[str, Any] = {"family": family, "quantities": len(part), "no_limit": int((~bounded).sum())}
     row["held_by_mesh"] = int((part["verdict"] == "held by mesh").sum())
@@ -176,6 +180,8 @@ def _coverage(family: object, part: pd.DataFrame) -> dict[str, Any]:
         row[f"{key}_95"] = float(part[name].quantile(0.95))
         row[f"{key}_largest"] = float(part[name].max())
         row[f"{key}_over_5"] = float((part[name] > WIDE).mean())
+    share = part["limit_error"] / part["true"]
+    row["limit_share_median"], row["limit_share_95"] = float(share.median()), float(share.quantile(0.95))
     row["limit_inside"] = float((part["limit_true"] <= part["limit_error"]).mean())
     row["gain"] = float((part["true"] / part["limit_true"]).median())
     return row

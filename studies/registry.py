@@ -21,6 +21,7 @@ from . import (
     existence,
     forces,
     gallery,
+    margins,
     mesh_check,
     mesh_search,
     panel_families,
@@ -28,6 +29,7 @@ from . import (
     solvers,
     stability,
     structure,
+    verify,
 )
 from .study import Study
 
@@ -48,11 +50,13 @@ MODULES = (
     existence,
     mesh_check,
     coverage,
+    margins,
     accuracy,
     panel_families,
     gallery,
     forces,
     structure,
+    verify,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

@@ -24,6 +24,7 @@ from pcmc.energy.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
+from pcmc.quantities import figures
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.surface.topology import CURVE, POINT, SHEET
 from studies import evolver
@@ -269,6 +270,14 @@ def test_quantities_of_cables_have_taylor_slope_two(roof, quantity):
         moved = measure(roof._with(vertices=roof.vertices + t * d), Target(quantity, "south")).value
         left.append(abs(moved - found.value - t * slope))
     assert left[1] < 0.02 * left[0] + 1e-12
+
+
+def test_key_figures_have_the_lengths_and_sags_of_cables(roof):
+    shown = {(f.quantity, f.of): f.value for f in figures(roof, pcmc.certify(roof)) if f.owner == "cable"}
+    for cable in roof.cables:
+        for quantity in ("length", "sag", "force"):
+            expected = measure(roof, Target(quantity, cable.name)).value
+            assert shown[quantity, cable.name] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_closed_cable_has_no_sag():

@@ -10,7 +10,7 @@ from refusals import refused
 from shapes import pyramid
 
 import pcmc
-from pcmc import Patch, Plane, Surface, Verdict, certify, solve
+from pcmc import Patch, Plane, Surface, Verdict, certify, project, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Evidence
 from pcmc.meshing.refinement import refine
@@ -39,6 +39,15 @@ def test_nothing_is_so_small_that_its_areas_vanish():
         surface(1e-60 * X)
     with refused(SurfaceError, what="tension", where="roof", found=1e-60, expected="0 or ≥ 1e-50"):
         Patch("roof", 1e-60, 0.0)
+    for key, value, bound in (("pressure", -1e-60, "≤ -"), ("weight", 1e-60, "≥ "), ("snow", 1e-300, "≥ ")):
+        with refused(SurfaceError, what=key, where="roof", found=value, expected=f"0 or {bound}1e-50"):
+            Patch("roof", 1.0, **{key: value})
+
+
+@pytest.mark.parametrize("door", [pcmc.read, lambda p: pcmc.write(p, pyramid()), project.load])
+def test_what_is_no_path_is_refused_in_one_line(door):
+    with refused(OptionError, what="path", found=5):
+        door(5)
 
 
 @pytest.mark.parametrize("scale", [1e-49, 1e-20, 1e20, 1e49])

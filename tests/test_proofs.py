@@ -58,6 +58,13 @@ def test_where_a_shape_changes_load_or_capacity_they_prove_nothing(surface):
     assert overload(surface) is None
 
 
+def test_a_sliding_wall_without_tension_carries_nothing():
+    """Two squares of area 32 and outline 24 need α ≥ 4/3 then; with a tension the wall may help."""
+    slack = two_squares(4, alpha_aux=0.0).retensioned({"left": 1.2, "right": 1.2})
+    assert overload(slack).ratio == pytest.approx(32.0 / (24.0 * 1.2))
+    assert solve(two_squares(4, alpha_aux=1.0).retensioned({"left": 1.2, "right": 1.2})).converged
+
+
 def test_unequal_pressures_prove_nothing_where_the_junction_moves_the_load():
     """With a wall on a held foot that takes the difference the load is given, without that it is not."""
     both = two_squares(4, alpha_aux=0.1).retensioned({"left": 0.1, "right": 0.1}, {"left": 2.0, "right": 1.0})

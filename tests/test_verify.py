@@ -8,6 +8,7 @@ import test_lines
 import volume_cases
 from exact_energy import Frozen, negative
 from flint import arb
+from motion_cases import SURFACES
 from test_contact_held import example
 
 import generators
@@ -18,7 +19,7 @@ from pcmc.contact.pull import pull_and_capacity
 from pcmc.energy.motion_space import motion_space
 from pcmc.energy.pattern import hessian_pattern
 from pcmc.energy.second_variation import assemble
-from pcmc.stability.modes import full_matrix
+from pcmc.stability.modes import full_matrix, second_variation
 from pcmc.verification import balls, enclosures, theorem
 from pcmc.verification.lipschitz import lipschitz
 from pcmc.verification.system import system
@@ -170,3 +171,13 @@ def test_a_junction_about_to_lift_is_refused():
     share = float((np.abs(pull) / np.maximum(capacity, 1e-300)).max())
     on_the_verge = surface.retensioned({"wall": 3.0 * share * (1.0 + 1e-12)})
     assert "verge" in verify(on_the_verge).reason
+
+
+def test_free_rigid_motions_are_named_with_index_and_gap():
+    """In the frozen frames they are not whole, and have small eigenvalues that no gap may deny."""
+    surface = pcmc.solve(SURFACES["bubbles"](), target="stationary").surface
+    found = verify(surface)
+    everything = second_variation(surface).matrix.toarray()
+    assert np.abs(np.linalg.eigvalsh(everything)).min() < found.gap
+    assert f"index is exactly {found.index}, among motions that are across its 5 free rigid" in str(found)
+    assert "second variation among these is within" in str(found)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from .errors import FileError
 from .interrupts import defer_interrupts
+from .validate import refuse
 
 
 def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> FileError:
@@ -22,6 +23,19 @@ def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> File
     """
     name = os.fspath(path)
     return FileError(f"{name}: cannot be {act} ({error.strerror or error})", what=name)
+
+
+def as_path(path: object) -> Path:
+    """The path that a caller gives.
+
+    >>> as_path(5)
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.OptionError: path: expected the path of a file, found 5
+    """
+    if isinstance(path, str | os.PathLike):
+        return Path(path)
+    refuse("path", path, "the path of a file")
 
 
 def check_regular(path: Path) -> None:

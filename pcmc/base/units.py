@@ -122,6 +122,11 @@ class Units:
         return "°"
 
     @property
+    def times(self) -> str:
+        """What follows a factor."""
+        return "times"
+
+    @property
     def volume(self) -> str:
         """The unit of volumes: "m³"."""
         return f"{self.length or 'length'}³"

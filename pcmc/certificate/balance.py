@@ -66,12 +66,16 @@ def load_is_given(surface: Surface) -> bool:
     d [p]_e times its length along Π, so that a chain of edges adds what its ends do, and these are fixed or
     in two such planes.
 
-    The capacity is that of fixed edges and of cables' ends. So nothing may slide on Π or on a leaning plane,
-    where the length that carries varies, nor along lines. No single vertex may be held: it carries nothing on
-    a smooth surface, but something on a mesh. There must be no weights and no prescribed volumes.
+    The capacity is that of fixed edges and of cables' ends. So what pulls may not slide on Π, and nothing
+    on a leaning plane, where the length that carries varies, or along lines. No single vertex may be held: it
+    carries nothing on a smooth surface, but something on a mesh. There must be no weights and no prescribed
+    volumes.
     """
     topo, pinned = surface.topology, surface.pinned
-    if surface.rooms or surface.weights.any() or surface.given_supports.on_line or surface.on_ground.any():
+    pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
+    if surface.rooms or surface.weights.any() or surface.given_supports.on_line:
+        return False
+    if surface.on_ground[pulling].any():
         return False
     if any(abs(float(np.dot(plane.normal, surface.plane.normal))) > 1e-9 for plane, _ in surface.on_planes):
         return False

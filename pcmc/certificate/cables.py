@@ -9,6 +9,7 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError
 from ..energy.cables import directions
 from ..surface import Surface
 from ..surface.cable import Cable
@@ -85,6 +86,25 @@ def cable_ends(surface: Surface) -> list[tuple[Cable, int, Floats]]:
     return ends
 
 
+def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
+    """The vertices (k,) of a cable, its two ends last, which share of the chord between these they are at,
+    and how far out from it (k,3).
+
+    Raises
+    ------
+    OptionError : for a cable that is closed, branched or in several parts.
+    """
+    vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
+    if (count > 2).any() or (count == 1).sum() != 2:
+        message = f"sag of {of}: the cable is closed, branched or in several parts, so it has no chord"
+        raise OptionError(f"{message}; give each span a cable of its own", what="of", found=of)
+    order = np.asarray(vertices[np.argsort(count == 1, kind="stable")])
+    X = surface.vertices[order]
+    across = X[-1] - X[-2]
+    share = (X - X[-2]) @ across / (across @ across)
+    return order, share, X - X[-2] - share[:, None] * across
+
+
 def too_long(surface: Surface) -> str:
     """Names a cable along a free edge whose chord is over 2 τ/α, the diameter of its arc; or empty.
 
@@ -128,7 +148,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     >>> sail = Surface(corners + middles, [[*edge, 8] for edge in ring], [0] * 8, [Patch("sail", 1.0, 0.0)],
     ...                fixed=range(4), cables=[Cable("rope", 1.2, ring)])
     >>> print(weak_cable(sail))
-    cable 'rope' is too weak for a flat sail: 1.2 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°
+    cable 'rope' is too weak for a flat sail: 1.2 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°; raise it
     """
     plane = _plane_of_sail(surface)
     if plane is None:

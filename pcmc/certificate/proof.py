@@ -88,7 +88,7 @@ class WeakCable:
     chord : distance of its ends, length. angle : φ, the most that its arc can turn by, radians.
 
     >>> print(WeakCable("east", 1.0, 2.0**0.5, 2.0, 0.5 * math.pi))
-    cable 'east' is too weak for a flat sail: 1 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°
+    cable 'east' is too weak for a flat sail: 1 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°; raise it
     """
 
     cable: str
@@ -100,7 +100,7 @@ class WeakCable:
     def __str__(self) -> str:
         return (
             f"cable {self.cable!r} is too weak for a flat sail: {self.tension:.4g} < α L / (2 sin(φ/2)) ="
-            f" {self.least:.4g}, L = {self.chord:.4g}, φ = {math.degrees(self.angle):.3g}°"
+            f" {self.least:.4g}, L = {self.chord:.4g}, φ = {math.degrees(self.angle):.3g}°; raise it"
         )
 
 

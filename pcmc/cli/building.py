@@ -173,6 +173,7 @@ def report_(
         roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
         require_certified(roof.shown.certificate, anyway)
     checking.mesh_check(roof, mesh_check)
+    checking.margins(roof)
     documents = _chosen(roof.documents, tolerance=tolerance, date=date)
     with working() as say:
         say("laying out the pages")

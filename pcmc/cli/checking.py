@@ -1,8 +1,9 @@
-"""The mesh check of a command: whether it is made, and why not."""
+"""The mesh check of a command: whether it is made, and why not; and the margins."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 from ..accuracy import MeshCheck
 from ..project import MOST_CHECKED, Outcome
@@ -23,3 +24,13 @@ def mesh_check(roof: Outcome, wanted: bool | None = None) -> MeshCheck | None:
     if check is None:  # the surface and its files are good without it
         print(f"no mesh check: {roof.mesh_failure}")
     return check
+
+
+def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:
+    """Find and print the margins wanted; of a certified roof also those that its project asks for."""
+    own = roof.project.margin if roof.project is not None and roof.certified else ()
+    sys.stdout.flush()
+    for what in dict.fromkeys([*wanted, *own]):
+        with working() as say:
+            found = roof.margin(what, say)
+        print(f"margin: {found.text(roof.units)}")

@@ -48,6 +48,7 @@ WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that a
 RISE = "Find the tension with which the whole roof rises so much over its outline."
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
+MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
@@ -119,6 +120,7 @@ def solve_(
         print("nothing written (use --anyway to write it)")
     if check := checking.mesh_check(outcome):
         print(f"\n{check.brief(outcome.units)}")
+    checking.margins(outcome)
     return OK if outcome.good else NOT_CERTIFIED
 
 
@@ -140,6 +142,7 @@ def certify_(
     cable: Cables = None,
     volume: Volumes = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
+    margin: Annotated[list[str] | None, option("WHAT", MARGIN, "--margin")] = None,
     start: Start = False,
     cache: Cache = True,
     whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
@@ -152,6 +155,7 @@ def certify_(
       pcmc certify roof.pcmc
       pcmc certify roof.toml
       pcmc certify roof.pcmc --meshes 3
+      pcmc certify roof.toml --margin pressure --margin "tension of west"
       pcmc certify roof.pcmc --verify
     """
     if meshes is not None:
@@ -166,6 +170,7 @@ def certify_(
     if roof.result is not None:
         report(roof, verdict=False)
     print(certificate.text(roof.units))
+    checking.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
     if meshes is not None and certificate.index is not None:

@@ -128,7 +128,7 @@ class Piece:
         if self.sweep:
             centre, u, v = self.points
             c, s = math.cos(start * self.sweep), math.sin(start * self.sweep)
-            return Piece(np.stack([centre, u * c + v * s, v * c - u * s]), (end - start) * self.sweep)
+            return Piece(np.stack([centre, u * c + v * s, v * c - u * s]), float((end - start) * self.sweep))
         control = _first_part(self.homogeneous, end)
         control = _first_part(control[::-1], 1.0 - start / end)[::-1]
         if self.weights is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import OptionError
+from ..certificate.cables import chord
 from ..energy.cables import add_pull
 from ..surface import Surface
 from .measurement import Branches, Measurement, largest
@@ -17,13 +17,9 @@ def sag(surface: Surface, of: str) -> Measurement:
     With the chord from a to b and x at the share s of it, the distance along the unit vector e changes by
     ⟨e, dx - (1 - s) da - s db⟩.
     """
-    order = _ends_last(surface, of)
-    X = surface.vertices[order]
-    a, b = X[-2], X[-1]
-    chord = b - a
-    share = (X - a) @ chord / (chord @ chord)
-    out = X - a - share[:, None] * chord
+    order, share, out = chord(surface, of)
     distance = np.linalg.norm(out, axis=1)
+    size = float(np.linalg.norm(np.diff(surface.vertices[order[-2:]], axis=0)))
     direction = out / np.where(distance > 0.0, distance, 1.0)[:, None]
 
     def branches(near: Ints) -> Branches:
@@ -32,7 +28,7 @@ def sag(surface: Surface, of: str) -> Measurement:
         slopes = np.stack([e, (along - 1.0) * e, -along * e], axis=1)
         return Branches.of(np.column_stack([order[near], ends]), slopes, surface.n)
 
-    return largest(distance, float(np.linalg.norm(chord)), branches)
+    return largest(distance, size, branches)
 
 
 def length(surface: Surface, of: str) -> Measurement:
@@ -50,12 +46,3 @@ def force(surface: Surface, of: str) -> Measurement:
     return Measurement(
         surface.cables[index].tension, np.zeros_like(surface.vertices), by_load={"cable": by_cable}
     )
-
-
-def _ends_last(surface: Surface, of: str) -> Ints:
-    """The vertices of a cable, its two ends last."""
-    vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
-    if (count > 2).any() or (count == 1).sum() != 2:
-        message = f"sag of {of}: the cable is closed, branched or in several parts, so it has no chord"
-        raise OptionError(f"{message}; give each span a cable of its own", what="of", found=of)
-    return np.asarray(vertices[np.argsort(count == 1, kind="stable")])

@@ -33,10 +33,12 @@ class Target:
         (p - s) / (2α), a patch's mean curvature at rest; ``"reaction per length"``, the greatest pull along
         an edge that holds a patch (``"reaction"`` stands for it); ``"lean"`` of a wall, its
         largest angle from the vertical, degrees;
+        ``"margin"``, the factor of ``pcmc.margin`` up to which the roof stays stable;
         ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
         cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
         and its ``"force"``, which is its tension.
-    of : name of the patch, room or cable; for ``"height"`` the point (x, y) in the coordinates of Π. None:
+    of : name of the patch, room or cable; what a margin varies, such as ``"tension of west"``, by default
+        the pressure; for ``"height"`` the point (x, y) in the coordinates of Π. None:
         all patches under pressure together (for reactions all edges that are held); not for
         ``"curvature"``, ``"pressure"`` and the quantities of cables.
     value, at_most, at_least : a value, or a limit on one side or both. A target to be met has at least one of

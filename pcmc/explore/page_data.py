@@ -18,6 +18,8 @@ from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
 from ..energy.curvature import curvature_error, mean_curvature
+from ..margins import Margin
+from ..margins.varied import named
 from ..panels.distance import difference
 from ..panels.families import family_of_face
 from ..project.values import values_of
@@ -189,6 +191,7 @@ def target_choices(surface: Surface) -> list[dict[str, Any]]:
         owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
         if names[owner] and quantity != "height":
             of = names[owner] if quantity in NAMED else ["", *names[owner]]
+            of = [*named(surface)] if quantity == "margin" else of
             choices.append({"quantity": quantity, "of": of, "dimension": dimension_of(quantity)})
     return choices
 
@@ -214,6 +217,17 @@ def _rows(table: Any) -> list[dict[str, Any]]:
     """The rows of a table; pandas' own ``to_dict`` takes ten times as long, at every answer to a slider."""
     columns = {name: table[name].tolist() for name in table}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def margin_findings(
+    margin: Margin | None, origin: Floats, units: Units = NO_UNITS
+) -> tuple[dict[str, Any], Arrays]:
+    """A margin in words, and the vertices of the surface there as in ``fields``; None is superseded."""
+    if margin is None:
+        return {"superseded": True}, {}
+    whole = whole_of(margin.surface)
+    drawn = margin.surface if whole is None else whole.surface
+    return {"margin": margin.text(units)}, {"vertices": drawn.vertices - origin}
 
 
 def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:

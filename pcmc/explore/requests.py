@@ -8,7 +8,8 @@ from typing import Any
 
 from ..base.errors import unknown
 from ..base.names import checked_name
-from ..design import Parameter, Target
+from ..design import Parameter
+from ..margins.targets import Target
 from ..surface.renewed import KINDS
 
 LONGEST_NAME = 1000  # characters
@@ -103,6 +104,11 @@ def variant_name(asked: dict[str, Any]) -> str:
     if not 0 < len(name) <= 60:
         raise RequestError(f"name: expected 1 to 60 characters, found {len(name)}")
     return checked_name("name", name)
+
+
+def varied(asked: dict[str, Any]) -> str:
+    """What a margin varies."""
+    return _name("what", asked.get("what"))
 
 
 def file_to_save(asked: dict[str, Any]) -> tuple[str, bool]:

@@ -41,6 +41,7 @@ from .page_data import (
     families_drawn,
     fields,
     findings,
+    margin_findings,
     mesh_findings,
     mesh_key,
     outline,
@@ -66,7 +67,7 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
 }
-OTHERS = ("check", "verify", "families", "news", "save")  # acts that answer with no surface
+OTHERS = ("check", "verify", "families", "margin", "news", "save")  # acts that answer with no surface
 
 
 class Explorer:
@@ -284,6 +285,10 @@ class _Handler(BaseHTTPRequestHandler):
             check = session.check_mesh(self._gone)
             found = None if check is None else mesh_findings(check, explorer.roof.units)
             self._send_header({"superseded": True} if found is None else {"check": found})
+        elif act == "margin":
+            margin = session.margin(requests.varied(asked), self._gone)
+            about, arrays = margin_findings(margin, explorer.origin, explorer.roof.units)
+            self._send(pack(about, arrays), "application/octet-stream")
         elif act == "verify":
             theorem, units = session.verify(), explorer.roof.units
             self._send_header({"badge": theorem.brief(units), "text": theorem.text(units)})

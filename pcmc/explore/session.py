@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 from .. import existence
 from ..accuracy import MeshCheck, check_mesh
@@ -20,10 +20,11 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..design import Parameter, Target, meet
+from ..margins import Margin, margin
 from ..meshing.remeshing import remesh
 from ..project.values import values_of
 from ..solvers import solve
-from ..solvers.result import Progress
+from ..solvers.result import Callback, Progress
 from ..surface import Patch, Surface
 from ..surface.geometry import segment_lengths
 from ..verification import Theorem, verify
@@ -38,6 +39,7 @@ SETTLE_SECONDS = 6.0  # time limit of settling
 MOST_STEPS = 200  # to undo
 MOST_BYTES = 64_000_000  # of vertices in these steps
 
+Found = TypeVar("Found")
 Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
@@ -312,15 +314,23 @@ class Session:
 
     def check_mesh(self, gone: Callable[[], bool] = never) -> MeshCheck | None:
         """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
-        checked = self.surface
+        return self._look(lambda shown, check: check_mesh(shown, callback=check), gone)
+
+    def margin(self, what: str, gone: Callable[[], bool] = never) -> Margin | None:
+        """How far the surface shown is from the edge; None as of ``check_mesh``."""
+        return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
+
+    def _look(self, at: Callable[[Surface, Callback], Found], gone: Callable[[], bool]) -> Found | None:
+        """What is found about the surface shown; None if the page shows another one, or is closed, before."""
+        shown = self.surface
 
         def check(_: Progress) -> None:
-            if self.surface is not checked or gone():
+            if self.surface is not shown or gone():
                 raise StopIteration
 
         with self._checks:
             try:
-                return check_mesh(checked, callback=check)
+                return at(shown, check)
             except KeyboardInterrupt:
                 return None
 

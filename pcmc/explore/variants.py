@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ..base.errors import OptionError
 from ..certificate import Certificate
-from ..design import Target
-from ..design.targets import measure
-from ..quantities import Figure, figures
+from ..quantities import figures
 from ..surface import Surface
 
 MOST_VARIANTS = 20
@@ -34,9 +30,4 @@ class Variant:
 def figures_data(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]:
     """The key figures of a surface as plain data: quantity, of, owner, dimension and value of each."""
     rows = figures(surface, certificate)
-    for cable in surface.cables:
-        for quantity in ("length", "sag"):
-            with suppress(OptionError):  # a closed cable has no sag
-                value = measure(surface, Target(quantity, cable.name)).value
-                rows.append(Figure(quantity, cable.name, "cable", value))
     return [row._asdict() | {"dimension": row.dimension} for row in rows]

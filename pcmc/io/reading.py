@@ -13,7 +13,7 @@ from typing import Any
 import numpy.typing as npt
 
 from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
-from ..base.files import check_regular, system_error
+from ..base.files import as_path, check_regular, system_error
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
@@ -111,7 +111,7 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
 
 def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
-    path = Path(path)
+    path = as_path(path)
     with opened(path) as form:
         data = without_unused(checked(contents(form, path)))
         return with_parts(data if form.shared else restore_walls(merged(data)))

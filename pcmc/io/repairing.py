@@ -20,6 +20,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
+from ..base.files import as_path
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
 from .libraries import unreadable
@@ -110,7 +111,7 @@ def repair(
         validate.positive("edge_length", edge_length)
     validate.choice("up", up, tuple(TURNS))
     require_meshlab()
-    path = Path(path)
+    path = as_path(path)
     data = converted(stated(_read(path), units), units)
     turn = np.array(TURNS[up], dtype=float)
     plane = data.plane and Plane(tuple(turn @ data.plane.point), tuple(turn @ data.plane.normal))

@@ -6,7 +6,6 @@ import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy.typing as npt
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
-from ..base.files import atomic_write, check_name, writing
+from ..base.files import as_path, atomic_write, check_name, writing
 from ..base.names import checked_name
 from ..base.units import Units, as_units, length_factor
 from ..base.validate import choice, refuse
@@ -69,7 +68,7 @@ def write(
     LostWarning : once, naming what the format cannot carry.
     FileWarning : if the coordinates are written relative to another origin (.stl).
     """
-    path = Path(path)
+    path = as_path(path)
     check_name(path)
     form = format_of(path, FORMATS)
     bare = getattr(surface, "bare", ())

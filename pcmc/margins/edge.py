@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,6 +71,12 @@ class Margin:
         """The value at the end; NaN where several differ."""
         values = set(self.values.values())
         return values.pop() if len(values) == 1 else math.nan
+
+    def numbers(self) -> dict[str, Any]:
+        """The margin, its bar and what ends it, for tables."""
+        number = self.value if math.isnan(self.factor) else self.factor
+        of = f"{self.what}.margin"
+        return {of: number, f"{of}_error": self.bar, f"{of}_ends_by": self.ends_by.name.lower()}
 
     def __str__(self) -> str:
         return self.text()

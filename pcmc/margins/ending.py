@@ -13,8 +13,6 @@ from ..certificate import Verdict
 from ..continuation import Branch, Ending, follow
 from ..continuation.switching import ALONG
 from ..energy.weight import compressed, effective_tensions
-from ..existence.attempts import MIN_QUALITY
-from ..existence.folding import POOR
 from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
@@ -34,7 +32,7 @@ class MarginEnd(Enum):
     WALL_DOWN = "wall down: a ridge comes down on the held bottom of its wall"
     COMPRESSION = "compression: the weight of a sheet is more than its tension holds"
     NONE = "no end found: it was followed no further"
-    MESH = "the mesh gave out: the branch could not be followed further"
+    MESH = "the mesh gave out: it could not be followed further; try finer triangles"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,7 @@ def find_end(
         kind, factor, there = MarginEnd.NONE, float(branch.points.parameter.iloc[-1]), branch.last
     else:
         factor, there = float(branch.points.parameter.iloc[-1]), branch.last
-        kind, detail = _lost(branch, varied, factor), branch.message
+        kind, detail = _lost(branch, varied, factor), branch.detail
     return End(kind, factor, there, _motion(branch), tuple(contacts), detail)
 
 
@@ -105,15 +103,13 @@ def _follow(
         if callback is not None:
             callback(progress)
         row = progress.row
-        left = row["index"] > index or sense * row["slope"] < 0.0 or row["quality"] < POOR
+        left = row["index"] > index or sense * row["slope"] < 0.0
         over[0] = left or bool(compressed(progress.surface()).any())
         if over[0]:
             raise StopIteration
 
     goal, first = most if varied.more else 1.0 / most, min(FIRST, largest)
-    branch = follow(
-        surface, varied.direction, goal, callback=watch, min_quality=MIN_QUALITY, step=first, largest=largest
-    )
+    branch = follow(surface, varied.direction, goal, callback=watch, step=first, largest=largest)
     if branch.ending is Ending.STOPPED and not over[0]:
         raise KeyboardInterrupt
     return branch

@@ -12,7 +12,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
-from ..base.files import check_name, check_regular
+from ..base.files import as_path, check_name, check_regular
 from ..base.units import LENGTHS
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     >>> files_of("notebooks/roof.toml")
     [PosixPath('notebooks/roof.toml')]
     """
-    path = Path(path)
+    path = as_path(path)
     with suppress(OSError, ValueError, RecursionError, PcmcError):  # of TOML, of UTF-8
         if path.suffix.lower() == ".toml":
             check_regular(path)

@@ -18,7 +18,7 @@ from ..advice.masts import mast_note
 from ..advice.rises import Rise, take_rises, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
-from ..base.files import check_name, check_regular, system_error
+from ..base.files import as_path, check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
@@ -58,6 +58,7 @@ class Project:
     method, options : as in ``pcmc.solve``.
     wanted : the accuracy asked for.
     mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
+    margin : what margins are wanted of, as in ``pcmc.margin``.
     verify : whether it is to be proved that an exact equilibrium is near.
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
@@ -84,6 +85,7 @@ class Project:
     options: Mapping[str, Any] = field(default_factory=dict)
     wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
     mesh_check: bool | None = None
+    margin: Sequence[str] = ()
     verify: bool = False
     search: bool = True
     remeshing: Sequence[Remeshing] = ()
@@ -152,7 +154,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
         For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
         and for a roof held at single points inside.
     """
-    path = Path(path)
+    path = as_path(path)
     if not is_project(path):
         return Project(path, mesh=mesh_file(path), units=Units(units))
     text, data = read_data(path, units)
@@ -261,6 +263,7 @@ def project_of(
     data, drawing, chosen = with_drawing(path, data) if mesh is None else (data, None, Chosen())
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
+    margin = options.pop("margin", [])
     proved = options.pop("verify", False)
     files, picture = output.get("files", []), output.get("picture")
     colour = output.get("colour", "patches")
@@ -297,6 +300,7 @@ def project_of(
             options=options,
             wanted=wanted,
             mesh_check=mesh_check,
+            margin=margin,
             verify=proved,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             targets=targets,
@@ -385,7 +389,8 @@ def _placed(entry: Mapping[str, Any], plan: Plan | None) -> Mapping[str, Any]:
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
-    from ..design import Parameter, Target
+    from ..design import Parameter
+    from ..margins.targets import Target
 
     if "tolerance" in table:
         validate.positive("targets.tolerance", table["tolerance"])

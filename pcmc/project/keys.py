@@ -27,6 +27,7 @@ from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
+MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME; see ``pcmc.margin``"
 PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
 WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
 FIRST = "First lines"  # the keys before any table
@@ -271,6 +272,7 @@ def solve_section(method: str) -> Section:
     known = (
         Key("method", "a text", "newton", "the solver", tuple(METHODS)),
         Key("mesh_check", "true or false", None, CHECKED),
+        Key("margin", "a list of names", [], MARGIN),
         Key("verify", "true or false", False, PROVED),
     )
     if method not in METHODS:
@@ -286,10 +288,11 @@ def solve_section(method: str) -> Section:
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-    from ..design import Parameter, Target  # needed by projects with targets only
+    from ..design import Parameter  # needed by projects with targets only
     from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
     from ..design.targets import SHORT
+    from ..margins.targets import Target
 
     changing = _of_class(
         Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}

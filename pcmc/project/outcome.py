@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
+    from ..margins import Margin
     from ..panels import Panels
     from ..quantities import Figure
     from ..report import RoofReport
@@ -63,8 +64,8 @@ class Outcome:
     unfold : whether the whole roof is shown that ``surface`` is the part of between its mirror planes.
     data : all that the file of ``start`` holds, such as scalars; None without a file.
 
-    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh`` and ``model`` are
-    computed when first asked for, and kept.
+    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh``, ``margin`` and ``model``
+    are computed when first asked for, and kept.
     """
 
     result: Result | None
@@ -227,6 +228,7 @@ class Outcome:
             tolerance=tolerance,
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
+            margins=self.margins,
             theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
@@ -289,6 +291,27 @@ class Outcome:
         except PcmcError as error:  # the roof is good without it
             self._known["mesh failure", self.unfold] = str(error)
         return self.mesh_check
+
+    def margin(self, what: str, progress: OnStep | None = None) -> Margin:
+        """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
+        from ..margins import margin  # takes long to import
+
+        def callback(state: Progress) -> None:
+            if progress is not None:
+                progress(f"margin of {what}: {state.surface().m} triangles, step {state.iteration}")
+
+        key = "margin", self.unfold, what
+        if key not in self._known:
+            surface, certificate = self.shown
+            self._known[key] = margin(
+                surface, what, corners=self.corners, callback=callback, certificate=certificate
+            )
+        return cast("Margin", self._known[key])
+
+    @property
+    def margins(self) -> list[Margin]:
+        """The margins that were found, in the order in which they were asked for."""
+        return [known for key, known in self._known.items() if key[:2] == ("margin", self.unfold)]
 
     @property
     def corners(self) -> Ints:

@@ -84,6 +84,8 @@ def run_project(
     if project.whole:
         report("certifying the whole")
         outcome.whole  # noqa: B018 — computed here, while the progress is shown
+    for what in project.margin if outcome.certified else ():
+        outcome.margin(what, report)
     if outputs and (outcome.good or anyway):
         works = surface_files(outcome, project.files)
         if project.picture is not None:

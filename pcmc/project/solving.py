@@ -41,6 +41,12 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     if project.documents.structure is not None and project.structure is not None:
         with in_file(project.path):
             project.structure.check(surface)
+    if project.margin:
+        from ..margins.varied import Varied  # takes long to import
+
+        with in_file(project.path):  # refuses unknown names before the work
+            for what in project.margin:
+                Varied.of(surface, what)
     if project.whole and not any(plane.mirror for plane, _ in surface.on_planes):
         text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
         raise OptionError(f"{text}, or give the plan mirrors", what="whole")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from .. import io
 from ..base.errors import OptionError, unknown
-from ..base.files import read_bytes
+from ..base.files import as_path, read_bytes
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
 from ..surface.renewed import KINDS, all_values
@@ -46,7 +46,7 @@ class _Source(NamedTuple):
 
 
 def _source(path: PathLike) -> _Source:
-    path = Path(path)
+    path = as_path(path)
     text, data = read_data(path) if is_project(path) else ("", {})
     return _Source(path, text, data, numbers(data) if data else {})
 
@@ -170,6 +170,7 @@ def digest(path: PathLike) -> str:
     sha = hashlib.sha256(repr(about).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
         sha.update(getattr(surface, name).tobytes())
+    sha.update(repr([curve.plain() for curve in surface.curves]).encode() if surface.curves else b"")
     for cable in surface.cables:
         sha.update(repr((cable.name, cable.tension)).encode() + cable.edges.tobytes())
     for held, on in (*surface.on_planes, *surface.given_supports.on_line):

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import NamedTuple
 
+import numpy as np
+
+from ..base.errors import OptionError
 from ..certificate import Certificate
+from ..certificate.cables import chord
 from ..energy.volume_below import volumes_below
 from ..surface import Surface
 from .table import dimension_of
@@ -71,6 +76,11 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         add("lean", str(name), "wall", float(lean))
     for cable in surface.cables:
         add("force", cable.name, "cable", cable.tension)
+        ends = surface.vertices[cable.edges]
+        add("length", cable.name, "cable", float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()))
+        with suppress(OptionError):  # a closed cable has no sag
+            out = chord(surface, cable.name)[2]
+            add("sag", cable.name, "cable", float(np.linalg.norm(out, axis=1).max()))
     for room in surface.rooms:
         add("volume", room.name, "room", room.volume)
     lowest = height[surface.held].min() if surface.held.any() else height.min()

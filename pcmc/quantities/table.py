@@ -48,6 +48,7 @@ _ROWS = (
     Quantity("reaction", "force", ("roof", "boundary"), "force of the supports along Π's normal"),
     Quantity("thrust", "force", ("boundary",), "force of the supports along Π"),
     Quantity("reaction per length", "tension", ("roof", "patch", "boundary"), "largest |Σ (α + w z) n|"),
+    Quantity("margin", "times", ("roof",), "factor on a load or tension up to which the roof stays stable"),
     Quantity("lowest eigenvalue", "eigenvalue", ("roof",), "smallest second variation per unit area"),
 )
 

@@ -28,6 +28,7 @@ from .plan import PaperPlan, paper_plan
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..margins import Margin
     from ..verification import Theorem
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
@@ -44,7 +45,7 @@ class RoofReport:
     name, date : in the head and the foot of the pages; empty for none.
     plan : to scale.
     schedule : the panels, if a tolerance was given; else None.
-    mesh_check, mesh_failure, targets, theorem : as given to ``roof_report``.
+    mesh_check, mesh_failure, targets, theorem, margins : as given to ``roof_report``.
     figures : the key figures.
     files : name of each file that belongs to the roof, and what it is.
     """
@@ -59,6 +60,7 @@ class RoofReport:
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
     targets: pd.DataFrame | None = None
+    margins: Sequence[Margin] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     figures: Sequence[Figure] = ()
     theorem: Theorem | None = None
@@ -104,6 +106,7 @@ class RoofReport:
         story = [
             pages.heading("Verdict"),
             *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check, self.theorem, units)),
+            *(pages.paragraph(f"The roof {margin.text(units)}.") for margin in self.margins),
             *pages.table(tables.key_figures(surface, self.figures, units)),
             *pages.picture("View from above", pictures["The roof"]),
             pages.new_page(),
@@ -187,6 +190,7 @@ def roof_report(
     mesh_failure: str = "",
     theorem: Theorem | None = None,
     targets: pd.DataFrame | None = None,
+    margins: Sequence[Margin] = (),
     files: Mapping[str, str] | None = None,
     date: str = "",
     anyway: bool = False,
@@ -206,6 +210,7 @@ def roof_report(
     mesh_failure : why it was asked for and failed; empty otherwise.
     theorem : of the surface; None for none.
     targets : ``Design.targets``; None for none.
+    margins : how far the roof is from the edge, a sentence each.
     files : name of each file that belongs to the roof, and what it is.
     date : of the report, as it is to be printed; no clock is read.
     anyway : report on a surface that is not certified; every page is marked.
@@ -244,6 +249,7 @@ def roof_report(
         mesh_check,
         mesh_failure,
         targets,
+        margins,
         dict(files or {}),
         quantities.figures(surface, certificate) if figures is None else figures,
         theorem,

@@ -149,7 +149,7 @@ def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: fl
     parts = tuple(given) if isinstance(given, Iterable) else (None,)
     if not all(isinstance(part, HeldCurve) for part in parts):
         validate.refuse("curves", given, "a sequence of HeldCurve", error=SurfaceError)
-    taken = np.zeros(len(topo.edges), dtype=bool)
+    checked, taken = list[HeldCurve](), np.zeros(len(topo.edges), dtype=bool)
     for number, part in enumerate(parts):
         V, t = np.asarray(part.vertices), np.asarray(part.at)
         shaped = (
@@ -174,9 +174,8 @@ def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: fl
         if not away.max() <= NEAR * size:
             vertex = V[np.argmax(away)]
             _refuse(number, f"does not pass through vertex {vertex}, which is {away.max():.3g} away from it")
-        read_only(V)
-        read_only(t)
-    return parts
+        checked.append(HeldCurve(part.curve, read_only(V.astype(np.int64)), read_only(t.astype(np.float64))))
+    return tuple(checked)
 
 
 def _refuse(number: int, fault: str) -> None:

@@ -56,15 +56,16 @@ class Patch:
             bears = "carries snow" if snow else "weighs something"
             hint = f"a patch that {bears} must pull; give it a tension"
             validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
-        if 0.0 < tension < checks.SMALLEST:
-            hint = "use a smaller unit of force"
-            validate.refuse("tension", tension, f"0 or ≥ {checks.SMALLEST:g}", self.name, hint, SurfaceError)
 
     def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
         value, where, most = getattr(self, key), self.name, checks.LARGEST
         number = validate.number(key, value, least=least, where=where, hint=hint, error=SurfaceError)
         hint = "use a larger unit of force"
         validate.number(key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError)
+        if 0.0 < abs(number) < checks.SMALLEST:
+            bound = f"≥ {checks.SMALLEST:g}" if number > 0.0 else f"≤ {-checks.SMALLEST:g}"
+            hint = "use a smaller unit of force"
+            validate.refuse(key, number, f"0 or {bound}", where, hint, SurfaceError)
         object.__setattr__(self, key, number)
         return number
 

@@ -95,9 +95,10 @@ def solve_project(
 
     Returns
     -------
-    dict : as of ``solve_case``, without numbers of a shape that is not at rest; and ``targets_met``, if the
-        project has targets. With mirror planes it is that of the whole roof if the project has
-        ``whole = true``, and otherwise of the part between them; ``extent`` says which.
+    dict : as of ``solve_case``, without numbers of a shape that is not at rest; for each name in the
+        project's ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and
+        ``targets_met``, if the project has targets. With mirror planes it is that of the whole roof if the
+        project has ``whole = true``, and otherwise of the part between them; ``extent`` says which.
 
     Raises
     ------
@@ -117,4 +118,6 @@ def solve_project(
     answer = row(outcome.solved, names, outcome)
     if mesh_check or design.mesh_check:
         answer |= mesh_columns(outcome)
+    for what in design.margin if outcome.certificate.index is not None else ():
+        answer |= outcome.margin(what).numbers()
     return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}

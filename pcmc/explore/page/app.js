@@ -1,6 +1,6 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { capital } from "./elements.js";
+import { capital, element } from "./elements.js";
 import {
   arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
@@ -62,6 +62,8 @@ class Page {
     this.tools?.begin(header);
     this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
     this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
+    const varied = header.quantities.find(({ quantity }) => quantity === "margin")?.of ?? [];
+    find("#margin-of").replaceChildren(...varied.map((what) => element("option", "", what)));
     if (header.note && opened) this.targets.say(header.note, header.note_met ? "met" : "missed");
     find("#together-row").hidden = header.patches.length < 2;
     addSaving(find("#save-project"), find("#saving"), header, () => this.name, (text) => this.notify(text));
@@ -199,7 +201,8 @@ class Page {
     this.variants.show(header, this.units);
     find("#check-result").hidden = true; // it was about the last surface
     find("#theorem").hidden = true;
-    for (const name of ["check", "verify"]) find(`#${name}`).disabled = !header.at_rest;
+    for (const name of ["check", "margin", "verify"]) find(`#${name}`).disabled = !header.at_rest;
+    find("#margin-result").hidden = true;
     if (!this.next) this.panel.show(header.values, values);
     find("#undo").disabled = !header.undo;
     find("#redo").disabled = !header.redo;
@@ -260,6 +263,34 @@ class Page {
     }
     button.textContent = label;
     button.disabled = !this.header.at_rest;
+  }
+
+  /** Follow the surface shown to the edge of its stability; a newer surface leaves the answer behind. */
+  async margin() {
+    const [button, { header: shown }] = [find("#margin"), this];
+    const label = button.textContent;
+    button.disabled = true;
+    button.textContent = "Following to the edge…";
+    try {
+      const { header, arrays } = await ask(`api/${this.name}/margin`, { what: find("#margin-of").value });
+      if (header.margin && this.header === shown) {
+        this.edge = arrays.vertices;
+        find("#margin-result .detail").textContent = capital(header.margin);
+        find("#margin-result").hidden = false;
+        this.showEdge(false);
+      }
+    } catch (error) {
+      this.notify(error.message);
+    }
+    button.textContent = label;
+    button.disabled = !this.header.at_rest;
+  }
+
+  /** Show the shape at the edge instead of the roof, or the roof again. */
+  showEdge(on) {
+    find("#margin-result button").setAttribute("aria-pressed", String(on));
+    this.sway(false);
+    this.viewer?.setVertices(on ? this.edge : this.arrays.vertices);
   }
 
   /** Prove that an exact equilibrium is near the surface shown; a newer surface leaves the answer behind. */
@@ -359,7 +390,9 @@ class Page {
     for (const name of ["undo", "redo", "reset", "stabilise", "remesh"]) {
       find(`#${name}`).addEventListener("click", () => this.act(name));
     }
-    for (const name of ["check", "verify"]) find(`#${name}`).addEventListener("click", () => this[name]());
+    for (const name of ["check", "margin", "verify"]) find(`#${name}`).addEventListener("click", () => this[name]());
+    find("#margin-result button").addEventListener("click", (event) =>
+      this.showEdge(event.currentTarget.getAttribute("aria-pressed") !== "true"));
     find("#back").addEventListener("click", () => this.act("undo"));
     find("#sway").addEventListener("click", () => {
       if (this.swaying) this.viewer.setVertices(this.arrays.vertices);

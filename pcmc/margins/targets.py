@@ -1,0 +1,63 @@
+"""The quantity "margin" of targets: its value, and its slopes by tensions and loads in closed form.
+
+At a fold the equations Bᵀ∇E = 0 have the left null vector φ, the mode, as they are symmetric. Along a change
+dμ of a tension or a load the fold moves so that ⟨φ, ∂∇E/∂λ⟩ dλ + ⟨φ, ∂∇E/∂μ⟩ dμ = 0, whatever the shape:
+
+    dλ/dμ = - ⟨φ, ∂∇E/∂μ⟩ / ⟨φ, ∂∇E/∂λ⟩
+
+(Govaerts 2000, ch. 4). A number that λ multiplies changes its ∂μ by λ, too.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..base.errors import OptionError
+from ..design import Target, meet, sensitivities  # from here they know the margin
+from ..design.measurement import Measurement
+from ..design.quantities import MEASURES, Measure
+from ..energy.functional import gradient_by
+from ..surface import Surface
+from .edge import margin
+from .ending import MarginEnd
+from .varied import Varied
+
+__all__ = ["Target", "meet", "sensitivities"]
+
+_known = lru_cache(maxsize=4)(lambda surface, what: margin(surface, what, meshes=1))
+"""Margins of the last surfaces: value and slopes are asked for one after the other."""
+
+
+def _margin(surface: Surface, of: str | None) -> Measurement:
+    """The factor of ``pcmc.margin``, on this mesh alone; constant where nothing ends it."""
+    what = of or "pressure"
+    if surface.rooms:
+        text = f"margin of {what}: as a target it needs rooms of given pressures, not volumes"
+        raise OptionError(text, what="of", found=what)
+    varied = Varied.of(surface, what)
+    if varied.unit:
+        raise OptionError(f"margin of {what}: it is 0 now, so it has no factor", what="of", found=what)
+    found = _known(surface, what)
+    still = np.zeros_like(surface.vertices)
+    if not len(found.mode):
+        return Measurement(found.factor, still)
+    if found.ends_by is not MarginEnd.FOLD:
+        text = f"margin of {what}: it ends by a {found.ends_by.name.lower()}, whose slopes are not known;"
+        raise OptionError(f"{text} as a target it has to end by a fold", what="of", found=what)
+    end, phi = found.surface, found.mode
+    line = varied.direction.line(end)
+    along = float((phi * line.gradient(end, end.vertices)).sum())
+    walls = {(k, p.name) for k, _ in varied.parts if varied.what == k for p in end.patches if p.wall}
+    patches = [patch.name for patch in end.patches]
+    named = dict.fromkeys(("tension", "pressure", "weight", "snow"), patches)
+    slopes = {}
+    for kind, names in {**named, "cable": [cable.name for cable in end.cables]}.items():
+        across = np.array([(phi * gradient_by(end, kind, i)).sum() for i in range(len(names))])
+        multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
+        slopes[kind] = -across * np.where(multiplied, found.factor, 1.0) / along
+    return Measurement(found.factor, still, slopes.pop("tension"), slopes.pop("pressure"), slopes)
+
+
+MEASURES["margin"] = Measure(_margin, lambda surface: 1.0)
