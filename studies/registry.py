@@ -29,6 +29,7 @@ from . import (
     solvers,
     stability,
     structure,
+    verify,
 )
 from .study import Study
 
@@ -55,6 +56,7 @@ MODULES = (
     gallery,
     forces,
     structure,
+    verify,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

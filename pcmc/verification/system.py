@@ -30,6 +30,7 @@ from ..energy.flat_pieces import flat_pieces
 from ..energy.motion_space import MotionSpace
 from ..energy.pattern import Pattern, hessian_pattern
 from ..energy.rooms import closing_volumes, prescribed_volumes
+from ..stability.modes import full_matrix
 from .balls import SAFE, U
 from .enclosures import Elements, coordinates, elements, forces, second_variation, volume
 from .lipschitz import lipschitz
@@ -46,7 +47,7 @@ class System:
     items, space, pattern : the elements, the frozen frames, and the upper triangle of K.
     forces, forces_radius : (n,3) ∇E and the radii of its balls.
     matrix, matrix_error : (k,) values of K in the pattern, and a bound of ‖K - its values‖₂.
-    residual : a bound of ‖F‖₂, force.
+    left, left_error : (N,) values of F and the radii of their balls; ``residual`` is a bound of ‖F‖₂, force.
     borders : r + k.
     coupling : a bound of ‖Σ κ_r ζ_r B₀ᵀ∇²V_r B₀‖₂ for |ζ| = 1, per |ζ|; ``scales`` (r,) are κ.
     """
@@ -58,10 +59,21 @@ class System:
     forces_radius: Floats
     matrix: Floats
     matrix_error: float
+    left: Floats
+    left_error: Floats
     residual: float
     borders: int
     scales: Floats
     coupling: float
+
+    def left_after(self, y: Floats) -> float:
+        """A bound of ‖F - K y‖₂. Row i of the product is a sum of k_i terms, off by γ_(k_i+1) |K| |y|."""
+        matrix = full_matrix(self.pattern, self.matrix)
+        terms = np.diff(matrix.indptr) + 3.0
+        off = 2.0 * U * terms * (abs(matrix) @ np.abs(y) + np.abs(self.left)) + self.left_error
+        total = np.abs(self.left - matrix @ y) + off
+        size = np.sqrt((y * y).sum())
+        return float((np.sqrt((total * total).sum()) + self.matrix_error * size) * SAFE)
 
     def lipschitz(self, radius: float) -> float:
         """L with ‖K(x) - K(y)‖₂ ≤ L |x - y| for x, y in the ball of this radius.
@@ -89,6 +101,7 @@ def system(part: StandingPart, space: MotionSpace, rigid: Floats) -> System:
     diagonal = np.abs(values[pattern.indptr[:-1]]).mean()
     columns = list(2.0 ** np.round(np.log2(diagonal)) * rigid.T)
     column_errors, forms = list(0.0 * rigid.T), []
+    left, error = np.append(left, 0.0 * rigid[0]), np.append(error, 0.0 * rigid[0])
     if surface.rooms:
         for signs in surface.room_signs:
             room = items.of_volume(signs)
@@ -110,7 +123,7 @@ def system(part: StandingPart, space: MotionSpace, rigid: Floats) -> System:
         pattern, values = _bordered(pattern, values, np.stack(columns, axis=1))
     residual = float(np.linalg.norm(np.abs(left) + error) * SAFE)
     error_norm = _norm(pattern, radii)
-    enclosed = force, force_radius, values, error_norm, residual
+    enclosed = force, force_radius, values, error_norm, left, error, residual
     return System(items, space, pattern, *enclosed, len(columns), scales, coupling)
 
 

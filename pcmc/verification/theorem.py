@@ -8,9 +8,10 @@ rounding (``enclosures``; where rooms prescribe volumes, with their pressures am
   (``stability.backward_error``) and g = σ - ρ - a > 0. By Sylvester and Weyl, A(0) has at least as many
   eigenvalues below -g as D has negative entries for Â + σ, and at most as many below g as D has for Â - σ. If
   both are k, that is the index, no eigenvalue is within g of zero, and ‖A(0)⁻¹‖ ≤ β = 1/g.
-- **Existence.** With ‖A(s) - A(s')‖ ≤ L |s - s'| on the ball |s| ≤ r₀ (``lipschitz``) and
-  h = β² L ‖f(0)‖ ≤ ½, Newton and Kantorovich give a zero of f within 2β‖f(0)‖/(1 + √(1 - 2h)) of 0, if
-  that is at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)).
+- **Existence.** Let η ≥ ‖A(0)⁻¹ f(0)‖, L with ‖A(s) - A(s')‖ ≤ L |s - s'| on the ball |s| ≤ r₀
+  (``lipschitz``), and h = β L η ≤ ½. Newton and Kantorovich give a zero of f within 2η/(1 + √(1 - 2h)) of 0,
+  if that is at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)). With any y, and so with the
+  step y ≈ A⁻¹f of Newton's method, η = |y| + β ‖f(0) - A(0) y‖ will do, the latter norm bounded.
 - **Index there.** A(s*) differs by L |s*| at most, so no eigenvalue is within g - L |s*| of zero, and the
   index is the same if that is positive.
 - **Walls that rest.** All this is about the standing part. A vertex that rests on Π or on a held bottom does
@@ -41,9 +42,9 @@ from .balls import SAFE, U
 from .lipschitz import lipschitz
 from .system import System, system
 
-STEPS = 8  # of inverse iteration for the least eigenvalue: within some tens of percent
-SHARE = 0.5  # of that estimate is σ first; a quarter of it after each failure
-TRIES = 4
+STEPS = 5  # of inverse iteration for the least eigenvalue: then mostly within a few percent
+SHARE = 0.8  # of that estimate is σ first; half of it after each failure
+TRIES = 5
 REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
 LEVEL = 1e-9  # of a unit motion along Π: a part across it that is rounding
 MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
@@ -62,7 +63,7 @@ class Theorem:
     index : the Morse index of the exact equilibrium.
     gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe
         volumes, among motions that keep these.
-    beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
+    beta, lipschitz, step, forces : β, length/force; L, force/length²; η, length; a bound of ‖f(0)‖, force.
     symmetric_in, volumes_kept : the mirror planes that motions are symmetric in, the rooms whose volumes they
         keep: index and gap are about such motions.
     rigid : the rigid motions that no support resists: index and gap are about motions across these, and it is
@@ -78,6 +79,7 @@ class Theorem:
     gap: float = 0.0
     beta: float = np.inf
     lipschitz: float = np.inf
+    step: float = np.inf
     forces: float = np.inf
     symmetric_in: tuple[str, ...] = ()
     volumes_kept: tuple[str, ...] = ()
@@ -131,7 +133,7 @@ def verify(surface: Surface) -> Theorem:
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> theorem = verify(roof)
     >>> theorem.proved, theorem.index, theorem.radius < 1e-14, round(theorem.gap, 2)
-    (True, 0, True, 1.68)
+    (True, 0, True, 2.68)
     >>> verify(roof.moved(roof.vertices * [1, 1, 1 + 1e-6])).proved
     False
     """
@@ -150,10 +152,11 @@ def _proved(surface: Surface) -> Theorem:
     _refuse(part, space, rigid if free.shape[1] else rigid[:0])
     found = system(part, space, free)
     _refuse_moving(part, found)
-    index, gap = _inertia(found)
+    index, gap, newton = _inertia(found)
     beta = SAFE / gap
     _, stiffness, height = lipschitz(found.items, space, 0.0, 0.0)
-    first = 2.0 * beta * found.residual * SAFE
+    step = (float(np.sqrt((newton * newton).sum())) + beta * found.left_after(newton)) * SAFE
+    first = 2.0 * step
     if not first <= MOST * height:
         raise _Unproved(
             f"the forces left, {found.residual:.1e}, may move it by {first:.1e}: too far beside its thinnest"
@@ -161,11 +164,11 @@ def _proved(surface: Surface) -> Theorem:
         )
     reach = max(REACH * height, first)
     rate = found.lipschitz(reach)
-    h = beta * beta * rate * found.residual * SAFE
+    h = beta * rate * step * SAFE
     if not h <= 0.5:
         raise _Unproved(
-            f"β² L |f| = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, |f| {found.residual:.1e}): solve to"
-            " a smaller tolerance, or improve the thinnest triangles"
+            f"β L η = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, η {step:.1e}): it is too near to"
+            " neutral for its thinnest triangles; solve to a smaller tolerance, or improve these"
         )
     root = np.sqrt(1.0 - 2.0 * h) / SAFE
     radius = first / (1.0 + root) * _stretch(space) * SAFE
@@ -184,6 +187,7 @@ def _proved(surface: Surface) -> Theorem:
         gap=float(left),
         beta=float(beta),
         lipschitz=rate,
+        step=step,
         forces=found.residual,
         symmetric_in=mirrors,
         volumes_kept=rooms,
@@ -218,15 +222,16 @@ def _refuse_moving(part: StandingPart, found: System) -> None:
         raise _Unproved(f"it is not at rest: the residual is {residual:.1e}; solve it first")
 
 
-def _inertia(found: System) -> tuple[int, float]:
-    """The Morse index, and g: no eigenvalue of K is within g of zero."""
+def _inertia(found: System) -> tuple[int, float, Floats]:
+    """The Morse index; g: no eigenvalue of K is within g of zero; Newton's step (N,), about -K⁻¹F."""
     pattern, data = found.pattern, found.matrix
     solver = factoriser(pattern, "superlu")
     rough = solver.factor(data)
+    step = rough.solve(found.left)
     x = np.cos(1.618 * np.arange(pattern.size))
     for _ in range(STEPS):
-        x = rough.solve(x / np.linalg.norm(x))
-    sigma, reason = SHARE / float(np.linalg.norm(x)), ""
+        x = rough.solve(x / np.sqrt((x * x).sum()))  # a sum: threads of BLAS wait for each other
+    sigma, reason = SHARE / float(np.sqrt((x * x).sum())), ""
     diagonal = pattern.indptr[:-1]
     for _ in range(TRIES):
         counts: list[int] = []
@@ -242,12 +247,12 @@ def _inertia(found: System) -> tuple[int, float]:
                 counts.append(int(np.count_nonzero(lu.U.diagonal() < 0.0)))
         gap = (sigma - (max(errors) + found.matrix_error) * SAFE) / SAFE
         if len(set(counts)) == 1 and gap > 0.0:
-            return counts[0] - found.borders, gap
+            return counts[0] - found.borders, gap, step
         reason = f"{min(counts)} to {max(counts)} eigenvalues below ∓{sigma:.1e}"
         if gap <= 0.0:
             reason = f"rounding, {sigma - gap:.1e}, hides eigenvalues as near to zero as {sigma:.1e}"
             break
-        sigma *= 0.25
+        sigma *= 0.5
     raise _Unproved(f"its Morse index is not certain: {reason}")
 
 
