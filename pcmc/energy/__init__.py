@@ -4,6 +4,5 @@ Gives these to contact, stability, the certificate and the solvers. Imports ``su
 """
 
 from .functional import energy, energy_and_gradient, energy_at, gradient
-from .second_variation import hessian
 
-__all__ = ["energy", "energy_and_gradient", "energy_at", "gradient", "hessian"]
+__all__ = ["energy", "energy_and_gradient", "energy_at", "gradient"]

@@ -199,7 +199,7 @@ def _values(
 ) -> tuple[Floats, Bools]:
     """(k,) the number after a key in what follows each element, and where there is one."""
     pattern = re.compile(rf"\b(?:{key})\s+\{{?([^\s{{}}]+)", re.I)
-    if not pattern.search(section.text):
+    if not pattern.search("\n".join(set(rest))):
         return np.full(len(rest), default), np.zeros(len(rest), dtype=bool)
     code, kinds = pd.factorize(np.array(rest, dtype=object))
     first = np.unique(code, return_index=True)[1]
