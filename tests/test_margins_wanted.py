@@ -9,6 +9,7 @@ from small_project import WITH_UNITS, changed
 from generators import spherical_cap, two_squares
 from pcmc import Parameter, Target, margin, meet, sensitivities, solve
 from pcmc.base.errors import OptionError
+from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.explore.page_data import target_choices
 from pcmc.explore.session import Session, solved_start
@@ -16,6 +17,7 @@ from pcmc.project import run
 from pcmc.sweep import run as sweep
 from pcmc.sweep import short_table
 from pcmc.sweep.projects import project_sweep
+from pcmc.sweep.short_table import with_units
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +74,24 @@ def test_a_project_asks_for_margins(roof, capsys):
     assert len(lines) == 3
     assert "kN/m² of snow" in lines[0]
     assert "times the tension of roof: then the roof inflates (fold" in lines[2]
+
+
+def test_a_project_has_a_margin_as_a_target(roof):
+    """Its start is not at rest, and has no margin."""
+    target = """[targets]
+vary = ["roof"]
+meet = [{quantity = "margin", of = "pressure", value = 1.8}]
+[solve]
+mesh_check = false"""
+    outcome = run(changed(roof, "[solve]", target))
+    assert outcome.design.met
+    assert outcome.margin("pressure").factor == pytest.approx(1.8, rel=1e-3)
+
+
+def test_a_margin_of_what_is_0_now_is_a_value_with_its_unit(cap):
+    numbers = margin(cap, "snow", meshes=1).numbers()
+    assert "snow.margin" not in numbers
+    assert with_units(numbers, Units("m", "kN"))["snow.margin_value"] == "snow.margin_value [kN/m²]"
 
 
 def test_an_unknown_name_is_refused_before_solving(roof, capsys):

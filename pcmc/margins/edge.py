@@ -73,10 +73,10 @@ class Margin:
         return values.pop() if len(values) == 1 else math.nan
 
     def numbers(self) -> dict[str, Any]:
-        """The margin, its bar and what ends it, for tables."""
-        number = self.value if math.isnan(self.factor) else self.factor
+        """For tables: the factor, or of what is 0 now the value, its bar, and what ends it."""
         of = f"{self.what}.margin"
-        return {of: number, f"{of}_error": self.bar, f"{of}_ends_by": self.ends_by.name.lower()}
+        number = {f"{of}_value": self.value} if math.isnan(self.factor) else {of: self.factor}
+        return {**number, f"{of}_error": self.bar, f"{of}_ends_by": self.ends_by.name.lower()}
 
     def __str__(self) -> str:
         return self.text()

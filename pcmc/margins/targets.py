@@ -10,28 +10,36 @@ dμ of a tension or a load the fold moves so that ⟨φ, ∂∇E/∂λ⟩ dλ + 
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
 
 from ..base.errors import OptionError
+from ..certificate import certify
+from ..certificate.certificate import TOLERANCE
 from ..design import Target, meet, sensitivities  # from here they know the margin
 from ..design.measurement import Measurement
 from ..design.quantities import MEASURES, Measure
 from ..energy.functional import gradient_by
 from ..surface import Surface
-from .edge import margin
+from .edge import Margin, margin
 from .ending import MarginEnd
 from .varied import Varied
 
 __all__ = ["Target", "meet", "sensitivities"]
 
-_known = lru_cache(maxsize=4)(lambda surface, what: margin(surface, what, meshes=1))
-"""Margins of the last surfaces: value and slopes are asked for one after the other."""
+
+@lru_cache(maxsize=4)
+def _known(surface: Surface, what: str) -> Margin | None:
+    """Of the last surfaces, as value and slopes are asked for one after the other; None if not at rest."""
+    certificate = certify(surface)
+    at_rest = certificate.residual <= TOLERANCE
+    return margin(surface, what, meshes=1, certificate=certificate) if at_rest else None
 
 
 def _margin(surface: Surface, of: str | None) -> Measurement:
-    """The factor of ``pcmc.margin``, on this mesh alone; constant where nothing ends it."""
+    """The factor of ``pcmc.margin``, on this mesh alone; constant without an end, NaN if not at rest."""
     what = of or "pressure"
     if surface.rooms:
         text = f"margin of {what}: as a target it needs rooms of given pressures, not volumes"
@@ -41,6 +49,8 @@ def _margin(surface: Surface, of: str | None) -> Measurement:
         raise OptionError(f"margin of {what}: it is 0 now, so it has no factor", what="of", found=what)
     found = _known(surface, what)
     still = np.zeros_like(surface.vertices)
+    if found is None:
+        return Measurement(math.nan, still)
     if not len(found.mode):
         return Measurement(found.factor, still)
     if found.ends_by is not MarginEnd.FOLD:

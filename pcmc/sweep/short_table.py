@@ -49,7 +49,7 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
     >>> list(short_table(frame, ["a"])), list(short_table(frame, ["a"], ["residual"]))
     (['a', 'verdict', 'west.apex'], ['a', 'verdict', 'residual'])
     """
-    margins = [c for c in table if str(c).endswith((".margin", ".margin_ends_by"))]
+    margins = [c for c in table if str(c).endswith((".margin", ".margin_value", ".margin_ends_by"))]
     usual = [*(c for c in columns_of(table, USUAL[0], parameters) if "." in c), *USUAL[1:], *margins]
     shown = [column for name in show for column in columns_of(table, name, parameters)] if show else usual
     wanted = dict.fromkeys([*parameters, *FIRST, *shown])
@@ -72,6 +72,8 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
     shown = {}
     for name in names if units else ():
         stem, _, quantity = name.rpartition(".")
+        if quantity == "margin_value":
+            quantity = stem.partition(" of ")[0]
         cable = quantity == "tension" and (stem in cables or stem.startswith("plan.cables."))
         with suppress(OptionError):
             dimension = DIMENSIONS.get(quantity) or dimension_of("force" if cable else quantity)
