@@ -100,7 +100,7 @@ class History:
             self.callback(Progress(len(self.rows) - 1, state.result_surface, row))
 
 
-class Attempt:
+class NewtonRun:
     """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
     Attributes
@@ -140,7 +140,7 @@ class Attempt:
         self.smooth_steps, self.stuck = smooth_steps, False
         self.best, self.steps_since_best = self.state.relative, 0
 
-    def run(self) -> Attempt:
+    def run(self) -> NewtonRun:
         """Step until the end, or on from there; ``status`` then gives the reason."""
         self.status = until_stopped(self._iterate)
         if self.status is Status.STOPPED:  # perhaps in the middle of a step

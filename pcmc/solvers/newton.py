@@ -27,7 +27,7 @@ from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import ways_down
 from ..surface import Surface
-from .attempt import CRAWLS, DESCENTS, POOR, Attempt, History, NewtonOptions
+from .attempt import CRAWLS, DESCENTS, POOR, NewtonRun, History, NewtonOptions
 from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]
@@ -63,7 +63,7 @@ def newton(
     )
 
 
-def _solve_level(surface: Surface, options: NewtonOptions, history: History, level: int) -> Attempt:
+def _solve_level(surface: Surface, options: NewtonOptions, history: History, level: int) -> NewtonRun:
     """Solve on one mesh; where a junction comes down on a held bottom, once more so that it can rest."""
     end = _attempts(surface, options, history, level)
     if end.status not in LOST:
@@ -83,9 +83,9 @@ def _solve_level(surface: Surface, options: NewtonOptions, history: History, lev
 
 def _attempts(
     surface: Surface, options: NewtonOptions, history: History, level: int, held: bool = False
-) -> Attempt:
+) -> NewtonRun:
     """Solve on one mesh; where that fails, once more from the same start in another way."""
-    first = Attempt(surface, options, history, level, held=held).run()
+    first = NewtonRun(surface, options, history, level, held=held).run()
     for more in (*CRAWLS[1:], inf):
         if first.status is not Status.SADDLE:
             break
@@ -98,7 +98,7 @@ def _attempts(
         return first
     rows, minimum = len(history.rows), options.target == "minimum"
     other_way = replace(options, target="stationary")
-    second = Attempt(surface, other_way, history, level, 0 if minimum else DESCENTS, held).run()
+    second = NewtonRun(surface, other_way, history, level, 0 if minimum else DESCENTS, held).run()
     if second.status is Status.STOPPED:
         if second.state.relative < first.state.relative:
             return second
@@ -111,7 +111,7 @@ def _attempts(
     return first
 
 
-def _saddle_near(crawling: Attempt, must_slip: bool) -> Attempt | None:
+def _saddle_near(crawling: NewtonRun, must_slip: bool) -> NewtonRun | None:
     """The saddle from which an attempt only crawls, or a minimum there; None if there is neither.
 
     ``must_slip``: only a saddle in whose lowest mode an end of a junction slips.
@@ -119,7 +119,7 @@ def _saddle_near(crawling: Attempt, must_slip: bool) -> Attempt | None:
     history, rows = crawling.history, len(crawling.history.rows)
     other_way = replace(crawling.options, target="stationary")
     held = crawling.state.held
-    end = Attempt(crawling.surface_uphill(), other_way, history, crawling.level, held=held).run()
+    end = NewtonRun(crawling.surface_uphill(), other_way, history, crawling.level, held=held).run()
     if end.status is Status.STOPPED or _rests(end, must_slip):
         return end
     del history.rows[rows:]
@@ -127,7 +127,7 @@ def _saddle_near(crawling: Attempt, must_slip: bool) -> Attempt | None:
     return None
 
 
-def _rests(end: Attempt, must_slip: bool) -> bool:
+def _rests(end: NewtonRun, must_slip: bool) -> bool:
     """Whether an attempt to find any stationary point ends what was asked for: a minimum, or the saddle.
 
     The saddle ends it, with status SADDLE, if an end of a junction slips in its lowest mode, as the way
