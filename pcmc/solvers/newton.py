@@ -27,7 +27,7 @@ from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import ways_down
 from ..surface import Surface
-from .attempt import CRAWLS, DESCENTS, POOR, NewtonRun, History, NewtonOptions
+from .attempt import CRAWLS, DESCENTS, POOR, History, NewtonOptions, NewtonRun
 from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]
