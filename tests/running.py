@@ -28,6 +28,7 @@ def executed(name: str) -> Any:
         kernel_name="python3",
         resources={"metadata": {"path": str(FOLDER)}},
         record_timing=False,
+        coalesce_streams=True,
     )
     client.execute()
     return tidy(notebook)

@@ -10,9 +10,11 @@ from generators import spherical_cap, two_squares
 from pcmc import Parameter, Target, margin, meet, sensitivities, solve
 from pcmc.base.errors import OptionError
 from pcmc.cli import main
+from pcmc.explore.page_data import target_choices
 from pcmc.explore.session import Session, solved_start
 from pcmc.project import run
 from pcmc.sweep import run as sweep
+from pcmc.sweep import short_table
 from pcmc.sweep.projects import project_sweep
 
 
@@ -82,6 +84,12 @@ def test_a_sweep_has_a_column(roof):
     margins = table["pressure.margin"].to_numpy()
     assert margins[1] == pytest.approx(1.5 * margins[0], rel=0.01)
     assert table["pressure.margin_ends_by"].tolist() == ["fold", "fold"]
+    assert {"pressure.margin", "tension of roof.margin"} < {*short_table(table, ["roof.tension"])}
+
+
+def test_the_page_offers_each_margin_once(cap):
+    (offered,) = (one["of"] for one in target_choices(cap) if one["quantity"] == "margin")
+    assert offered == ["pressure", "snow", "weight", "tension"]  # of the only patch
 
 
 def test_the_page_asks_for_the_surface_shown(cap):

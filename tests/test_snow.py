@@ -104,7 +104,8 @@ def test_files_carry_the_air_and_the_snow(suffix, tmp_path):
 
 @pytest.mark.parametrize("suffix", [s for s in io.FORMATS if s in (".pcmc", ".obj", ".glb")])
 def test_files_without_snow_are_what_they_were(suffix, tmp_path):
-    pcmc.write(path := tmp_path / f"hall{suffix}", hall(0.0, 0.0))
+    bare = hall(0.0, 0.0).rebuilt(curves=())  # curves of held lines need the newest version
+    pcmc.write(path := tmp_path / f"hall{suffix}", bare)
     assert b"snow" not in path.read_bytes().lower()
     if suffix == ".pcmc":
         assert '"version": 1' in str(np.load(path)["meta"])

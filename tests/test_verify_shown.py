@@ -1,5 +1,8 @@
 """Where a theorem is shown: command, project, report, and page."""
 
+import re
+from pathlib import Path
+
 import pytest
 import shapes
 from small_project import WITH_UNITS
@@ -40,6 +43,33 @@ def test_a_project_asks_for_it(tmp_path, capsys, monkeypatch):
     outcome = project.run("hall.toml")
     assert outcome.theorem.proved
     assert outcome.theorem is outcome.written(()).theorem
+
+
+def test_a_roof_too_heavy_for_its_span_has_short_words(tmp_path, capsys, monkeypatch):
+    """No theorem, no verdict on the whole, no compression of a shape that ran away; a remedy that holds."""
+    monkeypatch.chdir(tmp_path)
+    text = """[plan]
+edge_length = 1.5
+outline = [[0, 0], [9, 0], [9, 8], [0, 8]]
+mirrors = [[[9, 0], [9, 8]]]
+tension = 6.0
+weight = 3.0
+[solve]
+verify = true
+mesh_check = false
+[output]
+files = ["barrel.pcmc"]
+whole = true
+"""
+    Path("barrel.toml").write_text(text)
+    assert cli.main(["solve", "barrel.toml"]) == 1
+    said = capsys.readouterr().out
+    assert said.count("the branch of equilibria folds at") == 1
+    assert not any(word in said for word in ("proved:", "compression", "the whole roof"))
+    tension = re.search(r"\[plan\] tension = (\S+)", said)[1]
+    Path("barrel.toml").write_text(text.replace("tension = 6.0", f"tension = {tension}"))
+    assert cli.main(["solve", "barrel.toml"]) == 0
+    assert "the whole roof" in capsys.readouterr().out
 
 
 def test_words_have_units():

@@ -11,7 +11,7 @@ from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import Curve
 
-ROUNDING = 1e-12  # of the size: a coordinate below is 0
+ROUNDING = 1e-8  # of the size, about what a solve leaves: a coordinate below is 0
 
 
 def conormal_sum(surface: Surface, edges: Ints) -> Floats:

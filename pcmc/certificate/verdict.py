@@ -177,11 +177,10 @@ def _ran_away(f: Findings) -> str:
     if f.neck is not None:
         return f"{f.neck}; bring the held curves nearer to each other, or raise the pressure"
     if f.evidence is Evidence.INFLATED:
-        reason = (
+        return (
             "it grew without bound; start lower, raise the tensions or lower the pressures, or follow the"
             " pressure from a lower one (pcmc.follow)"
         )
-        return "; ".join(filter(None, (reason, _compressed(f))))
     return "it shrank to nothing; hold it with fixed= or on_plane=, raise the pressure, or start larger"
 
 
@@ -228,10 +227,10 @@ def _hidden_stability(f: Findings) -> str:
 
 
 def _compressed(f: Findings) -> str:
-    """Names a patch whose weight leaves no tension somewhere; or empty."""
+    """Names a patch whose weight leaves no tension somewhere; or empty, as where it grew without bound."""
     surface = f.surface
     faces = np.flatnonzero(compressed(surface))
-    if not len(faces):
+    if not len(faces) or f.evidence is Evidence.INFLATED:
         return ""
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
     worst = faces[pull.argmin()]

@@ -42,7 +42,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(outcome.certificate.verdict.value)
         if detail:
             print(detail)
-        if outcome.whole is not None:
+        if outcome.whole is not None and outcome.solved.certificate.index is not None:
             whole = outcome.whole
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
         leaning = lean_texts(outcome.certificate.leaning, FAR)

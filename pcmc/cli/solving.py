@@ -114,7 +114,7 @@ def solve_(
         how: dict[str, Any] = {"anyway": anyway, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, say, changed=changed, **how)
     report(outcome)
-    if verify:
+    if verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")

@@ -191,9 +191,17 @@ def target_choices(surface: Surface) -> list[dict[str, Any]]:
         owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
         if names[owner] and quantity != "height":
             of = names[owner] if quantity in NAMED else ["", *names[owner]]
-            of = [*named(surface)] if quantity == "margin" else of
+            of = _varied(surface) if quantity == "margin" else of
             choices.append({"quantity": quantity, "of": of, "dimension": dimension_of(quantity)})
     return choices
+
+
+def _varied(surface: Surface) -> list[str]:
+    """What a margin of a surface may vary, each once."""
+    once: dict[Any, str] = {}
+    for what, parts in named(surface).items():
+        once.setdefault(parts, what)
+    return [*once.values()]
 
 
 def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[str, Any]:

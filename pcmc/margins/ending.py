@@ -13,6 +13,7 @@ from ..certificate import Verdict
 from ..continuation import Branch, Ending, follow
 from ..continuation.switching import ALONG
 from ..energy.weight import compressed, effective_tensions
+from ..meshing.quality import triangle_quality
 from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
@@ -32,7 +33,7 @@ class MarginEnd(Enum):
     WALL_DOWN = "wall down: a ridge comes down on the held bottom of its wall"
     COMPRESSION = "compression: the weight of a sheet is more than its tension holds"
     NONE = "no end found: it was followed no further"
-    MESH = "the mesh gave out: it could not be followed further; try finer triangles"
+    MESH = "the mesh gave out: it could not be followed further"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,8 @@ def find_end(
     else:
         factor, there = float(branch.points.parameter.iloc[-1]), branch.last
         kind, detail = _lost(branch, varied, factor), branch.detail
+        if detail.startswith("triangles"):
+            detail += f" near {_worst_place(there)}"
     return End(kind, factor, there, _motion(branch), tuple(contacts), detail)
 
 
@@ -130,6 +133,13 @@ def _lost(branch: Branch, varied: Varied, factor: float) -> MarginEnd:
     beyond = varied.direction.line(branch.last).surface_at(branch.last, factor + change)
     down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
     return MarginEnd.WALL_DOWN if down else MarginEnd.MESH
+
+
+def _worst_place(surface: Surface) -> str:
+    """Where the worst triangle of the roof is, walls left out as their triangles may vanish."""
+    faces = surface.faces[surface.roof[surface.patch_of_face]]
+    worst = faces[triangle_quality(surface.vertices, faces).argmin()]
+    return f"({', '.join(f'{x:.3g}' for x in surface.vertices[worst].mean(axis=0))})"
 
 
 def _compression(branch: Branch) -> float | None:

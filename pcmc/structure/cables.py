@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
+from ..base.errors import OptionError
 from ..io.text import format_rows
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
@@ -34,8 +35,8 @@ def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
     names = [cable.name for cable in surface.cables]
     limits: dict[str, Any] = {"least": (THINNEST * surface.size) ** 2, "most": surface.size**2}
     if given is None and names:
-        hint = "give the area of the cables' sections"
-        validate.refuse("cable_area", None, "a finite number > 0", names[0], hint)
+        message = f"cable_area is missing: give the area of the section of cable {names[0]!r}, length²"
+        raise OptionError(message, what="cable_area", where=names[0])
     if isinstance(given, Mapping):
         for name in given:
             validate.choice("cable", name, names)

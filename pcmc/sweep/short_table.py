@@ -41,15 +41,16 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
     """The parameters, how each case ended, and quantities, each as of ``columns_of``.
 
     By default these are the apex of each patch, the greatest height over Π; and of the roof the rise of the
-    highest apex over the lowest support, the area, and the largest reaction per length. All are in the
-    surface's units.
+    highest apex over the lowest support, the area, and the largest reaction per length; and the margins,
+    with what ends each. All are in the surface's units.
 
     >>> import pandas as pd
     >>> frame = pd.DataFrame({"a": [1.0], "verdict": ["stable"], "residual": [1e-12], "west.apex": [2.0]})
     >>> list(short_table(frame, ["a"])), list(short_table(frame, ["a"], ["residual"]))
     (['a', 'verdict', 'west.apex'], ['a', 'verdict', 'residual'])
     """
-    usual = [*(c for c in columns_of(table, USUAL[0], parameters) if "." in c), *USUAL[1:]]
+    margins = [c for c in table if str(c).endswith((".margin", ".margin_ends_by"))]
+    usual = [*(c for c in columns_of(table, USUAL[0], parameters) if "." in c), *USUAL[1:], *margins]
     shown = [column for name in show for column in columns_of(table, name, parameters)] if show else usual
     wanted = dict.fromkeys([*parameters, *FIRST, *shown])
     return table[[name for name in wanted if name in table]]

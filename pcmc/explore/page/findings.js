@@ -101,7 +101,7 @@ export function showSupports(root, { supports, balance }, units) {
   const rows = [...supports, ...balance.filter(({ of }) => of !== "supports")];
   const axes = ["x", "y", "z"];
   const most = Math.max(...rows.flatMap((row) => axes.map((axis) => Math.abs(row[`force_${axis}`]))));
-  const force = (x) => digits(Math.abs(x) > 1e-9 * most ? x : 0, 3);
+  const force = (x) => digits(Math.abs(x) > 1e-4 * most ? x : 0, 3);
   root.replaceChildren(...(supports.length ? [tableOf("Forces of the supports",
     [["Length", units.given ? units.length : ""], ...axes.map((axis) => [axis, units.given ? units.force : ""])],
     rows.map((row) => [row.of ? capital(row.of) : `${row.support} ${row.name === row.support ? row.kind : row.name}`, [
