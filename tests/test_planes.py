@@ -292,9 +292,9 @@ def test_copies_keep_the_planes():
 
 def test_a_part_between_plates_cannot_shrink():
     film = tube(3, 7, pressure=0.0)
-    assert unheld(film, stable=True) is None
+    assert unheld(film) is None
     onto_floor = tube(3, 7, pressure=0.0, on_planes={})
-    assert unheld(onto_floor, stable=True) is not None
+    assert unheld(onto_floor) is not None
 
 
 def test_what_it_refuses():

@@ -35,7 +35,7 @@ def test_a_remeshed_roof_is_at_rest_as_it_is_seen():
     """A foot comes to stand right below a resting crest vertex, from where it had hung apart."""
     coarse = solve(platform(15, 6, 100, (50,), alpha=3.6, wall=2.88, h=1.9, turn=7.0))
     assert coarse.certificate.verdict is Verdict.STABLE
-    fine = solve(remesh(coarse.surface, 0.8))
+    fine = solve(remesh(coarse.surface, 0.7))
     assert fine.converged
     assert len(fine.certificate.pinched)
     assert fine.certificate.residual < 1e-9

@@ -6,7 +6,8 @@ from scipy.integrate import solve_ivp
 from shapes import pyramid, tube
 from starts import spherical_cap, two_squares
 
-from pcmc import Cable, Patch, Plane, Surface, Verdict, certify, continuation, existence, solve
+from generators.grid import grid_faces
+from pcmc import Cable, Patch, Plane, Surface, Verdict, certify, continuation, cut, existence, margin, solve
 from pcmc.base.errors import NoBranch, SurfaceError
 from pcmc.certificate.balance import load_is_given, load_ratio, overload
 from pcmc.certificate.cables import weak_cable
@@ -87,13 +88,14 @@ def test_a_held_line_carries_to_its_ends_on_the_boundary():
     assert load_ratio(sheet) == pytest.approx(60.0 / (32.0 + 2.0 * 6.0))
 
 
-def test_a_mesh_at_rest_is_not_contradicted():
+def test_a_mesh_at_rest_is_not_contradicted_but_told_of():
     """At α < 1/2 no smooth cap or roof over the square is at rest, but these meshes are."""
     for surface in (spherical_cap(0.2, alpha=0.495), pyramid(0.4)):
         result = solve(surface)
         assert overload(result.surface) is not None
         assert result.certificate.verdict is Verdict.STABLE
         assert result.proofs == result.certificate.proofs == ()
+        assert "only a mesh as coarse as this is at rest here" in result.certificate.detail
 
 
 # ---- flat sails
@@ -147,6 +149,37 @@ def test_of_a_sail_that_is_not_flat_a_weak_cable_proves_nothing():
         weak.retensioned(weights={"sail": 0.1}),
     ):
         assert weak_cable(other) is None
+
+
+def square_sail(tension):
+    """On 8 x 8 cells, of side 2: this mesh stands where a smooth sail needs cables of √2."""
+    i, j = np.divmod(np.arange(81), 9)
+    X, faces = np.stack([i, j, 0 * i], axis=1) / 4.0, grid_faces(8, 8)
+    bare = Surface(X, faces, [0] * 128, [Patch("sail", 1.0, 0.0)], fixed=[0, 8, 72, 80])
+    edges = bare.topology.edges[bare.topology.boundary_edge]
+    return bare.rebuilt(cables=[Cable("rope", tension, edges)])
+
+
+def test_a_coarse_sail_at_rest_is_told_that_its_cable_is_too_weak():
+    certificate = solve(square_sail(1.38)).certificate
+    assert certificate.verdict is Verdict.STABLE
+    assert "no smooth surface is: cable 'rope' is too weak" in certificate.detail
+    assert solve(square_sail(1.45)).certificate.detail == ""
+
+
+def test_half_a_sail_is_as_weak_as_the_whole():
+    whole = square_sail(1.2)
+    half = cut(whole, Plane((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)))
+    assert weak_cable(half).least == pytest.approx(weak_cable(whole).least)
+    assert solve(half).status is solve(whole).status is Status.NO_EQUILIBRIUM
+
+
+def test_the_margin_of_a_sail_claims_no_more_than_its_mesh():
+    found = margin(solve(square_sail(1.6)), "cable")
+    assert found.factor < np.sqrt(2.0) / 1.6  # where a smooth sail ends
+    assert found.text().startswith("holds on this mesh at least down to")
+    assert "no smooth surface is" in found.detail
+    assert "on 512 triangles 0.8" in found.detail
 
 
 # ---- branches

@@ -16,6 +16,7 @@ from ..surface.topology import Curve
 from ..surface.wall_tensions import balanced_wall
 from .proof import Overload, UnbalancedJunction, Unheld
 
+ROUNDED = 1e-9  # a load, or a tension, that exceeds what balances it by less may do so by rounding alone
 COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
@@ -54,7 +55,7 @@ def overload(surface: Surface) -> Overload | None:
         return None
     fixed = np.asarray(surface.pinned[surface.topology.edges].all(axis=1))
     ratio = abs(load(surface)) / (_capacity(surface, fixed) or np.inf)
-    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 else None
+    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 + ROUNDED else None
 
 
 def load_is_given(surface: Surface) -> bool:
@@ -221,7 +222,7 @@ def unbalanced(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
     Nothing is known where a cable or pressures that do not cancel pull, too, or a sheet's weight changes its
     tension with the height.
     """
-    return _strained(surface, pinchable, 1.0 + 1e-9)
+    return _strained(surface, pinchable, 1.0 + ROUNDED)
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:

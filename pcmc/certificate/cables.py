@@ -9,11 +9,12 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import OptionError
+from ..base.errors import OptionError, SurfaceError
 from ..energy.cables import directions
 from ..surface import Surface
 from ..surface.cable import Cable
 from ..surface.geometry import segment_lengths
+from ..surface.mirroring import mirrored
 from ..surface.topology import Curve
 from .curve_tables import conormal_sum, middle
 from .proof import WeakCable
@@ -140,6 +141,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     edges beside it, 0 of a held one. As 0 ≤ γ ≤ 2 π and β < 2 π, k ≥ 0. The disc has Σ (π - γ) - Σ θ = 2 π,
     the polygon Σ (π - β) = 2 π, so Σ k = 0, every k = 0, and θ + θ' ≤ 2 β. The least factor f on both
     tensions obeys asin(α L/(2 f τ)) + asin(α L'/(2 f τ')) = β, and φ is θ there: f τ = α L / (2 sin(φ/2)).
+    Of a piece between mirror planes the whole is looked at.
 
     >>> from pcmc import Cable, Patch
     >>> corners = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
@@ -150,6 +152,11 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     >>> print(weak_cable(sail))
     cable 'rope' is too weak for a flat sail: 1.2 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°; raise it
     """
+    if surface.on_planes and len(surface.cable_edges.ends) and all(p.mirror for p, _ in surface.on_planes):
+        try:
+            surface = mirrored(surface)
+        except SurfaceError:  # its images never end, or overlap
+            return None
     plane = _plane_of_sail(surface)
     if plane is None:
         return None

@@ -37,7 +37,7 @@ from .leaning import lean_table, lean_texts
 from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
 from .supports import boundary_view, pull_table, support_table
-from .verdict import COLLAPSED, NEAR, NEUTRAL, Evidence, Findings, Verdict, judge
+from .verdict import COLLAPSED, NEAR, NEUTRAL, Evidence, Findings, Verdict, judge, only_coarse
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
 UNKNOWN = np.empty(0), np.empty((0, 0, 3))  # no eigenvalues, no modes
@@ -276,7 +276,8 @@ def certify(
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
-    notes = _pulled_off(unheld), pressures_left_over(standing)
+    coarse = only_coarse(surface, part.walls.pinchable) if at_rest and surface.tensions.any() else ""
+    notes = coarse, _pulled_off(unheld), pressures_left_over(standing)
     findings = Findings(
         surface=surface,
         pinchable=part.walls.pinchable,

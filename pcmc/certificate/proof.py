@@ -7,6 +7,7 @@ where no smooth surface does, as its triangles balance along their normals alone
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -165,6 +166,8 @@ class Attempt:
 
     >>> print(Attempt("pressure", "fold", 0.8, 0.4))  # doctest: +ELLIPSIS
     the branch of equilibria folds at 0.800 of the pressure (followed from 0.4 of it): lower all ...
+    >>> Attempt("weight", "fold", 0.7868, 0.4).remedy
+    'lower all weights below 0.786 of theirs, or raise all tensions above 1.271 times theirs'
     >>> print(Attempt("given start", "diverged"))
     from the given start the surface grows without bound
     """
@@ -202,10 +205,13 @@ class Attempt:
         if self.way == "tensions" or not value:
             return "stay on that side of it"
         loads = "pressures and weights" if self.way == "load" else f"{self.way}s"
-        below, above = _three(value), _three(1.0 / value)
+        below, above = _three(value, math.floor), _three(1.0 / value, math.ceil)
         return f"lower all {loads} below {below} of theirs, or raise all tensions above {above} times theirs"
 
 
-def _three(value: float) -> str:
-    """Three digits behind the point, or three in all for small and large numbers."""
-    return f"{value:.3f}" if 1e-2 <= value < 1e4 else f"{value:.3g}"
+def _three(value: float, whole: Callable[[float], float] = round) -> str:
+    """Three digits behind the point, or three in all for small and large numbers; ``whole`` rounds them."""
+    fixed = 1e-2 <= value < 1e4
+    step = 10.0 ** (-3 if fixed else math.floor(math.log10(value or 1.0)) - 2)
+    rounded = step * whole(value / step)
+    return f"{rounded:.3f}" if fixed else f"{rounded:.3g}"

@@ -111,13 +111,7 @@ class Findings:
         load = self.overload
         if load and not settled and load.ratio <= 1.0 + coarseness(self.surface):
             load = None
-        proofs = (
-            unbalanced(self.surface, self.pinchable),
-            load,
-            unheld(self.surface),
-            weak_cable(self.surface),
-        )
-        return tuple(proof for proof in proofs if proof is not None)
+        return _theorems(self.surface, self.pinchable, load)
 
     @property
     def lost(self) -> bool:
@@ -139,6 +133,18 @@ class Findings:
     def collapsed(self) -> bool:
         """Whether triangles have collapsed."""
         return self.evidence is Evidence.COLLAPSED or self.quality <= COLLAPSED
+
+
+def _theorems(surface: Surface, pinchable: Bools, load: Overload | None) -> tuple[Proof, ...]:
+    """What rules out a smooth surface at rest, with an overload if one is given."""
+    found = unbalanced(surface, pinchable), load, unheld(surface), weak_cable(surface)
+    return tuple(proof for proof in found if proof is not None)
+
+
+def only_coarse(surface: Surface, pinchable: Bools) -> str:
+    """Why no smooth surface is at rest where this mesh is; empty if nothing is known against one."""
+    why = "; ".join(map(str, _theorems(surface, pinchable, overload(surface))))
+    return why and f"only a mesh as coarse as this is at rest here, no smooth surface is: {why}"
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,9 @@ from ..base.arrays import Floats
 from ..base.errors import PcmcError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
+from ..certificate.balance import pressures_left_over
+from ..certificate.verdict import only_coarse
+from ..contact.pinching import standing_part
 from ..continuation.segment import EVENT_ACCURACY
 from ..quantities import dimension_of
 from ..solvers.result import Callback, Result
@@ -88,11 +91,11 @@ class Margin:
         holds = f"stays a saddle of index {self.index}" if self.index else "holds"
         none_now = math.isnan(self.factor)
         number = self.value if none_now else self.factor
-        at_least = self.ends_by in OPEN
+        at_least, mesh = self.ends_by in OPEN, " on this mesh" * (self.ends_by is MarginEnd.MESH)
         shown = f"{number:.4g}" if at_least else with_bar(number, self.bar)
         shown += f"{units.behind(self.dimension)} of {self.what}" if none_now else f" times the {self.what}"
         then = f": then {self.where}" if self.where else ""
-        holds += f"{' at least' * at_least} {'up' if self.more else 'down'} to"
+        holds += f"{mesh}{' at least' * at_least} {'up' if self.more else 'down'} to"
         text = f"{holds} {shown}{then} ({self.ends_by.value})"
         return "; ".join(filter(None, (text, self.detail)))
 
@@ -161,9 +164,11 @@ def margin(
         message = f"margin: the surface is not at rest, so it has none ({certificate.verdict.value})"
         raise SurfaceError(message, what="surface", found=certificate.residual)
     ends, notes = [find_end(surface, varied, index, most, callback)], list[str]()
-    if meshes > 1 and ends[0].ends_by not in OPEN:
+    if ends[0].ends_by is MarginEnd.MESH:
+        notes = [only_coarse(ends[0].surface, standing_part(ends[0].surface).walls.pinchable)]
+    if meshes > 1 and ends[0].ends_by is not MarginEnd.NONE:
         finer, note = _on_finer_meshes(surface, varied, index, most, meshes, corners, callback)
-        ends, notes = [*ends, *finer], [note]
+        ends, notes = [*ends, *finer], [*notes, note]
     end, unit = ends[0], varied.unit or 1.0
     numbers = np.array([[unit * one.factor] for one in ends])
     alike = {one.ends_by in OPEN for one in ends} == {False}
@@ -172,6 +177,7 @@ def margin(
     if end.contacts:
         at = ", ".join(f"{unit * factor:.4g}" for factor in end.contacts)
         notes.append(f"ridges come to rest, or lift off, on the way: at {at}")
+    notes.append(pressures_left_over(end.surface))
     if certificate.symmetric_in:
         notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
     kinds = {dimension_of(kind) for kind, _ in varied.parts}
