@@ -91,9 +91,10 @@ class Margin:
         holds = f"stays a saddle of index {self.index}" if self.index else "holds"
         none_now = math.isnan(self.factor)
         number = self.value if none_now else self.factor
+        of = {"tension": "tensions", "cable": "tensions of the cables"}.get(self.what, self.what)
         at_least, mesh = self.ends_by in OPEN, " on this mesh" * (self.ends_by is MarginEnd.MESH)
         shown = f"{number:.4g}" if at_least else with_bar(number, self.bar)
-        shown += f"{units.behind(self.dimension)} of {self.what}" if none_now else f" times the {self.what}"
+        shown += f"{units.behind(self.dimension)} of {self.what}" if none_now else f" times the {of}"
         then = f": then {self.where}" if self.where else ""
         holds += f"{mesh}{' at least' * at_least} {'up' if self.more else 'down'} to"
         text = f"{holds} {shown}{then} ({self.ends_by.value})"
@@ -218,7 +219,8 @@ def _on_finer_meshes(
         return [], f"no bar: {error}"
     unit = varied.unit or 1.0
     return ends, ", ".join(
-        f"on {end.surface.m} triangles {unit * end.factor:.4g} by {end.ends_by.name.lower()}" for end in ends
+        f"on {end.surface.m} triangles {unit * end.factor:.4g} ({end.ends_by.value.partition(':')[0]})"
+        for end in ends
     )
 
 
