@@ -219,3 +219,11 @@ def test_the_cost_of_a_plan_grows_as_its_lines_do(plan, few):
 
     work(few // 4)  # loads what is compiled
     assert work(4 * few) < 10.0 * work(few)
+
+
+def test_a_curve_beside_the_keys_of_its_divider():
+    """It was "unknown curve 'name'", while polyline is among the known keys of a divider."""
+    divider = {"polyline": WALL, "name": "mid"}
+    with pytest.raises(OptionError, match=r"divider 1: beside 'name' its curve is a key, too: curve = {poly"):
+        Plan(BOX, [divider], tension=5.0, edge_length=2.0).surface()
+    assert Plan(BOX, [{"curve": {"polyline": WALL}, "name": "mid"}], tension=5.0, edge_length=2.0).surface().m

@@ -11,7 +11,7 @@ import numpy as np
 from ..base import validate
 from ..base.errors import OptionError, PcmcError, PlanError, unknown
 from ..base.names import checked_name
-from ..curves.curves import Curve, curve
+from ..curves.curves import CURVES, Curve, curve
 from ..meshing.walls import EDGES
 from ..surface import Plane
 
@@ -271,6 +271,11 @@ def _part_of(kind: Any, spec: Any, what: str) -> Any:
     if isinstance(spec, Mapping) and "curve" in spec:
         check_keys(spec, kind, what)
         return kind(**spec)
+    own = {entry.name for entry in fields(kind)}.intersection(spec) if isinstance(spec, Mapping) else ()
+    if own:
+        shape = next((key for key in spec if key in CURVES), "polyline")
+        message = f"{what}: beside {sorted(own)[0]!r} its curve is a key, too: curve = {{{shape} = ...}}"
+        raise OptionError(message, what="curve", where=what, found=list(spec))
     return spec if isinstance(spec, kind) else kind(spec)
 
 
