@@ -79,6 +79,7 @@ def test_words_have_units():
     assert "1.3e-09 m of its vertices" in text
     assert "within 0.066 kN/m of zero" in text
     assert str(Theorem(False, "it is not at rest")) == "not proved: it is not at rest"
+    assert repr(theorem) == str(theorem)
 
 
 def test_the_report_has_a_line():

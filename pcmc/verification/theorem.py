@@ -89,6 +89,8 @@ class Theorem:
     def __str__(self) -> str:
         return self.text()
 
+    __repr__ = __str__  # what a prompt and a notebook's cell show
+
     def brief(self, units: Units = NO_UNITS) -> str:
         """The theorem in a line: "proved: index 0, within 1.3e-09 m"."""
         if not self.proved:
