@@ -326,6 +326,7 @@ def test_points_are_measured_by_mouse_and_keys_and_a_section_follows_its_slider(
     page = Explored(driver, running.url)
     page.find("#views [data-view=plan]").click()
     page.find("#views .measure").click()
+    page.idle()  # a point is picked in the view that is drawn
     page.find("#canvas").click()
     until(lambda: page.text("#measured").startswith("Height "), "the height")
     top = float(page.text("#measured").split()[1])
