@@ -6,6 +6,7 @@ Whatever a file holds, nothing but a PcmcError may come out of a reader, and not
 from __future__ import annotations
 
 import json
+import os
 import random
 import tempfile
 import warnings
@@ -26,7 +27,7 @@ for library in ("pyvista", "rhino3dm", "trimesh"):
     pytest.importorskip(library)
 
 READABLE = [suffix for suffix, form in FORMATS.items() if form.reads]
-FLIPS = 2000
+FLIPS = int(os.environ.get("PCMC_FLIPS", "500"))  # PCMC_FLIPS=2000 for a long run
 OWN = (".obj", ".ply", ".fe")  # read by readers of our own, which check all themselves: no net below them
 NET = "not a readable ."  # how an error of the net begins
 
