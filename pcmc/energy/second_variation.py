@@ -214,9 +214,10 @@ def add_products(surface: Surface, mesh: Mesh, X: Floats, d: Floats, change: Flo
     """(∂²E) d added to ``change`` (n,3), in place, for a motion d (n,3); ``mesh`` has the triangles."""
     _add_triangle_products(mesh, X, d, change)
     _add_cable_products(surface.cable_edges, X, d, change)
-    ends, q = _flat_sides(surface, mesh.pressure)
-    np.add.at(change, ends[:, 0], np.cross(q, d[ends[:, 1]]))
-    np.subtract.at(change, ends[:, 1], np.cross(q, d[ends[:, 0]]))
+    if flat_pieces(surface):
+        ends, q = _flat_sides(surface, mesh.pressure)
+        np.add.at(change, ends[:, 0], np.cross(q, d[ends[:, 1]]))
+        np.subtract.at(change, ends[:, 1], np.cross(q, d[ends[:, 0]]))
     return change
 
 
@@ -236,8 +237,8 @@ def _assembled(
     if len(cables.ends):
         offset = pattern.edge_offset[topo.edge_numbers(cables.ends)]
         _assemble_cables(cables, offset, X, space, pattern, hessian, stiffness, data)
-    ends, q = _flat_sides(surface, mesh.pressure)
-    if hessian and len(ends):
+    if hessian and flat_pieces(surface):
+        ends, q = _flat_sides(surface, mesh.pressure)
         offset = pattern.edge_offset[topo.edge_numbers(ends)]
         _assemble_sides(ends, offset, hessian * q, space, pattern, data)
     return data
