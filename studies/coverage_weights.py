@@ -32,17 +32,20 @@ def _profile(alpha: float, pressure: float, weight: float, half: float, round_pl
         around = (np.sin(slope) / x if x > 1e-12 else 0.5 * bend) if round_plan else 0.0
         return [np.cos(slope), -np.sin(slope), bend - around]
 
-    def reached(s: float, y: Floats) -> float:
-        return float(y[0] - half)
+    class Reached:
+        """The end of the curve."""
 
-    reached.terminal = True  # type: ignore[attr-defined]
+        terminal = True
+
+        def __call__(self, s: float, y: Floats) -> float:
+            return float(y[0] - half)
 
     def down(top: float) -> Any:
         return solve_ivp(
             right,
             (0.0, 4.0 * half),
             [0.0, top, 0.0],
-            events=reached,
+            events=Reached(),
             rtol=1e-12,
             atol=1e-13,
             dense_output=True,

@@ -46,3 +46,9 @@ def test_the_bound_holds_in_exact_arithmetic():
         norm = float(max(rows))
         bound = backward_error(lu.L, lu.U)
         assert norm <= bound < 1e-12 * (1 + np.abs(lu.U.data).max() ** 2)
+
+
+def test_factors_that_are_not_symmetric_count():
+    """L U may be exact and L D Lᵀ another matrix: here they differ by 0.1 beside the diagonal."""
+    lower, upper = csc_array([[1.0, 0.0], [0.5, 1.0]]), csc_array([[2.0, 1.1], [0.0, 3.0]])
+    assert backward_error(lower, upper) >= 0.1

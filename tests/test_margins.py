@@ -92,7 +92,7 @@ def test_two_caps_with_a_wall_fold_where_the_wall_pulls_too_much():
 
 
 def test_a_wall_that_pulls_too_much_slips_before_it_comes_down():
-    """Contact and loss of stability on one step of the branch are told apart: first it slips."""
+    """The ridge slips before it touches, though both happen within one step of the branch."""
     start = solve(two_squares(8)).surface
     found = margin(start, "wall", meshes=1)
     assert found.ends_by is MarginEnd.BIFURCATION

@@ -140,7 +140,7 @@ class SecondVariation:
 
     Attributes
     ----------
-    surface, classes, space : of which it is the second variation.
+    surface, classes, space : what it is the second variation of.
     mass : (N,) lumped area M, length².
     excluded : (N,k) unit columns; only motions across all of them count. See ``excluded_columns``.
     """
