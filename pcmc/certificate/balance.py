@@ -10,7 +10,7 @@ import pandas as pd
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
-from ..surface.origin import uncancelled_pressures
+from ..surface.supports import uncancelled_pressures
 from ..surface.supports import common_point
 from ..surface.topology import Curve
 from ..surface.wall_tensions import balanced_wall

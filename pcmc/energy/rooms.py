@@ -22,7 +22,7 @@ from ..base.compiled import compiled
 from ..base.errors import OptionError, SurfaceError
 from ..surface import Line, Surface, expect_surface
 from ..surface.geometry import accumulate, cross, point, scaled, sub, vector
-from ..surface.room import Room
+from ..surface.parts import Room
 from ..surface.topology import components
 from . import kernels
 from .functional import apply_supports

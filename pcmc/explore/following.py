@@ -16,7 +16,7 @@ from ..project.values import single_points, values_of
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Surface
-from ..surface.renewed import KINDS, all_values
+from ..surface.parts import KINDS, all_values
 from ..surface.wall_pressures import with_pressures
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)

@@ -23,7 +23,7 @@ from ..base.errors import FileError, MissingExtra
 from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..energy.functional import patch_areas
 from ..surface import Cable, Surface
-from ..surface.origin import file_origin
+from ..surface.geometry import file_origin
 from .libraries import load_library
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata

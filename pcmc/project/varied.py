@@ -16,7 +16,7 @@ from ..base.errors import OptionError, unknown
 from ..base.files import as_path, read_bytes
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
-from ..surface.renewed import KINDS, all_values
+from ..surface.parts import KINDS, all_values
 from ..surface.wall_pressures import with_pressures
 from .checking import is_curve
 from .drawn import files_of, is_drawing

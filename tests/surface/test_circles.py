@@ -14,7 +14,7 @@ import pcmc
 from generators import three_patches
 from pcmc import Circle, Patch, Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.energy.functional import apply_supports, energy_and_gradient, energy_at, onto_circles
+from pcmc.energy.functional import apply_supports, energy_and_gradient, energy_at
 from pcmc.energy.jacobian import linearise
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.energy.pattern import hessian_pattern
