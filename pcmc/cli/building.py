@@ -17,8 +17,8 @@ from ..base.units import Units
 from ..certificate.required import require_certified
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
-from ..panels import fewer_families
-from ..panels.schedule import MIRROR_IMAGES
+from ..panelling import fewer_families
+from ..panelling.schedule import MIRROR_IMAGES
 from ..report.document import check_suffix as check_report
 from ..structure import write_structure
 from ..surface import Surface
