@@ -14,7 +14,7 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
-from ..energy.rooms import refuse_varied_pressure
+from ..forces.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY
 from ..project import Outcome, Project
 from ..project.output import OnStep

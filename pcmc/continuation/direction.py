@@ -17,8 +17,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import apply_supports, weighted
-from ..energy.rooms import prescribed_volumes, refuse_varied_pressure
+from ..forces.functional import apply_supports, weighted
+from ..forces.rooms import prescribed_volumes, refuse_varied_pressure
 from ..surface import Surface
 from ..surface.wall_pressures import wall_pressure_changes, with_pressures
 from .loads import Loads

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import gradient_by, weighted
-from ..energy.weight import moments
+from ..forces.functional import gradient_by, weighted
+from ..forces.weight import moments
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.wall_pressures import wall_pressure_changes

@@ -29,12 +29,12 @@ from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, place_wall_rows, standing_part
 from ..contact.pull import excess_pull
-from ..energy.functional import energy_and_gradient, gradient_by
-from ..energy.jacobian import Linearisation, linearise
-from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.pattern import hessian_pattern
-from ..energy.rooms import prescribed_volumes, volume_defects, volume_gradients_at
-from ..energy.second_variation import assemble
+from ..forces.functional import energy_and_gradient, gradient_by
+from ..forces.jacobian import Linearisation, linearise
+from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.pattern import hessian_pattern
+from ..forces.rooms import prescribed_volumes, volume_defects, volume_gradients_at
+from ..forces.second_variation import assemble
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from .. import io
 from ..base.errors import OptionError, unknown
 from ..base.files import as_path, read_bytes
-from ..energy.rooms import refuse_varied_pressure
+from ..forces.rooms import refuse_varied_pressure
 from ..surface import Surface
 from ..surface.renewed import KINDS, all_values
 from ..surface.wall_pressures import with_pressures

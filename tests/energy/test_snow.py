@@ -13,11 +13,11 @@ from generators import hypar_roof, spherical_cap
 from pcmc import Parameter, Patch, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
 from pcmc.design.targets import measure
-from pcmc.energy.rooms import room_pressures
 from pcmc.existence.attempts import Attempts
 from pcmc.existence.loads import raise_loads
 from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
+from pcmc.forces.rooms import room_pressures
 from pcmc.io.scaling import scaled_surface
 from pcmc.plan import Area, Plan
 from pcmc.project import digest, run, varied
