@@ -24,7 +24,7 @@ from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
 from pcmc.surface.wall_pressures import with_pressures
-from studies import evolver
+from studies.reference import evolver
 
 TOML = """
 [plan]
