@@ -16,7 +16,7 @@ design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
 margins                    how far a roof is from the edge of its stability
-compas panels structure    COMPAS; families of panels; structural models
+compas panelling structure COMPAS; families of panels; structural models
 drawings plot report       sheets, pictures, and pages for those who build
 advice                     first tensions for a rise, and what to type where a roof fails
 project                    a whole design in one file
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from .io import read, write
     from .io.repairing import Repaired, repair
     from .margins import Margin, margin
-    from .panels import FewerFamilies, Panels, fewer_families, panels
+    from .panelling import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
     from .verification import Theorem, verify
@@ -132,18 +132,18 @@ _NAMES = {
     ),
     "margins": ("Margin", "margin"),
     "margins.targets": ("Target", "meet", "sensitivities"),
-    "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
+    "panelling": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
     "verification": ("Theorem", "verify"),
 }
 
 
 class _Package(ModuleType):
-    """``pcmc.energy`` and ``pcmc.panels`` are functions, although folders have the same names."""
+    """``pcmc.energy`` is a function, although a folder has the same name."""
 
     def __setattr__(self, name: str, value: object) -> None:
         folder = isinstance(value, ModuleType)  # set by its import
-        if not (folder and name in ("energy", "panels")):
+        if not (folder and name == "energy"):
             super().__setattr__(name, value)
 
 

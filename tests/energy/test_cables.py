@@ -27,7 +27,7 @@ from pcmc.meshing.remeshing import remesh
 from pcmc.quantities import figures
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.surface.topology import CURVE, POINT, SHEET
-from studies import evolver
+from studies.reference import evolver
 
 ALONE = {"a": 0.0, "b": 0.0}
 TERMS = {

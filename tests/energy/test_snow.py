@@ -23,7 +23,7 @@ from pcmc.plan import Area, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
-from studies import evolver
+from studies.reference import evolver
 
 TOML = """
 [plan]

@@ -17,7 +17,7 @@ from pcmc.plan import Divider, Plan
 from pcmc.quantities import figures
 from pcmc.surface.geometry import area_vectors
 from pcmc.sweep.solving import row
-from studies.forces_cases import tube
+from studies.forces.cases import tube
 
 TIGHT = {"tolerance": 1e-13, "min_quality": 0.0}
 

@@ -30,7 +30,7 @@ from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
 from pcmc.stability.modes import full_matrix
 from pcmc.surface.geometry import vertex_area_vectors
-from studies import evolver
+from studies.reference import evolver
 
 TOP = Plane((0, 0, 2), (0, 0, 1), name="top")
 

@@ -21,7 +21,7 @@ from pcmc.stability.modes import full_matrix, second_variation
 from pcmc.verification import balls, enclosures, theorem
 from pcmc.verification.lipschitz import lipschitz
 from pcmc.verification.system import system
-from studies.forces_cases import hanging_barrel
+from studies.forces.cases import hanging_barrel
 from tests.contact.test_contact_held import example
 from tests.surface import test_lines
 
