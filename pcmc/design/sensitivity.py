@@ -38,7 +38,7 @@ from ..forces.second_variation import assemble
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface
-from ..surface.wall_pressures import wall_pressure_changes
+from ..surface.values import wall_changes
 from .quantities import Measurement, room_index
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
@@ -148,7 +148,7 @@ def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Paramete
     if parameter.kind not in ("pressure", "snow"):
         return one
     named = {surface.patch_index(name) for p in parameters if p.kind == parameter.kind for name in p.names}
-    return one + wall_pressure_changes(surface, one, named)
+    return one + wall_changes(surface, one, named)
 
 
 @dataclass(frozen=True, eq=False)
