@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..energy.cables import directions
+from ..forces.cables import directions
 from ..surface import Surface
-from ..surface.parts import Cable
 from ..surface.geometry import segment_lengths
+from ..surface.parts import Cable
 from ..surface.symmetry import mirrored
 from ..surface.topology import Curve
 from .curve_tables import conormal_sum, middle

@@ -14,7 +14,7 @@ from ..base.files import suffix_of
 from ..base.units import Units, expect_length
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.sheet import FORMATS
-from ..panels import Panels
+from ..panelling import Panels
 from ..report.document import check_suffix as check_report
 from ..structure.wanted import Structure
 from .output import Works

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..margins import Margin
-    from ..panels import Panels
+    from ..panelling import Panels
     from ..quantities import Figure
     from ..report import RoofReport
     from ..structure import StructuralModel
@@ -181,7 +181,7 @@ class Outcome:
         self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
     ) -> Panels:
         """The schedule of the panels of what is shown; see ``pcmc.panels``."""
-        from ..panels import panels
+        from ..panelling import panels
 
         key = "panels", self.unfold, tolerance, mirror_images, walls
         if key not in self._known:

@@ -20,7 +20,7 @@ from ..base.files import atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..energy.curvature import curvature_error, mean_curvature
+from ..forces.curvature import curvature_error, mean_curvature
 from ..plot.figure import SUFFIXES, check_suffix
 from ..surface import Surface
 

@@ -23,10 +23,10 @@ from ..contact.pinching import (
     top_spacing,
 )
 from ..contact.pull import excess_pull, pull_directions
-from ..energy.functional import energy_and_gradient, energy_at
-from ..energy.loose_parts import relative_forces, rounding_left
-from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.rooms import (
+from ..forces.functional import energy_and_gradient, energy_at
+from ..forces.loose_parts import relative_forces, rounding_left
+from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.rooms import (
     closing_volumes,
     prescribed_volumes,
     volume_gradients_at,
@@ -36,8 +36,8 @@ from ..energy.rooms import (
 from ..meshing.quality import compare, redistribute, worst_quality
 from ..surface import Surface
 from ..surface.checks import reachable
-from ..surface.supports import onto_circles
 from ..surface.geometry import vertex_area_vectors
+from ..surface.supports import onto_circles
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time

@@ -10,7 +10,6 @@ from ..base.arrays import read_only
 from ..base.errors import SurfaceError
 from ..curves.guides import Plane
 from . import checks
-from .geometry import bounding_size
 from .held_curve import checked_curves
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes

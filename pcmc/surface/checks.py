@@ -142,7 +142,8 @@ def mesh(
     for one, two in _first_double(key):
         ends = sorted((int(start[one]), int(end[one])))
         many, faces = np.count_nonzero(key // 2 == key[one] // 2), f"faces {one // 3} and {two // 3}"
-        fault = f" is not consistently oriented: {faces} run along edge {ends} the same way; reverse one of them"
+        fault = f" is not consistently oriented: {faces} run along edge {ends} the same way;"
+        fault += " reverse one of them"
         if many > 2:
             fault = f": {many} of its faces share edge {ends} ({faces} among them);"
             fault += " split it into patches that each have at most two faces at an edge"

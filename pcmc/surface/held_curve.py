@@ -35,7 +35,7 @@ class HeldCurve:
     """
 
     curve: Curve  # with points (x, y, z)
-    vertices: Ints  # (k,) k ≥ 2, an edge of the mesh from each to the next; closed: the last is the first again
+    vertices: Ints  # (k,) k ≥ 2, each joined to the next by an edge; closed: the last is the first again
     at: Floats  # (k,) ascending, the parameter of each vertex on the curve
 
     @property
@@ -149,8 +149,9 @@ def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: fl
 def _fault(part: HeldCurve, X: Floats, topo: Topology, fixed: Bools, taken: Bools, near: float) -> str:
     """What is wrong with a curve, or nothing; ``taken`` (e,) are the edges of those before."""
     V, t = np.asarray(part.vertices), np.asarray(part.at)
-    shaped = V.ndim == 1 and len(V) > 1 and V.dtype.kind in "iu" and t.shape == V.shape and t.dtype.kind == "f"
-    if not shaped or not isinstance(part.curve, Curve) or part.curve.pieces[0].points.shape[1] != 3:
+    shaped = V.ndim == 1 and len(V) > 1 and t.shape == V.shape
+    typed = V.dtype.kind in "iu" and t.dtype.kind == "f"
+    if not shaped or not typed or not isinstance(part.curve, Curve) or part.curve.pieces[0].points.shape[1] != 3:
         return "needs a curve in space, and two or more vertices with a parameter each"
     if V.min() < 0 or V.max() >= len(X):
         return f"has vertices outside 0..{len(X) - 1}"
@@ -158,7 +159,8 @@ def _fault(part: HeldCurve, X: Floats, topo: Topology, fixed: Bools, taken: Bool
         return f"needs ascending parameters in 0..{len(part.curve.pieces)}"
     edges = topo.edge_numbers(part.edges)
     if (edges < 0).any():
-        return f"joins the vertices {part.edges[np.argmax(edges < 0)].tolist()}, which no edge of the mesh joins"
+        ends = part.edges[np.argmax(edges < 0)].tolist()
+        return f"joins the vertices {ends}, which no edge of the mesh joins"
     if taken[edges].any() or len(np.unique(edges)) < len(edges):
         return "runs along an edge that is on a curve already"
     if not fixed[V].all():

@@ -18,13 +18,6 @@ from ..base.names import checked_name
 from . import checks
 from .topology import Topology, edge_places
 
-KINDS = {
-    **{f"{key}s": ("patches", key) for key in ("tension", "pressure", "snow", "weight")},
-    "cables": ("cables", "tension"),
-    "volumes": ("rooms", "volume"),
-}
-"""The arguments of ``Surface.retensioned``: the parts of the surface that each changes, and their field."""
-
 Part = TypeVar("Part")
 
 
@@ -222,27 +215,6 @@ def room_signs(rooms: Sequence[Room], patches: Sequence[str]) -> Floats:
         for name, sign in room.patches:
             row[patches.index(validate.choice(f"room {room.name!r}: patch", name, list(patches)))] = sign
     return signs
-
-
-def all_values(surface: Any) -> dict[str, dict[str, float]]:
-    """The values of a Surface by kind and name, as ``Surface.retensioned`` takes them."""
-    return {
-        kind: {part.name: getattr(part, key) for part in getattr(surface, parts)}
-        for kind, (parts, key) in KINDS.items()
-    }
-
-
-def with_values(kind: str, parts: tuple[Any, ...], **values: Mapping[str, object] | None) -> tuple[Any, ...]:
-    """The parts, each a ``kind``, with other values of their fields; OptionError for an unknown name.
-
-    >>> with_values("patch", (Patch("roof", 1.0),), tension={"roof": 2.0}, pressure={"roof": 3.0})
-    (Patch(name='roof', tension=2.0, pressure=3.0),)
-    """
-    changes: dict[str, dict[str, object]] = {part.name: {} for part in parts}
-    for key, by_name in values.items():
-        for name, value in (by_name or {}).items():
-            changes[validate.choice(kind, name, list(changes))][key] = value
-    return tuple(replace(part, **changes[part.name]) if changes[part.name] else part for part in parts)
 
 
 def named_parts(kind: type[Part], what: str, given: Any) -> tuple[Part, ...]:

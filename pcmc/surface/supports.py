@@ -26,7 +26,7 @@ class Supports(NamedTuple):
 
     fixed: Bools  # (n,)
     on_plane: Bools  # (n,) also of vertices that are fixed
-    on_line: tuple[tuple[Guide, Bools], ...]  # as in Surface, without the lines that two planes have in common
+    on_line: tuple[tuple[Guide, Bools], ...]  # as in Surface, without the common lines of two planes
 
     @property
     def guided(self) -> Bools:
@@ -60,7 +60,8 @@ class Supports(NamedTuple):
                 lines[number] = guide, along & ~leaves
             several = (np.sum([mask for _, mask in planes], axis=0) > 1) & ~self.fixed & ~self.guided
             for meeting, rows in _by_planes(planes, several):
-                direction, along = _common_direction(meeting, int(rows[0])), np.isin(np.arange(len(fixed)), rows)
+                direction = _common_direction(meeting, int(rows[0]))
+                along = np.isin(np.arange(len(fixed)), rows)
                 if direction is None:
                     fixed |= along
                 elif direction.any():
@@ -122,9 +123,7 @@ def onto_circles(surface: Any, X: Floats) -> Floats:
     return X
 
 
-def guide_masks(
-    what: str, given: Any, n: int, kind: Any, expected: str
-) -> tuple[tuple[Support, Bools], ...]:
+def guide_masks(what: str, given: Any, n: int, kind: Any, expected: str) -> tuple[tuple[Support, Bools], ...]:
     """The supports of a mapping or of pairs, each with the (n,) mask of its vertices."""
     pairs = given.items() if isinstance(given, Mapping) else given
     if not isinstance(pairs, Iterable):
@@ -181,7 +180,8 @@ def checked_planes(
     """
     near, planes = NEAR * bounding_size(X), list[tuple[Plane, Bools]]()
     expected = "a mapping from Planes to vertices"
-    for plane, mask in guide_masks("on_planes", given, len(X), Plane, expected):
+    pairs: tuple[tuple[Plane, Bools], ...] = guide_masks("on_planes", given, len(X), Plane, expected)
+    for plane, mask in pairs:
         height = plane.height(X)
         there = topo.on_boundary & (np.abs(height) <= max(near, 1e-309))
         mask |= there if plane.mirror else there & fixed
@@ -190,7 +190,9 @@ def checked_planes(
             continue
         sides = before, behind = int((height > near).sum()), int((height < -near).sum())
         if before and behind:
-            text = f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind;"
+            text = (
+                f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind;"
+            )
             text += " keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
             raise SurfaceError(text, what="on_planes", where=str(plane), found=sides)
         refuse_in_mirror(plane, mask, F, patch, names)

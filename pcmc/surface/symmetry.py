@@ -1,11 +1,11 @@
-"""A symmetric surface: the part on one side of a plane, and the whole that a part with mirror planes stands for."""
+"""A symmetric surface: its part on one side of a plane, and the whole that such a part stands for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -67,7 +67,10 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     number[vertices] = np.arange(len(vertices))
     patches, patch = np.unique(surface.patch_of_face[stays], return_inverse=True)
     given, edges = surface.given_supports, surface.topology.edges
-    pairs = [[(g, mask[vertices]) for g, mask in all_ if mask[vertices].any()] for all_ in _guides(surface)]
+    planes, lines = (
+        [(guide, mask[vertices]) for guide, mask in pairs if mask[vertices].any()]
+        for pairs in (surface.on_planes, given.on_line)
+    )
     left = np.zeros(len(edges), dtype=bool)
     left[surface.topology.edge_of_face[stays]] = True
     X = np.where((side == 0)[:, None], plane.nearest(surface.vertices), surface.vertices)
@@ -78,16 +81,12 @@ def cut(surface: Surface, plane: Plane) -> Surface:
         patches=tuple(surface.patches[p] for p in patches),
         fixed=given.fixed[vertices],
         on_plane=given.on_plane[vertices],
-        on_line=pairs[1],
-        on_planes=(*pairs[0], (plane, side[vertices] == 0)),
+        on_line=lines,
+        on_planes=(*planes, (plane, side[vertices] == 0)),
         cables=_cut_cables(surface, side, number),
         rooms=_cut_rooms(surface, stays),
         curves=surface.edges_on_curves[left].joined(number[edges[left]]),
     )
-
-
-def _guides(surface: Surface) -> tuple[Sequence[tuple[Plane, Bools]], Sequence[tuple[Guide, Bools]]]:
-    return surface.on_planes, surface.given_supports.on_line
 
 
 def _cut_cables(surface: Surface, side: Ints, number: Ints) -> tuple[Cable, ...]:
@@ -108,7 +107,8 @@ def _cut_cables(surface: Surface, side: Ints, number: Ints) -> tuple[Cable, ...]
 def _cut_rooms(surface: Surface, stays: Bools) -> tuple[Room, ...]:
     """The rooms of the part that stays; of one that the plane cuts, half the volume."""
     left, gone = (
-        {surface.patches[p].name for p in np.unique(surface.patch_of_face[faces])} for faces in (stays, ~stays)
+        {surface.patches[p].name for p in np.unique(surface.patch_of_face[faces])}
+        for faces in (stays, ~stays)
     )
     rooms = []
     for room in surface.rooms:
@@ -244,8 +244,8 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
 
     Planes whose images never end, or cross the piece, are refused: there the whole would cover itself.
     """
-    images = [Image(np.eye(3), np.zeros(3))]
-    reflections = []
+    images, reflections = [Image(np.eye(3), np.zeros(3))], []
+    near = 1e2 * NEAR * surface.size
     for plane in planes:
         normal = np.array(plane.normal)
         R, t = np.eye(3) - 2.0 * np.outer(normal, normal), 2.0 * np.dot(normal, plane.point) * normal
@@ -255,7 +255,8 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
         for reflection, numbers in zip(reflections, next_to, strict=True):
             new = image.after(reflection)
             same = [
-                np.abs(new.R - old.R).max() <= ALIKE and np.abs(new.t - old.t).max() <= 1e3 * NEAR * surface.size
+                np.abs(new.R - old.R).max() <= ALIKE
+                and np.abs(new.t - old.t).max() <= 1e3 * NEAR * surface.size
                 for old in images
             ]
             if not any(same):
@@ -263,12 +264,14 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
                 same.append(True)
             numbers.append(same.index(True))
         if len(images) > MOST_IMAGES:
-            text = "the images in the mirror planes never end: some planes are parallel, or no whole number of"
+            text = (
+                "the images in the mirror planes never end: some planes are parallel, or no whole number of"
+            )
             text += " images fits around their line; name those to unfold at: mirrored(surface, planes=[…])"
             raise SurfaceError(text, what="planes", found=len(images))
     for image in images:
         for plane in planes:
-            height, near = plane.mapped(*image).height(surface.vertices), 1e2 * NEAR * surface.size
+            height = plane.mapped(*image).height(surface.vertices)
             if (height > near).any() and (height < -near).any():
                 text = f"the images overlap: an image of the {plane} cuts through the surface; mirror planes"
                 text += " must meet at 180° over a whole number, with the surface between them"
@@ -296,7 +299,7 @@ def _add_images(
     pairs = list(pairs)
     for image, row in zip(images, place, strict=True):
         for guide, mask in pairs:
-            new = guide.mapped(*image)
+            new = cast(Held, guide.mapped(*image))
             same = [there for other, there in found if other.same_as(new, near)]
             if not same and mask.any():
                 same.append(np.zeros(int(place.max()) + 1, dtype=bool))

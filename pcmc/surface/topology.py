@@ -185,7 +185,8 @@ def edge_places(wanted: Ints, edges: Ints) -> Ints:
         return np.full(wanted.shape[:-1], -1)
     width = 1 + max(int(wanted.max(initial=0)), int(edges.max()))
     keys, sought = (
-        np.minimum(pair[..., 0], pair[..., 1]).astype(np.int64) * width + np.maximum(pair[..., 0], pair[..., 1])
+        np.minimum(pair[..., 0], pair[..., 1]).astype(np.int64) * width
+        + np.maximum(pair[..., 0], pair[..., 1])
         for pair in (edges, wanted)
     )
     order = np.argsort(keys, kind="stable")
@@ -209,11 +210,11 @@ def joined(pairs: Ints, stop: Bools, vertex_count: int) -> Iterator[tuple[Ints, 
     if not len(pairs):
         return
     # each edge end at a stopping vertex gets a vertex of its own, so that chains end there
-    split = pairs.astype(np.int64).ravel()
-    ends = np.flatnonzero(stop[split])
+    split = pairs.astype(np.int64)
+    ends = stop[split]
     original = np.concatenate([np.arange(vertex_count), split[ends]])
-    split[ends] = vertex_count + np.arange(len(ends))
-    split, count = split.reshape(-1, 2), len(original)
+    count = len(original)
+    split[ends] = np.arange(vertex_count, count)
     label = components(split, count)
     degree = np.bincount(split.ravel(), minlength=count)
     members = np.flatnonzero(degree)

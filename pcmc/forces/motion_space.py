@@ -1,0 +1,356 @@
+"""The motion space: at each vertex the directions in which moving it changes the shape.
+
+- inside a sheet: the unit vertex normal (the normalised vector area);
+- on a curve where sheets meet or end: the plane perpendicular to the curve;
+- on a cable the same, also where it runs inside a sheet or along a free edge;
+- at a point where such curves meet, where a cable ends or its tension changes, or which sheets share that
+  have no edge in common there: all three directions;
+- always within what the support allows: nothing where fixed, along the plane where sliding, or along a
+  line or circle. In a mirror plane the sheet goes on: its boundary there is no curve.
+
+The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
+tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
+A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints, Vector
+from ..base.compiled import compiled, inlined
+from ..surface import Surface
+from ..surface.geometry import (
+    accumulate,
+    add,
+    cross,
+    divided,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+    vertex_area_vectors,
+)
+from ..surface.supports import mirror_edges
+from ..surface.topology import (
+    CURVE,
+    POINT,
+    SHEET,
+    Topology,
+    curve_neighbours,
+    one_sided_copies,
+    topology,
+    vertex_kind,
+)
+from .cables import squared_cable_forces, tensions_on
+from .kernels import Mesh, energy_mesh
+from .weight import effective_tensions
+
+PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
+
+
+@dataclass(frozen=True, eq=False)
+class VertexClasses:
+    """The active faces, which exert forces, and the class of each vertex: both stay as vertices move.
+
+    Attributes
+    ----------
+    active : (m,) bool, faces with a tension or a pressure.
+    faces, patch_of_face : the active faces alone; those without pressure turned over where that gives
+        a sheet one side.
+    kind : (n,) SHEET, CURVE or POINT: how many edges end there at which active sheets meet, end, or
+        change tension, pressure or side.
+    curve, beside : (c,) vertices on a curve, and their neighbours along it (c,2).
+    idle : (n,) vertices of no active face.
+    level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
+    """
+
+    active: Bools
+    faces: Ints
+    patch_of_face: Ints
+    topology: Topology
+    kind: Ints
+    curve: Ints
+    beside: Ints
+    idle: Bools
+    level: Bools
+
+    def mesh(self, surface: Surface) -> Mesh:
+        """The active faces, with the tensions and pressures of a surface of these classes."""
+        return energy_mesh(surface)._replace(faces=self.faces, patch=self.patch_of_face)
+
+
+class MotionSpace(NamedTuple):
+    """Orthonormal basis of the motion space at each vertex; an unknown is a component along one vector.
+
+    Attributes
+    ----------
+    basis : (n,3,3) float; basis[v, c] for c < dimension[v] are unit vectors, the rest zero.
+    dimension : (n,) int, 0 to 3.
+    start : (n+1,) int, the first unknown of each vertex; the last entry is the number of unknowns.
+    """
+
+    basis: Floats
+    dimension: Ints
+    start: Ints
+
+    @classmethod
+    def of(cls, basis: Floats, dimension: Ints) -> MotionSpace:
+        """The space of a basis, with its unknowns numbered vertex by vertex."""
+        return cls(basis, dimension, np.append(0, np.cumsum(dimension)).astype(np.int64))
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.start[-1])
+
+    def to_coordinates(self, vectors: Floats) -> Floats:
+        """Bᵀ v (size,): the components of vectors (n,3) along the basis."""
+        return _to_coordinates(self, vectors)
+
+    def to_vectors(self, components: Floats) -> Floats:
+        """B s (n,3): the vectors that have these components (size,)."""
+        return _to_vectors(self, components)
+
+    def from_other(self, other: MotionSpace, components: Floats) -> Floats:
+        """Bᵀ B' s (size,): the components here of the vectors that have these in another space."""
+        return _between(other, self, components)
+
+    def project(self, vectors: Floats) -> Floats:
+        """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
+        return self.to_vectors(self.to_coordinates(vectors))
+
+
+def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | None = None) -> VertexClasses:
+    """The active faces of a surface and the classes of its vertices.
+
+    ``crest`` (k,2) leads from each junction vertex that rests on Π to its neighbours on the junction:
+    that is its curve, sharp or not, and whatever else ends there, as a standing wall does beside.
+    ``level`` (n,) marks curve vertices whose tangent is taken along Π: beside a resting vertex the
+    curve has a corner and no tangent of its own.
+
+    Two sheets of equal tension and pressure that meet with no pulling wall between them are one
+    smooth sheet: their common curve can slide along it freely and carries no motion of its own.
+    Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
+    """
+    in_room = surface.room_signs.any(axis=0)  # the pressure of a room may take any value
+    pulls = (surface.tensions != 0.0) | (surface.net_pressures != 0.0) | in_room
+    active = pulls[surface.patch_of_face]
+    faces, patch = surface.faces, surface.patch_of_face
+    if not active.all():
+        faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
+    laws = np.vstack([surface.tensions, surface.net_pressures, surface.weights, surface.room_signs])
+    kinds = np.unique(laws, axis=1, return_inverse=True)
+    alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
+    if active.all():
+        topo = replace(surface.topology, patch_of_face=alike)
+    else:
+        topo = topology(faces, alike, surface.n)
+    if (topo.one_way_edge & ~topo.seam_edge).any():
+        turned = _against_the_others(topo) & ((surface.net_pressures == 0.0) & ~in_room)[patch]
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
+        topo = topology(faces, alike, surface.n)
+    faces.setflags(write=False)  # compiled loops then see one type of array
+    patch.setflags(write=False)
+    on_curve = topo.curve_edge | topo.one_way_edge
+    if surface.on_planes:
+        on_curve = on_curve & ~mirror_edges(surface.on_planes, topo)
+    pull = tensions_on(topo, surface.cable_edges) if surface.cables else None
+    if pull is not None:
+        on_curve = on_curve | (pull > 0.0)
+    edges = topo.edges[on_curve]
+    links = np.concatenate([edges, edges[:, ::-1]])
+    if crest is not None and len(crest):
+        links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
+    curve, beside = curve_neighbours(links, surface.n)
+    kind = vertex_kind(links[:, 0], surface.n)
+    shared = topo.fans > 1
+    if pull is not None:
+        shared |= _pulled_unevenly(edges, pull[on_curve], surface.n)
+    if crest is not None:
+        shared[crest[:, 0]] = False
+    kind[shared] = POINT
+    curve, beside = curve[~shared[curve]], beside[~shared[curve]]
+    idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
+    level = np.zeros(surface.n, dtype=bool) if level is None else level
+    return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level)
+
+
+def _pulled_unevenly(edges: Ints, pull: Floats, n: int) -> Bools:
+    """(n,) vertices at which curve edges (e,2) of different line tension (e,) meet."""
+    least, most = np.full(n, np.inf), np.zeros(n)
+    np.minimum.at(least, edges, pull[:, None])
+    np.maximum.at(most, edges, pull[:, None])
+    return least < most
+
+
+def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
+    """Basis of the motion space of the surface with its vertices at X (n,3).
+
+    Of the directions that the supports admit the ones along the shape are removed.
+    """
+    freedom, axis = surface.admissible_at(X)
+    freedom = np.where(classes.idle, np.int8(0), freedom)
+    for circle, along in surface.on_circle:
+        # a curve along the circle on both sides: the polygon's chord is not quite along the tangent
+        near = surface.fixed & (circle.distance(surface.vertices) <= 1e-9 * surface.size)
+        freedom[classes.curve[along[classes.curve] & near[classes.beside].all(axis=1)]] = 0
+    chord = np.zeros_like(X)
+    chord[classes.curve] = curve_chords(surface, classes, X)
+    basis, dimension = np.zeros((surface.n, 3, 3)), np.zeros(surface.n, dtype=np.int64)
+    area_vector = vertex_area_vectors(X, classes.faces)[0]
+    _fill(classes.kind, area_vector, chord, freedom, axis, basis, dimension)
+    return MotionSpace.of(basis, dimension)
+
+
+@compiled
+def _fill(
+    kind: Ints,
+    normal: Floats,
+    chord: Floats,
+    freedom: Ints,
+    axis: Floats,
+    basis: Floats,
+    dimension: Ints,
+) -> None:
+    """The basis at each vertex, from the shape's normal or chord and what the supports admit."""
+    none = (0.0, 0.0, 0.0)
+    for v in range(len(kind)):
+        if freedom[v] == 0:
+            continue
+        # the directions that change the shape
+        along = point(normal, v) if kind[v] == SHEET else point(chord, v)
+        length = norm(along)
+        along = divided(along, length) if length > 0.0 else none
+        first, second, third, size = along, none, none, 1 if length > 0.0 else 0
+        if kind[v] == CURVE and length > 0.0:
+            pair = perpendicular_pair(along)
+            first, second, size = pair[0], pair[1], 2
+        elif kind[v] != SHEET:
+            first, second, third, size = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), 3
+        a = point(axis, v)
+        if freedom[v] == 2 and size > 0:  # within the plane across a
+            rest = cross(a, along) if size == 2 else sub(first, scaled(dot(first, a), a))
+            length = norm(rest)
+            if size == 3 or (size == 2 and length <= PARALLEL):
+                pair = perpendicular_pair(a)
+                first, second, third, size = pair[0], pair[1], none, 2
+            else:
+                size = 1 if length > PARALLEL else 0
+                first, second = divided(rest, length) if size else none, none
+        elif freedom[v] == 1:  # along a
+            across = (dot(first, a), dot(second, a), dot(third, a))
+            first, second, third, size = a, none, none, 1 if norm(across) > PARALLEL else 0
+        dimension[v] = size
+        for d in range(3):
+            if size > 0:
+                basis[v, 0, d] = first[d]
+            basis[v, 1, d], basis[v, 2, d] = second[d], third[d]
+
+
+def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
+    """(c,3) from the vertex before to the one after each curve vertex: along its tangent."""
+    chord = X[classes.beside[:, 1]] - X[classes.beside[:, 0]]
+    level = classes.level[classes.curve]
+    chord[level] = surface.plane.along(chord[level])
+    return np.asarray(chord)
+
+
+def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
+    """The norm of the single forces that cancel at rest: ½ α |e| of triangles, τ of cable edges, force.
+
+    With a weight, α + w z stands for α.
+    """
+    faces = classes.faces
+    sheets = _norm_of_forces(X, faces, effective_tensions(surface, X, faces, classes.patch_of_face))
+    if not surface.cables:
+        return sheets or 1.0
+    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) or 1.0
+
+
+def tension_forces(surface: Surface) -> float:
+    """The same norm for all triangles and cables of a surface, force; 0 without tension."""
+    X, F, patch = surface.vertices, surface.faces, surface.patch_of_face
+    sheets = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
+    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) if surface.cables else sheets
+
+
+@inlined
+def perpendicular_pair(direction: Vector) -> tuple[Vector, Vector]:
+    """Two unit vectors that complete a unit direction to a right-handed frame."""
+    x, y, z = abs(direction[0]), abs(direction[1]), abs(direction[2])
+    if x <= y and x <= z:
+        first = cross(direction, (1.0, 0.0, 0.0))
+    else:
+        first = cross(direction, (0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0))
+    first = divided(first, norm(first))
+    return first, cross(direction, first)
+
+
+@compiled
+def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
+    out = np.empty((2, len(directions), 3))
+    for v in range(len(directions)):
+        first, second = perpendicular_pair(point(directions, v))
+        for d in range(3):
+            out[0, v, d], out[1, v, d] = first[d], second[d]
+    return out[0], out[1]
+
+
+def _against_the_others(topo: Topology) -> Bools:
+    """(m,) faces to turn over so that each sheet has one side; none of a sheet that has only one."""
+    flat, m = topo.edge_of_face.ravel(), len(topo.faces)
+    smooth = (topo.valence == 2) & ~topo.seam_edge
+    hit = np.flatnonzero(smooth[flat])
+    one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
+    label = one_sided_copies(one, other, topo.one_way_edge[smooth], m)
+    return np.asarray(label[:m] > label[m:])
+
+
+@compiled
+def _norm_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
+    total = 0.0
+    for f in range(len(F)):
+        square = 0.0
+        for i in range(3):
+            edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
+            square += dot(edge, edge)
+        total += 0.25 * tension[f] ** 2 * square
+    return sqrt(total)
+
+
+@compiled
+def _to_coordinates(space: MotionSpace, vectors: Floats) -> Floats:
+    out = np.empty(space.start[-1])
+    for v in range(len(space.dimension)):
+        for c in range(space.dimension[v]):
+            out[space.start[v] + c] = dot(vector(space.basis[v, c]), point(vectors, v))
+    return out
+
+
+@compiled
+def _to_vectors(space: MotionSpace, components: Floats) -> Floats:
+    out = np.zeros((len(space.dimension), 3))
+    for v in range(len(space.dimension)):
+        for c in range(space.dimension[v]):
+            accumulate(out, v, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
+    return out
+
+
+@compiled
+def _between(space: MotionSpace, other: MotionSpace, components: Floats) -> Floats:
+    out = np.empty(other.start[-1])
+    for v in range(len(space.dimension)):
+        moved = (0.0, 0.0, 0.0)
+        for c in range(space.dimension[v]):
+            moved = add(moved, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
+        for c in range(other.dimension[v]):
+            out[other.start[v] + c] = dot(vector(other.basis[v, c]), moved)
+    return out
