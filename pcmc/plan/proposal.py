@@ -16,9 +16,9 @@ from ..surface.wall_tensions import balanced_wall
 from .corners import most_in_corners
 from .drawing import Drawing
 from .edges import cable_for
+from .layers import Label
 from .lines import Kind, Line
 from .parts import Area, CableLine, Divider, Hole, PlanData, check_count, check_keys
-from .texts import Label
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
