@@ -15,7 +15,7 @@ from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
 from ..drawings import FORMATS
 from ..meshing.walls import EDGES
-from ..plan import Area, CableLine, Divider, Hole, Plan
+from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
 from ..structure.wanted import Structure
@@ -159,7 +159,7 @@ def _mesh_keys() -> tuple[Key, ...]:
 def _mesh_patch_keys() -> tuple[Key, ...]:
     """The keys of a patch of a mesh, with the sentences of a plan's."""
     wall = Key("wall", "true or false", None, "whether it is a wall between rooms")
-    return (*(Key(k.name, k.kind, None, k.help) for k in _of_class(Area) if k.name in PATCH_KEYS), wall)
+    return (*(Key(k.name, k.kind, None, k.help) for k in _of_class(PatchSpec) if k.name in PATCH_KEYS), wall)
 
 
 def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
@@ -179,7 +179,7 @@ def main_sections() -> tuple[Section, ...]:
     plan = {"outline": "a curve", "dividers": curves, "holes": curves, "patches": "a table"}
     plan |= {"supports": "a list of points and curves", "plane": "a table", "cables": "a list of tables"}
     plan |= {"mirrors": "a list of curves or tables", "rooms": "a table", "points": "a table"}
-    area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
+    area = _of_class(PatchSpec, {"at": "a point [x, y] or a list of points"})
     directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
     documents = {"drawings": "a list of names", "panels": "a text", "structure": "a text", "report": "a text"}
     return (
