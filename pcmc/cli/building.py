@@ -135,7 +135,7 @@ def draw_(
         project = arguments.load(file, units)
         roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
         say("drawing")
-        documents = _chosen(roof.documents, sheet=sheet, tolerance=tolerance)
+        documents = _chosen(roof.output, sheet=sheet, tolerance=tolerance)
         documents = replace(documents, panel_sheets=panel_sheets)
         drawings = roof.drawing_set(documents, anyway=anyway, scale=scale, heights=heights, lines=lines)
         written = projects.write_all(drawings.files(*output), say)
@@ -174,7 +174,7 @@ def report_(
         require_certified(roof.shown.certificate, anyway)
     checking.mesh_check(roof, mesh_check)
     checking.margins(roof)
-    documents = _chosen(roof.documents, tolerance=tolerance, date=date)
+    documents = _chosen(roof.output, tolerance=tolerance, date=date)
     with working() as say:
         say("laying out the pages")
         listed = {file.name: "project" if roof.result is not None else "surface"}
@@ -192,7 +192,7 @@ def _expect_force(project: projects.Project, force: str) -> None:
         raise OptionError(text, what="--force", found=force, expected=own)
 
 
-def _chosen(documents: projects.Documents, **given: Any) -> projects.Documents:
+def _chosen(documents: projects.Output, **given: Any) -> projects.Output:
     """What a project says about its documents, with what the command line says instead."""
     return replace(documents, **{name: value for name, value in given.items() if value is not None})
 
@@ -219,7 +219,7 @@ def _works(path: Path, schedule: Panels, units: Units) -> list[Any]:
     """Each file with the function that writes it."""
     if path.suffix.lower() != CSV:
         return [(path, partial(write, surface=schedule.surface, units=units))]
-    return projects.schedule_works(path, schedule)
+    return projects.schedule_jobs(path, schedule)
 
 
 def _paint(schedule: Panels, view: Any, path: Path) -> None:

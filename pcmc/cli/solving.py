@@ -95,7 +95,7 @@ def solve_(
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture, units)
-    project = projects.raised(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
+    project = projects.with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
@@ -105,7 +105,8 @@ def solve_(
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     verify = verify or project.verify
-    project = replace(project, mesh_check=wanted, verify=verify, whole=whole or project.whole)
+    written = replace(project.output, whole=whole or project.output.whole)
+    project = replace(project, mesh_check=wanted, verify=verify, output=written)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
@@ -116,7 +117,7 @@ def solve_(
     report(outcome)
     if verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
-    if project.outputs and not outcome.files:
+    if project.output.paths and not outcome.files:
         print("nothing written (use --anyway to write it)")
     if check := checking.mesh_check(outcome):
         print(f"\n{check.brief(outcome.units)}")
@@ -130,7 +131,9 @@ def _project(
     """The project, with the output files of the command line if there are any."""
     arguments.check_input(file)
     project = projects.load(file, units=units).in_folder(file.parent if folder is None else folder)
-    return replace(project, files=output or project.files, picture=picture or project.picture)
+    own = project.output
+    written = replace(own, files=output or own.files, picture=picture or own.picture)
+    return replace(project, output=written)
 
 
 def certify_(
@@ -215,8 +218,8 @@ def remesh_(
             print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
-    project = replace(_project(file, None, output, None, units), remeshing=(stage,), picture=None)
-    project = replace(project, documents=projects.Documents())
+    project = _project(file, None, output, None, units)
+    project = replace(project, remeshing=(stage,), output=projects.Output(files=project.output.files))
     with working() as say:
         outcome = projects.run_project(project, say)
     report(outcome)
