@@ -6,7 +6,7 @@ import math
 
 from ..base import validate
 from ..base.errors import SurfaceError
-from ..energy.functional import energy
+from ..forces.functional import energy
 from ..surface import Surface
 from .certificate import Certificate, certify
 

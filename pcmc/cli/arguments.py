@@ -14,12 +14,11 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
-from ..energy.rooms import refuse_varied_pressure
+from ..forces.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY
 from ..project import Outcome, Project
 from ..project.output import OnStep
 from ..surface import Surface
-from ..surface.wall_pressures import with_pressures
 
 TOML, DXF = ".toml", ".dxf"
 
@@ -102,8 +101,7 @@ class Loads:
         loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
         pressures = by_name(loaded, self.pressure, "--pressure")
         refuse_varied_pressure(surface, map(surface.patch_index, pressures))
-        return with_pressures(
-            surface,
+        return surface.retensioned(
             by_name(loaded, self.tension, "--tension"),
             pressures,
             weights=by_name(sheets, self.weight, "--weight"),

@@ -16,8 +16,8 @@ from ..base.units import Units
 from ..certificate.required import require_certified
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
-from ..panels import Panels, fewer_families
-from ..panels.schedule import MIRROR_IMAGES
+from ..panelling import Panels, fewer_families
+from ..panelling.schedule import MIRROR_IMAGES
 from ..report.document import check_suffix as check_report
 from . import NOT_CERTIFIED, OK, arguments, checking
 from .arguments import MANY_FILES, Cache, FileUnits, Input, ViewName, Whole, number, option

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import energy_and_gradient
+from ..forces.functional import energy_and_gradient
 from ..surface import Surface
 
 DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ

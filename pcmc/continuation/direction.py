@@ -17,10 +17,10 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import apply_supports, weighted
-from ..energy.rooms import prescribed_volumes, refuse_varied_pressure
+from ..forces.functional import apply_supports, weighted
+from ..forces.rooms import prescribed_volumes, refuse_varied_pressure
 from ..surface import Surface
-from ..surface.wall_pressures import wall_pressure_changes, with_pressures
+from ..surface.values import wall_changes
 from .loads import Loads
 
 KINDS = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
@@ -35,7 +35,7 @@ class Direction:
     ----------
     tensions : weight w_i by patch name.
     pressures : weight u_i by patch name. The pressure of a wall that is not named changes with the
-        difference between its rooms, as in ``pcmc.surface.wall_pressures.with_pressures``. Snow stays.
+        difference between its rooms, as in ``Surface.retensioned``. Snow stays.
     weights, snows : rates of the self-weight and of the snow by patch name; walls under snow follow, too.
     cables : rate of the tension by the cable's name.
     volumes : weight v_r by the name of a room of prescribed volume, whose pressure is a result.
@@ -86,7 +86,7 @@ class Direction:
         v = _volume_rates(surface, self.volumes)
         loads = Loads.of(surface, self.weights, self.cables, self.snows)
         value = 0.0 if self.relative else _common_value(surface, w, u, v, loads)
-        followed = wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
+        followed = wall_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
         # zero, and not only to rounding: so a value of λ that is asked for gives exactly the values named
         a, b, c = (
             values if self.relative else np.where(rates != 0.0, 0.0, values)
@@ -104,7 +104,7 @@ class Direction:
             raise OptionError(message, what="parameter", where=name, found=0.0)
         loads.check()
         loads = loads.line(self.relative).with_walls(surface, value)
-        with_pressures(surface, snows=loads.at(value + 1.0)["snows"])  # refuses snow beside free edges
+        surface.retensioned(snows=loads.at(value + 1.0)["snows"])  # refuses snow beside free edges
         return ParameterLine(value, a, b, w, u, c, v, loads)
 
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import gradient_by, weighted
-from ..energy.weight import moments
+from ..forces.functional import gradient_by, weighted
+from ..forces.weight import moments
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from ..surface.wall_pressures import wall_pressure_changes
+from ..surface.values import wall_changes
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Loads:
         snows = {load.index: load.rate for load in self.parts if load.kind == "snow"}
         rates = np.zeros(len(surface.patches))
         rates[list(snows)] = list(snows.values())
-        follow = wall_pressure_changes(surface, rates, snows)
+        follow = wall_changes(surface, rates, snows)
         names = {surface.patches[k].name: float(follow[k]) for k in np.flatnonzero(follow)}
         walls = Loads.of(surface, {}, {}, names).parts
         at_zero = (replace(load, start=load.start - load.rate * value) for load in walls)

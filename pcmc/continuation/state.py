@@ -10,23 +10,23 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..contact.pull import excess_pull
-from ..energy.functional import (
+from ..forces.functional import (
     apply_supports,
     energy_and_gradient,
     energy_at,
     onto_circles,
 )
-from ..energy.jacobian import Linearisation, linearise
-from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.rooms import (
+from ..forces.jacobian import Linearisation, linearise
+from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.rooms import (
     prescribed_volumes,
     volume_gradients_at,
     volumes_at,
     with_room_pressures,
 )
-from ..energy.second_variation import assemble
-from ..energy.volume_below import volume_below_gradient, volumes_below
+from ..forces.second_variation import assemble
+from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser

@@ -14,8 +14,8 @@ from typing import Any
 
 from ..base.errors import NoBranch, SurfaceError
 from ..base.interrupts import stop_requested
-from ..energy.rigid_motions import rigid_modes, rigid_motions
-from ..energy.rooms import room_pressures
+from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
 from ..solvers import solve

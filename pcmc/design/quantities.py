@@ -18,8 +18,8 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..certificate.curve_tables import sides_at
 from ..certificate.reactions import SupportForces, support_forces
-from ..energy.functional import weighted
-from ..energy.volume_below import volume_below_gradient, volumes_below
+from ..forces.functional import weighted
+from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d
 from . import cable_quantities

@@ -29,16 +29,16 @@ from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, place_wall_rows, standing_part
 from ..contact.pull import excess_pull
-from ..energy.functional import energy_and_gradient, gradient_by
-from ..energy.jacobian import Linearisation, linearise
-from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.pattern import hessian_pattern
-from ..energy.rooms import prescribed_volumes, volume_defects, volume_gradients_at
-from ..energy.second_variation import assemble
+from ..forces.functional import energy_and_gradient, gradient_by
+from ..forces.jacobian import Linearisation, linearise
+from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.pattern import hessian_pattern
+from ..forces.rooms import prescribed_volumes, volume_defects, volume_gradients_at
+from ..forces.second_variation import assemble
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface
-from ..surface.wall_pressures import wall_pressure_changes
+from ..surface.values import wall_changes
 from .quantities import Measurement, room_index
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
@@ -148,7 +148,7 @@ def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Paramete
     if parameter.kind not in ("pressure", "snow"):
         return one
     named = {surface.patch_index(name) for p in parameters if p.kind == parameter.kind for name in p.names}
-    return one + wall_pressure_changes(surface, one, named)
+    return one + wall_changes(surface, one, named)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..base import validate
 from ..base.errors import OptionError
-from ..energy.rooms import refuse_varied_pressure
+from ..forces.rooms import refuse_varied_pressure
 from ..quantities import dimension_of
 from ..surface import Surface
 from .quantities import MEASURES, Measurement, room_index

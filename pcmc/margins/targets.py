@@ -21,7 +21,7 @@ from ..certificate.certificate import TOLERANCE
 from ..design import Target, meet, sensitivities  # from here they know the margin
 from ..design.measurement import Measurement
 from ..design.quantities import MEASURES, Measure
-from ..energy.functional import gradient_by
+from ..forces.functional import gradient_by
 from ..surface import Surface
 from .edge import Margin, margin
 from .ending import MarginEnd

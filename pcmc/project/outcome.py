@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..margins import Margin
-    from ..panels import Panels
+    from ..panelling import Panels
     from ..quantities import Figure
     from ..report import RoofReport
     from ..structure import StructuralModel
@@ -189,7 +189,7 @@ class Outcome:
         self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
     ) -> Panels:
         """The schedule of the panels of what is shown; see ``pcmc.panels``."""
-        from ..panels import panels
+        from ..panelling import panels
 
         surface, certificate = self.shown
         options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
@@ -274,10 +274,9 @@ class Outcome:
         from ..accuracy import check_mesh  # takes long to import
 
         def check() -> MeshCheck | None:
-            accurate = self.accurate
-            if accurate is not None and accurate.surface is self.surface and not self.unfold:
-                if accurate.check is not None:
-                    return accurate.check
+            found = None if self.unfold else self.accurate
+            if found is not None and found.check is not None and found.surface is self.surface:
+                return found.check
             given = self.result if self.result is not None and not self.unfold else self.shown.surface
             try:
                 callback = _reporter("mesh check", progress)

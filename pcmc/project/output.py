@@ -13,8 +13,8 @@ from ..base.errors import FileError, FileWarning, PcmcError
 from ..base.files import PathLike, atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
-from ..energy.curvature import curvature_error, mean_curvature
-from ..panels import Panels
+from ..forces.curvature import curvature_error, mean_curvature
+from ..panelling import Panels
 from ..surface import Surface
 from .settings import check_picture, schedule_paths
 

@@ -15,7 +15,7 @@ from ..base.arrays import Floats
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
 from ..certificate.certificate import Certificate
-from ..energy.curvature import curvature_error, mean_curvature
+from ..forces.curvature import curvature_error, mean_curvature
 from ..structure import write_structure
 from ..surface import Surface, unfolded
 from . import cache

@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 from .. import io
 from ..base.errors import OptionError, unknown
 from ..base.files import PathLike, as_path, read_bytes
-from ..energy.rooms import refuse_varied_pressure
+from ..forces.rooms import refuse_varied_pressure
 from ..surface import Surface
-from ..surface.renewed import KINDS, all_values
-from ..surface.wall_pressures import with_pressures
+from ..surface.values import KINDS, all_values
 from .checking import in_file
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, project_of, read_data
@@ -212,7 +211,7 @@ def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float])
         given[kind][part] = values[name]
     with in_file(source.path, OptionError):
         refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
-        return with_pressures(surface, **given)
+        return surface.retensioned(**given)
 
 
 def _names(surface: Surface) -> dict[str, tuple[str, str]]:

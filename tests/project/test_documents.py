@@ -15,7 +15,7 @@ from refusals import refused
 import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError
-from studies import calculix
+from studies.reference import calculix
 from tests.report.test_report import words_of
 
 ROOF = Path(__file__).resolve().parents[2] / "notebooks" / "roof.toml"

@@ -88,7 +88,7 @@ def test_a_run_with_all_outputs_computes_each_finding_once(folder, monkeypatch):
         "pcmc.project.outcome.certify",
         "pcmc.certificate.required.certify",
         "pcmc.certificate.certify",
-        "pcmc.panels.panels",
+        "pcmc.panelling.panels",
         "pcmc.drawings.drawing_set.panels",
         "pcmc.report.document.panels",
         "pcmc.accuracy.check_mesh",

