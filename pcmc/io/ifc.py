@@ -21,7 +21,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
 from ..base.units import NEWTONS, TABLE, Units, length_factor
-from ..energy.functional import patch_areas
+from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.origin import file_origin
 from .libraries import load_library
@@ -301,7 +301,7 @@ def read(path: Path) -> MeshData:
     """The surface in a file that pcmc wrote; other .ifc files are refused."""
     if find_spec("ifcopenshell") is None:
         raise MissingExtra("ifcopenshell", "ifc")
-    arrays = read_arrays("ifc", path)
+    arrays = read_arrays("io/reading_surfaces.py", "ifc_arrays", path)
     if arrays["text"] is None or not arrays["parts"]:
         text = "pcmc reads only .ifc files that it wrote; export the mesh of the roof as .obj or .3dm"
         raise FileError(text, where="Pcmc_Surface")

@@ -18,28 +18,17 @@ from ..base.errors import FileError
 
 SECONDS, PACE = 30.0, 1e6  # time limit of a file: this, and one more for so many bytes
 MEMORY = 100  # bytes for each byte of the file, which may be compressed
-READERS = {
-    "vtk": ("reading_surfaces", "vtk_arrays"),
-    "rhino": ("reading_surfaces", "rhino_arrays"),
-    "ifc": ("reading_surfaces", "ifc_arrays"),
-    "dxf drawing": ("reading_drawings", "dxf_entities"),
-    "3dm drawing": ("reading_drawings", "rhino_entities"),
-    "meshlab": ("reading_meshes", "meshlab_arrays"),
-    "repair": ("reading_meshes", "repaired_arrays"),
-}
-"""The file beside this one and the function in it that read a kind: a path in, plain values out."""
 
 _lock = threading.Lock()
 _processes: dict[int, ChildProcess] = {}  # by the process that started it: a fork starts its own
 
 
-def read_arrays(kind: str, path: Path) -> dict[str, Any]:
-    """What the reader of this kind in ``READERS`` returns.
+def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
+    """The plain values that a function in a script of this package, such as io/reading_meshes.py, returns.
 
     FileError if the library refuses the file, crashes or takes too long.
     """
-    file, function = READERS[kind]
-    place, size = Path(__file__).with_name(f"{file}.py"), path.stat().st_size
+    place, size = Path(__file__).parents[1] / script, path.stat().st_size
     limit = SECONDS + size / PACE
     with _lock:
         process = _processes.get(os.getpid())

@@ -141,7 +141,7 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     with tempfile.TemporaryDirectory() as folder:
         request = Path(folder) / "mesh.npz"
         np.savez(request, **values)
-        answer = read_arrays("repair", request)
+        answer = read_arrays("io/reading_meshes.py", "repaired_arrays", request)
     kept, patch = np.unique(answer["patch"], return_inverse=True)  # one may have vanished
     clean = MeshData(
         answer["points"], answer["faces"], patch, tuple(data.patches[k] for k in kept), plane=data.plane
@@ -191,7 +191,7 @@ def _read(path: Path) -> MeshData:
 def read(path: Path) -> MeshData:
     """Every mesh of the file; meshes of one name are one patch."""
     require_meshlab()
-    found = enumerate(read_arrays("meshlab", path)["meshes"], 1)
+    found = enumerate(read_arrays("io/reading_meshes.py", "meshlab_arrays", path)["meshes"], 1)
     meshes = [(Path(m["name"]).stem or f"mesh {k}", m["points"], m["faces"]) for k, m in found]
     return Metadata().of_meshes(meshes, path.stem)
 

@@ -106,7 +106,7 @@ def read(path: Path) -> MeshData:
     """Layers as patches; curves, surfaces and other objects are left out, with a note."""
     if find_spec("rhino3dm") is None:
         raise MissingExtra("rhino3dm", "files")
-    arrays = read_arrays("rhino", path)
+    arrays = read_arrays("io/reading_surfaces.py", "rhino_arrays", path)
     layers = arrays["layers"]
     X, corners, counts, named = [], [], [], []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}

@@ -58,7 +58,7 @@ def read(path: Path) -> MeshData:
     if find_spec("vtkmodules") is None or find_spec("pyvista") is None:
         raise MissingExtra("pyvista", "files")
     _check_text(path)
-    arrays = read_arrays("vtk", path)
+    arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
     corners, counts, chosen = _cells(arrays)
     metadata = parse_metadata(arrays["text"])
     points = np.asarray(arrays["points"]).reshape(-1, 3)

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..curves.pieces import to_space
-from ..energy.rooms import check_rooms
+from ..forces.rooms import check_rooms
 from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, Patch, Surface

@@ -25,6 +25,7 @@ from ..io.reading_process import read_arrays
 
 LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
 """The suffixes of drawings, and the libraries that read them."""
+READERS = {".dxf": "dxf_entities", ".3dm": "rhino_entities"}
 LARGEST = 1e12  # of a coordinate; beyond, the digits of a double are too few for a roof
 HIGHEST_DEGREE = 11  # of a NURBS curve, in Rhino
 ROUNDING = 1e-9  # of a stroke's length: pieces nearer to each other than this are joined
@@ -69,7 +70,7 @@ def read_strokes(path: Path) -> Strokes:
         raise MissingExtra(LIBRARIES[suffix], "cad")
     try:
         path.open("rb").close()
-        contents = read_arrays(f"{suffix[1:]} drawing", path)
+        contents = read_arrays("plan/reading_drawings.py", READERS[suffix], path)
         strokes = [stroke for entity in contents["entities"] for stroke in _strokes(entity)]
     except OSError as error:
         raise system_error(path, "read", error) from None

@@ -17,7 +17,7 @@ from ..curves.curves import Curve
 from ..curves.pieces import to_space
 from ..meshing.walls import UpperEdge, WallMesh, build_walls
 from ..surface import Patch, Plane, Room
-from ..surface.wall_tensions import balanced_wall
+from ..surface.values import balanced_wall
 from .draft import Draft
 from .edges import NONE
 from .lines import SNAP, Line

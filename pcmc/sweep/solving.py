@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .. import existence, solvers
 from ..base import validate
 from ..base.errors import OptionError, unknown
-from ..energy.functional import gradient
+from ..forces.functional import gradient
 from ..solvers import find_method
 from ..solvers.result import Result
 from .case_script import resolve

@@ -234,7 +234,7 @@ def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():
 
 
 def test_the_reading_process_gives_plain_values(tmp_path):
-    content = read_arrays("dxf drawing", drawing(tmp_path))
+    content = read_arrays("plan/reading_drawings.py", "dxf_entities", drawing(tmp_path))
     assert content["unit"] == 6  # metres in DXF
     assert [entity["layer"] for entity in content["entities"]] == ["outline"]
     assert len(content["entities"][0]["pieces"]) == 4
