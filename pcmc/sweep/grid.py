@@ -105,9 +105,9 @@ class Sweep:
         for name in keywords:
             if taken[name].default is inspect.Parameter.empty and name not in names:
                 raise OptionError(f"{case} needs the parameter {name!r}, which has no value", what=name)
-        check = getattr(function, "check", None)
-        for parameters in self if check is not None else ():
-            check(**parameters)
+        if (check := getattr(function, "check", None)) is not None:
+            for parameters in self:
+                check(**parameters)
 
     def __len__(self) -> int:
         return math.prod(len(values) for values in self.grid.values())
