@@ -19,7 +19,7 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
-from ..base.names import names_from_file
+from ..base.validate import names_from_file
 from ..surface import Cable, Patch, Plane, Room
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
 from .polygons import triangulate
