@@ -31,10 +31,8 @@ from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
-from .boundary_motion import BoundaryLine
 from .direction import ParameterLine
 
-Line = ParameterLine | BoundaryLine
 LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
 
@@ -51,7 +49,7 @@ class BranchMesh:
     roof : (patches,) 1 for the patches whose volumes over Π are that of the roof, 0 for walls.
     """
 
-    def __init__(self, surface: Surface, line: Line, backend: str | None = None) -> None:
+    def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
