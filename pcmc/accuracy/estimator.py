@@ -137,7 +137,7 @@ class _FineMesh:
             own = self.stiffness * self._missing(mode) ** 2
         else:
             slope = _slope(self.fine, quantity, of)
-        dual = self.system.space.to_vectors(self.system.solve(self.system.space.to_coordinates(slope)))
+        dual = self.system.of.space.to_vectors(self.system.solve(self.system.of.space.to_coordinates(slope)))
         reaction = slope - _along(self.fine, dual)
         at_held = np.abs(np.einsum("nd,nd->n", reaction, self.held))[n:]
         return np.asarray(self.stiffness * missing * self._missing(dual) + at_held + own)
@@ -146,7 +146,7 @@ class _FineMesh:
         """(e,) size of the interpolation error of a field of motions, in the motion space."""
         error = np.zeros_like(field)
         error[self.coarse.n :] = _interpolation_error(self.coarse, field)
-        space = self.system.space if self.system is not None else None
+        space = self.system.of.space if self.system is not None else None
         error = error if space is None else space.project(error)
         return np.asarray(np.linalg.norm(error[self.coarse.n :], axis=1))
 

@@ -139,9 +139,9 @@ class NewtonRun:
                     return Status.STALLED if state.at.excess_pull.any() else Status.CONVERGED
                 self._restart()
             elif self.stuck or step == self.options.iterations:
-                poor = state.quality < min(POOR, 0.5 * self.first_quality)  # which explains it
-                status = Status.STALLED if self.stuck else Status.ITERATION_LIMIT
-                return Status.DEGENERATE if poor else status
+                if state.quality < min(POOR, 0.5 * self.first_quality):  # which explains it
+                    return Status.DEGENERATE
+                return Status.STALLED if self.stuck else Status.ITERATION_LIMIT
             else:
                 if state.maintain_mesh():
                     self.stepper.second = None
