@@ -14,8 +14,8 @@ from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
-from .short_table import with_units
 from .solving import mesh_columns, row
+from .tables import with_units
 
 
 def project_sweep(
