@@ -12,23 +12,21 @@ from __future__ import annotations
 import hashlib
 import uuid
 from collections.abc import Callable, Iterable, Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra
+from ..base.errors import FileError
 from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..energy.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.origin import file_origin
-from .libraries import load_library
+from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .patch_meshes import patch_meshes
-from .reading_process import read_arrays
 
 SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
 TIME = "2000-01-01T00:00:00"
@@ -266,8 +264,7 @@ def _unit(
 
 def read(path: Path) -> MeshData:
     """The surface in a file that pcmc wrote; other .ifc files are refused."""
-    if find_spec("ifcopenshell") is None:
-        raise MissingExtra("ifcopenshell", "ifc")
+    require("ifcopenshell", extra="ifc")
     arrays = read_arrays("io/reading_surfaces.py", "ifc_arrays", path)
     if arrays["text"] is None or not arrays["parts"]:
         text = "pcmc reads only .ifc files that it wrote; export the mesh of the roof as .obj or .3dm"

@@ -26,7 +26,6 @@ from .polygons import from_polygons
 from .text import numbers
 
 MARK = "comment pcmc "
-RESERVED = ("x", "y", "z", "support", "patch", "vertex_indices")
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
     "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
@@ -41,11 +40,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata:
     vertex["support"] = support_of(surface).astype("u1")
     face = {"patch": surface.patch_of_face.astype("<i4")}
     for name, values in scalars.items():
-        key = re.sub(r"\s+", "_", name)
-        if key in RESERVED:
-            text = f"scalars: .ply files use the name {name!r} themselves; rename the scalar"
-            raise FileError(text, where=name, found=name)
-        (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
+        columns = vertex if len(values) == surface.n else face
+        columns[re.sub(r"\s+", "_", name)] = np.asarray(values, dtype="<f8")
     announced = [
         "".join(f"property {NAMES[column.dtype.str[1:]]} {key}\n" for key, column in columns.items())
         for columns in (vertex, face)

@@ -18,7 +18,7 @@ from pcmc.existence.attempts import Attempts
 from pcmc.existence.loads import raise_loads
 from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
-from pcmc.io.scaling import scaled_surface
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Area, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
