@@ -89,7 +89,7 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
 
 
 def _benchmark(asked: argparse.Namespace) -> int:
-    from .benchmark import main as benchmark
+    from .benchmarks.run import main as benchmark
 
     return benchmark(asked.results or HOME / "results", asked.quick)
 

@@ -6,24 +6,17 @@ from collections.abc import Iterable
 
 from pcmc.base.errors import OptionError, unknown
 
-from . import (
+from .alpha_grid import geometric, grid
+from .corners import ends
+from .coverage import bars
+from .examples import calibration, equilibria, example1, example2, example3, example4, mesh_search
+from .forces import checks
+from .gallery import surfaces
+from .questions import (
     accuracy,
-    alpha_grid,
-    alpha_grid_geometric,
-    calibration,
-    corners,
-    coverage,
-    equilibria,
-    example1,
-    example2,
-    example3,
-    example4,
     existence,
-    forces,
-    gallery,
     margins,
     mesh_check,
-    mesh_search,
     panel_families,
     refinement,
     solvers,
@@ -38,23 +31,23 @@ MODULES = (
     example2,
     example3,
     example4,
-    alpha_grid,
+    grid,
     calibration,
     mesh_search,
     equilibria,
-    alpha_grid_geometric,
-    corners,
+    geometric,
+    ends,
     stability,
     refinement,
     solvers,
     existence,
     mesh_check,
-    coverage,
+    bars,
     margins,
     accuracy,
     panel_families,
-    gallery,
-    forces,
+    surfaces,
+    checks,
     structure,
     verify,
 )

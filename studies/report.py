@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from .flow import NOISE, NOISE_RESIDUAL
+from .examples.flow import NOISE, NOISE_RESIDUAL
 from .folder import Folder, write_bytes
 from .paper import HOLDS, compare, read_measured
 

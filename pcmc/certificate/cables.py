@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..energy.cables import directions
+from ..forces.cables import directions
 from ..surface import Surface
 from ..surface.cable import Cable
 from ..surface.geometry import segment_lengths

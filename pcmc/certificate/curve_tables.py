@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints
-from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
+from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import Curve

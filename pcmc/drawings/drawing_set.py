@@ -19,7 +19,7 @@ from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified, warning_mark
-from ..panels import Panels, panels
+from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
 from ..surface.sections import Polyline, section
 from . import dxf, pdf, views

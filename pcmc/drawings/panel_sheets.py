@@ -7,8 +7,8 @@ from collections import defaultdict
 import numpy as np
 
 from ..base.arrays import Floats
-from ..panels import Panels
-from ..panels.flat import packed, turned_to_fit
+from ..panelling import Panels
+from ..panelling.flat import packed, turned_to_fit
 from .sheet import WIDTH, Line, Sheet, Text, corner, drawing_area, table_sheets
 
 

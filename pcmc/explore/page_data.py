@@ -17,11 +17,11 @@ from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
-from ..energy.curvature import curvature_error, mean_curvature
+from ..forces.curvature import curvature_error, mean_curvature
 from ..margins import Margin
 from ..margins.varied import named
-from ..panels.distance import difference
-from ..panels.families import family_of_face
+from ..panelling.distance import difference
+from ..panelling.families import family_of_face
 from ..project.values import values_of
 from ..quantities import dimension_of
 from ..surface import Patch, Surface

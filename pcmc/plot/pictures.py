@@ -21,7 +21,7 @@ from .raster import paint
 from .scene import Drawing, View, mean_edge, scene, view_of
 
 if TYPE_CHECKING:
-    from ..panels import Panels
+    from ..panelling import Panels
 
 ViewName = str | tuple[float, float]
 

@@ -19,7 +19,7 @@ from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate
 from ..certificate.required import certified, warning_mark
-from ..panels import Panels, panels
+from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..quantities import Figure
 from ..surface import Surface, expect_surface

@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..base.units import Units
 from ..certificate import Certificate
-from ..panels import Panels
+from ..panelling import Panels
 from ..quantities import Figure, dimension_of
 from ..surface import Surface
 

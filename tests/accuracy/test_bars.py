@@ -8,8 +8,9 @@ import pytest
 from pcmc import MeshVerdict, check_mesh, solve, solve_to_accuracy
 from pcmc.accuracy.adaptive import AccuracyStatus
 from pcmc.accuracy.extrapolation import extrapolate
-from studies import coverage_forms, coverage_weights
-from studies.coverage import STUDY
+from studies.coverage import forms as coverage_forms
+from studies.coverage import weights as coverage_weights
+from studies.coverage.bars import STUDY
 from studies.folder import Folder
 from studies.study import perform
 

@@ -26,7 +26,7 @@ from pcmc.sweep import run as run_sweep
 from pcmc.sweep import solve_case
 from pcmc.sweep.projects import project_sweep
 from studies.folder import Folder
-from studies.mesh_check import STUDY
+from studies.questions.mesh_check import STUDY
 from studies.study import perform
 
 

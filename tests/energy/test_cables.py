@@ -18,16 +18,16 @@ from pcmc import Cable, Direction, Parameter, Patch, Plane, Surface, Target, Ver
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate.balance import load_ratio, unbalanced
 from pcmc.design.targets import measure
-from pcmc.energy.functional import energy_and_gradient, energy_at
-from pcmc.energy.motion_space import vertex_classes
-from pcmc.energy.second_variation import hessian
+from pcmc.forces.functional import energy_and_gradient, energy_at
+from pcmc.forces.motion_space import vertex_classes
+from pcmc.forces.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
 from pcmc.quantities import figures
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.surface.topology import CURVE, POINT, SHEET
-from studies import evolver
+from studies.reference import evolver
 
 ALONE = {"a": 0.0, "b": 0.0}
 TERMS = {

@@ -8,7 +8,7 @@ import pcmc
 from generators import two_squares
 from pcmc.explore.page_data import families_drawn, fields
 from pcmc.explore.session import State
-from pcmc.panels.families import ALIKE, family_of_face
+from pcmc.panelling.families import ALIKE, family_of_face
 from pcmc.surface.geometry import edge_vectors
 
 

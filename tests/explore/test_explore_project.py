@@ -18,7 +18,7 @@ from pcmc.design.targets import measure
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session
 from pcmc.explore.variants import figures_data
-from pcmc.panels.distance import difference
+from pcmc.panelling.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
 

@@ -23,7 +23,7 @@ from pcmc.explore import saving
 from pcmc.explore.requests import RequestError
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
-from pcmc.panels.distance import difference
+from pcmc.panelling.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
 

@@ -15,7 +15,7 @@ from pictures import near
 from generators import spherical_cap, two_squares
 from pcmc import explore
 from pcmc.base.units import Units
-from pcmc.panels.families import family_of_face
+from pcmc.panelling.families import family_of_face
 from pcmc.plan import Plan
 
 CAP = spherical_cap(edge_length=0.25)

@@ -7,10 +7,10 @@ from volume_cases import cap, cylinder, raised
 import generators
 import pcmc
 from pcmc import Line, Patch, Room, Surface
-from pcmc.energy.rooms import prescribed_volumes, room_pressures, room_volumes, with_room_pressures
+from pcmc.forces.rooms import prescribed_volumes, room_pressures, room_volumes, with_room_pressures
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
-from studies import evolver
+from studies.reference import evolver
 
 
 def test_meshes_made_from_a_surface_keep_its_rooms():

@@ -12,7 +12,7 @@ from generators.catenary import FOLD
 from pcmc import certify, margin, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.margins import MarginEnd
-from studies import evolver
+from studies.reference import evolver
 
 
 def cap(alpha=0.75, edge_length=0.2):

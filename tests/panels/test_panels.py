@@ -15,10 +15,10 @@ from generators import two_caps, two_squares
 from pcmc import Patch, Surface
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.cli import main
-from pcmc.panels.distance import distances
-from pcmc.panels.families import families
+from pcmc.panelling.distance import distances
+from pcmc.panelling.families import families
 from pcmc.surface.geometry import edge_vectors, face_areas
-from studies import panel_families
+from studies.questions import panel_families
 from studies.study import perform
 
 TURNS = [[0, 1, 2], [1, 2, 0], [2, 0, 1]]

@@ -88,7 +88,7 @@ def test_a_run_with_all_outputs_computes_each_finding_once(folder, monkeypatch):
         "pcmc.project.outcome.certify",
         "pcmc.certificate.required.certify",
         "pcmc.certificate.certify",
-        "pcmc.panels.panels",
+        "pcmc.panelling.panels",
         "pcmc.drawings.drawing_set.panels",
         "pcmc.report.document.panels",
         "pcmc.accuracy.check_mesh",
@@ -109,7 +109,7 @@ def test_a_mesh_check_that_fails_is_in_the_report(folder, monkeypatch):
     roof = project.run("roof.toml")
     assert roof.mesh_check is None
     assert roof.mesh_failure == "too many triangles"
-    story = roof.report(roof.documents, files={})._story
+    story = roof.report(roof.output, files={})._story
     shown = [
         getattr(part, "text", "")
         for part in story(dict.fromkeys(("The roof", "Elevation", "Reactions"), PNG))

@@ -18,7 +18,7 @@ from starts import (
 )
 
 from pcmc import solve
-from studies import evolver
+from studies.reference import evolver
 
 pytestmark = [
     pytest.mark.skipif(not evolver.available(), reason="evolver is not installed"),

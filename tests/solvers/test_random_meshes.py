@@ -10,7 +10,7 @@ import pcmc
 from pcmc import Patch, Surface, Verdict, solvers
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, PcmcError, SurfaceError
 from pcmc.meshing.refinement import refine
-from studies import evolver
+from studies.reference import evolver
 
 METHODS = (
     {"method": "newton", "iterations": 15},

@@ -14,8 +14,9 @@ from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, Wind
 from pcmc.certificate.balance import load
 from pcmc.certificate.reactions import reactions
 from pcmc.surface.geometry import face_areas
-from studies import calculix, structure
-from studies.calculix import CalculixError
+from studies.questions import structure
+from studies.reference import calculix
+from studies.reference.calculix import CalculixError
 from tests.surface.test_circles import roofs
 from tests.surface.test_lines import squares
 

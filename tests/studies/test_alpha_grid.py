@@ -8,10 +8,12 @@ import pytest
 
 from pcmc import solve
 from pcmc.solvers.result import Status
-from studies import alpha_grid, alpha_grid_branches, alpha_grid_geometric
-from studies.alpha_grid_branches import branch_case, branches, equilibrium, finer_case, starts, weakening_case
-from studies.alpha_grid_geometric import CATEGORIES, explained
-from studies.alpha_grid_sentences import sentences
+from studies.alpha_grid import branches as alpha_grid_branches
+from studies.alpha_grid import geometric as alpha_grid_geometric
+from studies.alpha_grid import grid as alpha_grid
+from studies.alpha_grid.branches import branch_case, branches, equilibrium, finer_case, starts, weakening_case
+from studies.alpha_grid.geometric import CATEGORIES, explained
+from studies.alpha_grid.sentences import sentences
 from studies.folder import Folder
 from studies.study import perform
 

@@ -12,22 +12,15 @@ import pytest
 
 from generators import spherical_cap_exact, two_squares
 from pcmc import hessian
-from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.sweep import Sweep
-from studies import (
-    benchmark,
-    benchmark_explore,
-    benchmark_height,
-    benchmark_scaling,
-    benchmark_solver,
-    benchmark_sweep,
-    evolver,
-)
 from studies.__main__ import main
-from studies.alpha_grid import TENSIONS
-from studies.benchmark_solver import Step
+from studies.alpha_grid.grid import TENSIONS
+from studies.benchmarks import explore, height, run, scaling, solver, sweep
+from studies.benchmarks.solver import Step
+from studies.benchmarks.timing import Row, median, median_seconds, peak_bytes
 from studies.orders import richardson
-from studies.timing import Row, median, median_seconds, peak_bytes
+from studies.reference import evolver
 
 TIMES = (
     *("build_seconds", "solve_seconds", "solve_processor_seconds", "solve_gigabytes", "solve_peak_gigabytes"),
@@ -39,15 +32,15 @@ HOME = Path(__file__).resolve().parents[2]
 @pytest.fixture
 def small(monkeypatch):
     """Every benchmark at its least."""
-    monkeypatch.setattr(benchmark, "FEW", 3)
-    monkeypatch.setattr(benchmark, "REPEATS", 1)
-    monkeypatch.setattr(benchmark_solver, "QUICK", 4)
-    monkeypatch.setattr(benchmark_solver, "DESIGN", 3)
-    monkeypatch.setattr(benchmark_solver, "SCRIPT_STEPS", 1)
-    monkeypatch.setattr(benchmark_scaling, "FEW", (3, 4, 6))
-    monkeypatch.setattr(benchmark_sweep, "FEW", (4.0,))
-    monkeypatch.setattr(benchmark_sweep, "SHORT", 2)
-    monkeypatch.setattr(benchmark_explore, "STEPS", 3)
+    monkeypatch.setattr(run, "FEW", 3)
+    monkeypatch.setattr(run, "REPEATS", 1)
+    monkeypatch.setattr(solver, "QUICK", 4)
+    monkeypatch.setattr(solver, "DESIGN", 3)
+    monkeypatch.setattr(solver, "SCRIPT_STEPS", 1)
+    monkeypatch.setattr(scaling, "FEW", (3, 4, 6))
+    monkeypatch.setattr(sweep, "FEW", (4.0,))
+    monkeypatch.setattr(sweep, "SHORT", 2)
+    monkeypatch.setattr(explore, "STEPS", 3)
 
 
 @pytest.mark.slow
@@ -79,9 +72,9 @@ def test_a_step_is_newtons():
     surface = two_squares(4, alpha_aux=1.0)
     space = motion_space(surface, vertex_classes(surface), surface.vertices)
     B = np.stack([space.to_vectors(e).ravel() for e in np.eye(space.size)], axis=1)
-    forces = benchmark_solver.energy_and_gradient(surface, surface.vertices)[1].ravel()
+    forces = solver.energy_and_gradient(surface, surface.vertices)[1].ravel()
     expected = -B @ np.linalg.solve(B.T @ hessian(surface).toarray() @ B, B.T @ forces)
-    for backend in benchmark_solver.available():
+    for backend in solver.available():
         step = Step(surface, backend)
         np.testing.assert_allclose(step().ravel(), expected, atol=1e-10 * np.abs(expected).max())
         np.testing.assert_array_equal(step(), step())
@@ -97,7 +90,7 @@ def test_the_programs_faster_form_has_the_same_energy_and_steps():
 
 def test_without_the_program_the_rows_say_so(small, monkeypatch):
     monkeypatch.setattr(evolver, "PROGRAM", "no-such-program")
-    rows = benchmark_solver.newton_steps(True) + benchmark_solver.from_start_to_rest(True)
+    rows = solver.newton_steps(True) + solver.from_start_to_rest(True)
     theirs = [row for row in rows if "no-such-program" in row.what or "script" in row.what]
     assert theirs
     assert all(np.isnan(row.value) for row in theirs)
@@ -105,8 +98,8 @@ def test_without_the_program_the_rows_say_so(small, monkeypatch):
 
 
 def test_without_the_fast_backend_the_rows_say_so(small, monkeypatch):
-    monkeypatch.setattr(benchmark_solver, "available", lambda: ("superlu",))
-    rows = {row.what: row for row in benchmark_solver.newton_steps(True)}
+    monkeypatch.setattr(solver, "available", lambda: ("superlu",))
+    rows = {row.what: row for row in solver.newton_steps(True)}
     assert rows["Newton step, pardiso"].remark == "not installed"
     assert rows["Newton step, superlu"].value > 0.0
 
@@ -118,32 +111,32 @@ def test_sweeps_are_timed_whole_and_in_turn(monkeypatch):
         asked.append((sweep.case.split(":")[1], len(sweep), workers))
         return {1: 19.0, 2: 10.0}[workers]
 
-    monkeypatch.setattr(benchmark_sweep, "sweep_seconds", seconds)
-    rows = benchmark_sweep.sweeps(False)
+    monkeypatch.setattr(sweep, "sweep_seconds", seconds)
+    rows = sweep.sweeps(False)
     size = len(TENSIONS) ** 3
     assert size >= 512
     flow, geometric = ([(case, size, k) for k in (1, 2)] for case in ("flow_case", "solve_case"))
-    assert asked == flow * benchmark_sweep.REPEATS + geometric + [("flow_case", 1, 1)]
+    assert asked == flow * sweep.REPEATS + geometric + [("flow_case", 1, 1)]
     assert [row.asked for row in rows] == ["", "≤ 60", "≥ 1.7", "", "≤ 300", "≥ 1.7", ""]
     assert [row.value for row in rows if "over" in row.what] == [pytest.approx(1.9)] * 2
-    assert [row.asked for row in benchmark_sweep.sweeps(True)] == [""] * 7
+    assert [row.asked for row in sweep.sweeps(True)] == [""] * 7
 
 
 def test_the_caps_height_is_extrapolated_at_its_orders():
     exact = spherical_cap_exact().height
-    heights = benchmark_height.our_heights(benchmark_height.RINGS, benchmark_height.MESHES)
+    heights = height.our_heights(height.RINGS, height.MESHES)
     once = heights[1:] + np.diff(heights) / 3.0
     error = [np.abs(heights - exact), np.abs(once - exact)]
     assert np.log2(error[0][:-1] / error[0][1:]) == pytest.approx([2.0, 2.0], abs=0.07)
     assert np.log2(error[1][0] / error[1][1]) == pytest.approx(3.0, abs=0.15)
-    assert abs(richardson(heights, benchmark_height.ORDERS) - exact) < benchmark_height.ERROR
+    assert abs(richardson(heights, height.ORDERS) - exact) < height.ERROR
 
 
 @pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
 def test_the_programs_cap_follows_its_circle():
     exact = spherical_cap_exact().height
     for elements, order, close in (("linear", 2.0, 2e-3), ("quadratic", 3.2, 8e-6)):
-        heights, clock = benchmark_height.ladder(elements, 4, 1, steps=2)
+        heights, clock = height.ladder(elements, 4, 1, steps=2)
         error = np.abs(heights - exact)
         assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.1)
         assert error[1] < close
@@ -154,24 +147,24 @@ def test_the_growth_of_cost_is_a_slope():
     triangles = np.array([1e4, 1e5, 1e6])
     table = pd.DataFrame({"triangles": triangles} | dict.fromkeys(TIMES, 0.5))
     table = table.assign(solve_seconds=1e-6 * triangles**1.1, solve_gigabytes=1e-9 * triangles**1.2)
-    rows = {row.what: row for row in benchmark_scaling.rows(table, quick=False)}
+    rows = {row.what: row for row in scaling.rows(table, quick=False)}
     assert rows["exponent of time"].value == pytest.approx(1.1)
     assert rows["exponent of memory"].value == pytest.approx(1.2)
     assert rows["surface and solution"].value == pytest.approx(1e-6 * 1e6**1.1)
-    if benchmark_solver.available()[0] == "pardiso":
+    if solver.available()[0] == "pardiso":
         assert (rows["exponent of time"].met, rows["exponent of memory"].met) == ("yes", "no")
 
 
 def test_the_flows_workers_wait_for_no_large_library():
-    code = "import sys, studies.flow_case; print({'pandas', 'scipy.optimize'} & set(sys.modules))"
+    code = "import sys, studies.examples.flow_case; print({'pandas', 'scipy.optimize'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).stdout == b"set()\n"
 
 
 def test_a_case_that_fails_spoils_a_sweeps_time():
     halves = Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2]}, {"under": 2})
-    assert benchmark_sweep.sweep_seconds(halves, 1) > 0.0
+    assert sweep.sweep_seconds(halves, 1) > 0.0
     with pytest.raises(AssertionError):
-        benchmark_sweep.sweep_seconds(Sweep(halves.case, halves.grid, {"under": 0}), 1)
+        sweep.sweep_seconds(Sweep(halves.case, halves.grid, {"under": 0}), 1)
 
 
 def test_rows_know_what_is_asked(monkeypatch):
@@ -183,7 +176,7 @@ def test_rows_know_what_is_asked(monkeypatch):
     assert median([3.0, 1.0, 2.0]) == 2.0
     calls = []
     clock = iter([0.0, 1.0, 1.0, 4.0, 4.0, 6.0, 6.0, 6.5])  # of 1, 3, 2 and 0.5 s
-    monkeypatch.setattr("studies.timing.time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    monkeypatch.setattr("studies.benchmarks.timing.time", SimpleNamespace(perf_counter=lambda: next(clock)))
     assert median_seconds(lambda: calls.append(1), 4) == 1.5
     assert len(calls) == 5  # the first is not counted
 
@@ -194,6 +187,6 @@ def test_memory_of_this_process_is_known():
 
 def test_memory_of_a_child_does_not_hold_its_parents():
     held = np.ones(25_000_000)  # 200 MB
-    code = "from studies.timing import peak_bytes; print(peak_bytes())"
+    code = "from studies.benchmarks.timing import peak_bytes; print(peak_bytes())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HOME)
     assert not float(done.stdout) > 0.75 * held.nbytes  # NaN where the system does not tell

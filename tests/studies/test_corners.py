@@ -7,10 +7,10 @@ import pytest
 
 from generators import four_fans, three_patches, two_caps, two_squares
 from pcmc.solvers import solve
-from studies import corner_ladder as ladder
-from studies import corners
-from studies.corner_cases import CASES
-from studies.corner_ladder import LOST, PERSISTS, SADDLE, SINKS, TURNS
+from studies.corners import ends as corners
+from studies.corners import ladder
+from studies.corners.cases import CASES
+from studies.corners.ladder import LOST, PERSISTS, SADDLE, SINKS, TURNS
 
 
 def rows(values, **more):

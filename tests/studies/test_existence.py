@@ -5,8 +5,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from studies import existence
-from studies.existence import EDGES, START, STUDY, exact_tension
+from studies.questions import existence
+from studies.questions.existence import EDGES, START, STUDY, exact_tension
 from studies.study import perform
 
 KEPT = Path(__file__).resolve().parents[2] / "results" / "existence"

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies import evolver
-from studies.forces import SIDES, STUDY
-from studies.forces_cases import CASES, TRIPLE_BUBBLE
+from studies.forces.cases import CASES, TRIPLE_BUBBLE
+from studies.forces.checks import SIDES, STUDY
+from studies.reference import evolver
 from studies.study import perform
 
 KEPT = Path(__file__).resolve().parents[2] / "results" / "forces"

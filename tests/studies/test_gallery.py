@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from generators import catenoid_fold, enneper_exact
-from studies.gallery import EXAMPLES, STUDY
+from studies.gallery.surfaces import EXAMPLES, STUDY
 from studies.study import perform
 
 KEPT = Path(__file__).resolve().parents[2] / "results" / "gallery"

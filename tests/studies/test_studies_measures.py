@@ -10,11 +10,11 @@ import pytest
 
 from generators import four_fans, spherical_cap, two_caps, two_squares
 from pcmc import curvature_error, solve
-from pcmc.energy.functional import energy_and_gradient
-from studies import example1
-from studies.benchmark import numpy_energy_and_gradient
-from studies.flow import NOISE, Case, errors, start_of, turn
-from studies.mesh_search import GROUPS, groups, holders
+from pcmc.forces.functional import energy_and_gradient
+from studies.benchmarks.run import numpy_energy_and_gradient
+from studies.examples import example1
+from studies.examples.flow import NOISE, Case, errors, start_of, turn
+from studies.examples.mesh_search import GROUPS, groups, holders
 
 
 @pytest.mark.parametrize("surface", [two_squares(5), two_caps(1.2)], ids=["squares", "caps"])

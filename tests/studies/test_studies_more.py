@@ -14,12 +14,13 @@ from pcmc import sweep
 from pcmc.base.errors import OptionError, SweepError
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
-from studies import cases, refinement, solvers, stability
+from studies import cases
 from studies.cases import run_sweep
-from studies.cone import cone
-from studies.flow import NOISE
+from studies.corners.cone import cone
+from studies.examples.flow import NOISE
 from studies.folder import Folder
 from studies.orders import limit_order, slope
+from studies.questions import refinement, solvers, stability
 from studies.registry import STUDIES, chosen, of_the_paper
 from studies.study import perform
 

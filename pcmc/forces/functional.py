@@ -1,0 +1,153 @@
+"""The energy of a Surface, and its gradient with the supports applied.
+
+    E = Σ α_i A_i - Σ p_i V_i + Σ τ L + Σ w ∫ z dA   (11), (20); the paper's pressures are 1 and 0
+    A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
+    V_i = (1/6) Σ_T ⟨p, q_j × q_{j+1}⟩             (10b), positions seen from the point of Π
+
+τ L are the cables (``cables``), w ∫ z dA the patches' weights (``weight``); the paper has neither.
+
+V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.origin``) to patch i. At a
+junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
+cancel (equal patches and a wall of pressure 0; or patches of pressures p_1 and p_2 and a wall of
+p_1 - p_2, its normal pointing from room 1 to room 2), so do the sides: Σ p V is the pressures of the
+rooms times their volumes, wherever on Π the point is. Where they do not (p_1 ≠ p_2 and a wall of
+pressure 0, as (11) admits), the difference acts on the side of the cones, the triangles between junction
+and point, as it would on a wall there; E, and the shape at rest, then depend on the point.
+
+Units: E force·length, ∇E force, with tension in force/length and pressure in force/length².
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..surface import Surface, expect_surface
+from . import kernels
+from .cables import add_cables
+from .plane_pieces import add_plane_forces, add_plane_volumes
+from .weight import add_weights
+
+
+def energy(surface: Surface) -> float:
+    """E = Σ α A - Σ (p - s) V + Σ τ L + Σ w ∫ z dA, Eq. (20) with snow, cables, weights, force·length.
+
+    >>> from pcmc import Patch, Surface
+    >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]],
+    ...                [[0, 1, 2], [1, 3, 2], [3, 0, 2]], [0, 0, 0], [Patch("tent", 2.0)], fixed=[0, 1, 3])
+    >>> round(energy(tent), 12) == round(2 * (3**0.5 / 2 + 1) - 1 / 6, 12)
+    True
+    """
+    expect_surface(surface)
+    return energy_at(surface, surface.vertices)
+
+
+def energy_at(surface: Surface, X: Floats) -> float:
+    """E of the surface with its vertices at X (n,3)."""
+    areas, volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)
+    add_plane_volumes(surface, X, volumes)
+    return total(surface.tensions, areas, surface.net_pressures, volumes) + add_cables_and_weights(surface, X)
+
+
+def add_cables_and_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ τ L + Σ w ∫ z dA at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
+    return add_cables(surface, X, gradient) + add_weights(surface, X, gradient)
+
+
+def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -> float:
+    """E of the patches' areas and volumes.
+
+    Sums, not dot products: BLAS rounds those differently on different processors, and the paper's
+    flow amplifies the last digit.
+    """
+    return float((tensions * areas).sum() - (pressures * volumes).sum())
+
+
+def energy_and_gradient(
+    surface: Surface, X: Floats | None = None, *, supports: bool = True, workers: int | None = None
+) -> tuple[float, Floats]:
+    """E and ∇E (n,3) in one pass over the triangles, at X or at the surface's own vertices.
+
+    ``supports=False`` keeps the forces at held vertices, which the supports must carry.
+    """
+    X = surface.vertices if X is None else X
+    areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
+    add_plane_volumes(surface, X, volumes)
+    add_plane_forces(surface, surface.net_pressures, X, gradient)
+    further = add_cables_and_weights(surface, X, gradient)
+    if supports:
+        apply_supports(surface, gradient, X)
+    return total(surface.tensions, areas, surface.net_pressures, volumes) + further, gradient
+
+
+def gradient(surface: Surface) -> Floats:
+    """∇E (n,3), force; its squared sum is the paper's ‖∇E‖².
+
+    The seven cases of Sec. 2.3 are one sum over the triangles around a vertex, Σ α ∇A - p ∇V with
+    ∇A = ½ Σ ν × (q_{j+1} - q_j) (15a), (17a) and ∇V = (1/6) Σ q_j × q_{j+1}; the paper prints the
+    negative of the latter in (15b), (17b). What the cases add is the support: sliding vertices keep
+    the part along Π (19), fixed ones are zero.
+
+    >>> from pcmc import Patch, Surface
+    >>> pyramid = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]],
+    ...     [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4, [Patch("roof", 1.0)], fixed=range(4))
+    >>> gradient(pyramid)[4].round(6).tolist()
+    [0.0, 0.0, 1.495094]
+    """
+    expect_surface(surface)
+    return energy_and_gradient(surface)[1]
+
+
+def apply_supports(surface: Surface, vectors: Floats, X: Floats | None = None) -> Floats:
+    """Leave of vectors (n,3) what the supports allow, in place.
+
+    Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
+    along their plane at those that slide there; with the vertices at X (n,3) or where the surface has them.
+    """
+    X = surface.vertices if X is None else X
+    along = [line.along(vectors[vertices], X[vertices]) for line, vertices in surface.on_line]
+    vectors[surface.fixed] = 0.0
+    for (_, vertices), part in zip(surface.on_line, along, strict=True):
+        vectors[vertices] = part
+    for plane, sliding in surface.sliding:
+        vectors[sliding] = plane.along(vectors[sliding])
+    return vectors
+
+
+def onto_circles(surface: Surface, X: Floats) -> Floats:
+    """X (n,3) with the vertices that slide along a circle put back on it; X itself without any."""
+    circles = surface.on_circle
+    if circles:
+        X = X.copy()
+    for circle, along in circles:
+        X[along] = circle.nearest(X[along])
+    return X
+
+
+def weighted(
+    surface: Surface, tensions: Floats | float = 0.0, pressures: Floats | float = 0.0, X: Floats | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
+    alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
+    X = surface.vertices if X is None else X
+    areas, volumes, forces = kernels.measure(kernels.energy_mesh(surface, alpha, p), X)
+    return areas, add_plane_volumes(surface, X, volumes), add_plane_forces(surface, p, X, forces)
+
+
+def patch_areas(surface: Surface) -> Floats:
+    """(k,) area A_i of each patch, length²."""
+    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[0]
+
+
+def patch_volumes(surface: Surface) -> Floats:
+    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b).
+
+    With the flat pieces of ``plane_pieces`` where a boundary slides on a plane that misses the origin.
+    """
+    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
+    return add_plane_volumes(surface, surface.vertices, volumes)
+
+
+def volume(surface: Surface) -> float:
+    """Σ V_i of the energy over the patches that are no walls, length³; under a roof see ``volume_below``."""
+    return float(patch_volumes(surface)[~surface.auxiliary].sum())

@@ -1,0 +1,298 @@
+"""The volumes of rooms that are prescribed, and their gradients.
+
+The volume V of a room is the one that its patches enclose: the cones from ``Surface.origin`` to its patches,
+each with the sign of its normal, and what closes their boundary. Along edges on Π the cones' sides lie in Π;
+along edges on other sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed;
+a flat fan about its middle closes it, and adds a constant.
+
+A pressure δ in all of the room adds -δ V to E. At rest the pressures δ are those at which V is as prescribed:
+δ is the multiplier of the condition V = V̄ in
+
+    L(X, δ) = E(X) - Σ δ_r (V_r(X) - V̄_r).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.compiled import compiled
+from ..base.errors import OptionError, SurfaceError
+from ..surface import Line, Surface, expect_surface
+from ..surface.geometry import accumulate, cross, point, scaled, sub, vector
+from ..surface.room import Room
+from ..surface.topology import components
+from . import kernels
+from .functional import apply_supports
+from .motion_space import MotionSpace
+from .plane_pieces import add_plane_forces, add_plane_volumes
+
+ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
+UNCHANGED = 1e-13  # of the size, squared: a gradient of a volume that is rounding
+ON_PLANE = 1e-9  # of the size: a vertex as high as this over Π is on it
+
+
+def room_volumes(surface: Surface) -> Floats:
+    """(r,) the volume enclosed by each room of prescribed volume, length³.
+
+    Raises
+    ------
+    SurfaceError : the patches of a room leave an edge open that nothing holds.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], [[0, 1, 2], [1, 3, 2], [3, 0, 2]],
+    ...                [0, 0, 0], [Patch("tent", 2.0)], fixed=[0, 1, 3],
+    ...                rooms=[Room("all", {"tent": 1}, 1.0)])
+    >>> bool(abs(room_volumes(tent)[0] - 1 / 6) < 1e-15)
+    True
+    """
+    expect_surface(surface)
+    return volumes_at(surface, surface.vertices)
+
+
+def room_volume_gradients(surface: Surface) -> Floats:
+    """(r,n,3) ∂V_r/∂X, supports applied, length².
+
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4), rooms=[Room("all", {"roof": 1}, 1.0)])
+    >>> room_volume_gradients(roof)[0, 4].round(12).tolist()
+    [0.0, 0.0, 1.333333333333]
+    """
+    expect_surface(surface)
+    return volume_gradients_at(surface, surface.vertices)
+
+
+def volumes_at(surface: Surface, X: Floats) -> Floats:
+    """(r,) the volumes of the rooms of a surface with its vertices at X (n,3)."""
+    if not surface.rooms:
+        return np.zeros(0)
+    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)[1]
+    add_plane_volumes(surface, X, volumes)
+    return surface.room_signs @ volumes + closing_volumes(surface)
+
+
+def volume_gradients_at(surface: Surface, X: Floats) -> Floats:
+    """(r,n,3) the gradients of the rooms' volumes at X (n,3), supports applied."""
+    gradients = np.zeros((len(surface.rooms), *X.shape))
+    if len(gradients):
+        _add_gradients(kernels.energy_mesh(surface), X, np.array(surface.room_signs), gradients)
+    for gradient, signs in zip(gradients, surface.room_signs, strict=True):
+        add_plane_forces(surface, -signs, X, gradient)
+        apply_supports(surface, gradient, X)
+    return gradients
+
+
+def volume_columns(surface: Surface, space: MotionSpace, X: Floats) -> Floats:
+    """(N,r) the gradients of the rooms' volumes in the motion space, Bᵀ ∂V_r/∂X, length²."""
+    gradients = volume_gradients_at(surface, X)
+    return (
+        np.stack([space.to_coordinates(g) for g in gradients], axis=1)
+        if len(gradients)
+        else np.zeros((space.size, 0))
+    )
+
+
+def volume_defects(surface: Surface) -> Floats:
+    """(r,) (V - V̄) / |V̄|: what each room has too much of its prescribed volume, relative."""
+    wanted = prescribed_volumes(surface)
+    return (room_volumes(surface) - wanted) / np.abs(wanted)
+
+
+def prescribed_volumes(surface: Surface) -> Floats:
+    """(r,) V̄ of each room, length³."""
+    return np.array([room.volume for room in surface.rooms])
+
+
+def room_pressures(surface: Surface) -> Floats:
+    """(r,) the pressure of the air in each room, force/length²: that which fits the patches around it best.
+
+    >>> from pcmc import Patch
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 3.0, 2.0)],
+    ...                fixed=[0, 1, 2], rooms=[Room("all", {"a": -1}, 1.0)])
+    >>> room_pressures(flat).round(12).tolist()
+    [-2.0]
+    """
+    return np.asarray(np.linalg.lstsq(surface.room_signs.T, surface.pressures)[0])
+
+
+def with_room_pressures(surface: Surface, change: Floats) -> Surface:
+    """The surface with the pressure of each room changed by ``change`` (r,); walls stay walls.
+
+    >>> from pcmc import Patch
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)],
+    ...                fixed=[0, 1, 2], rooms=[Room("all", {"a": 1}, 1.0)])
+    >>> with_room_pressures(flat, np.array([0.5])).pressures.tolist()
+    [1.5]
+    """
+    pressures = surface.pressures + change @ surface.room_signs
+    pressures[surface.auxiliary & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
+    names = [patch.name for patch in surface.patches]
+    walls = surface.walls & surface.room_signs.any(axis=0)
+    new = dict(zip(names, pressures.tolist(), strict=True))
+    other = surface.retensioned(None, new, [names[k] for k in np.flatnonzero(walls)])
+    for kept in ("origin", "closing_volumes"):  # neither depends on the pressures in a room that is closed
+        if kept in vars(surface):
+            vars(other)[kept] = vars(surface)[kept]
+    return other
+
+
+def refuse_varied_pressure(surface: Surface, patches: Iterable[int]) -> None:
+    """Refuse to vary the pressure of any of these patches if it is the result of a prescribed volume."""
+    for k in patches:
+        for room in np.flatnonzero(surface.room_signs[:, k]):
+            name, patch = surface.rooms[room].name, surface.patches[k].name
+            message = f"the pressure of {patch!r} follows from the volume of room {name!r}"
+            raise OptionError(
+                f"{message}: vary that volume, or remove the room", what="parameter", where=patch
+            )
+
+
+def check_rooms(surface: Surface) -> None:
+    """Refuse rooms whose volume no solver can reach.
+
+    Raises
+    ------
+    SurfaceError : a room does not close, no motion changes its volume, a patch around it does not pull, or it
+        is closed on all sides and its volume is negative, or its normals point into it.
+    """
+    if not surface.rooms:
+        return
+    closing_volumes(surface)
+    by_motion = np.abs(room_volume_gradients(surface)).max(axis=(1, 2))
+    for room, change in zip(surface.rooms, by_motion, strict=True):
+        if change <= UNCHANGED * surface.size**2:
+            message = f"room {room.name!r}: no motion changes its volume, as supports hold all its vertices"
+            raise SurfaceError(f"{message}; free some, or remove the room", what="rooms", where=room.name)
+    for room, row, volume in zip(surface.rooms, surface.room_signs, room_volumes(surface), strict=True):
+        for k in np.flatnonzero(row):
+            patch = surface.patches[k]
+            if patch.tension == 0.0:
+                message = f"room {room.name!r}: patch {patch.name!r} has no tension and takes no pressure"
+                raise SurfaceError(f"{message}; give it one", what="rooms", where=patch.name, found=0.0)
+        if _left_over(surface, row).any():
+            continue  # the room lies on either side of Π or of its fixed boundary
+        if room.volume < 0.0:
+            message = f"room {room.name!r} is closed on all sides: its volume cannot be {room.volume:g}"
+            raise SurfaceError(
+                f"{message}; give a positive one", what="volume", where=room.name, found=room.volume
+            )
+        if volume <= 0.0:
+            message = f"room {room.name!r} has the volume {volume:g} at the start: the normals of its patches"
+            message += " point into it; give them -1 in place of 1, and 1 in place of -1"
+            raise SurfaceError(message, what="rooms", where=room.name, found=float(volume))
+
+
+def closing_volumes(surface: Surface) -> Floats:
+    """(r,) what the fans over the fixed boundaries of each room add to its cones, length³.
+
+    Computed once per surface. SurfaceError where a room has an open edge.
+    """
+    closing: Floats | None = vars(surface).get("closing_volumes")
+    if closing is None:
+        rows = zip(surface.rooms, surface.room_signs, strict=True)
+        closing = np.array([sum(_fans(surface, room, row)) for room, row in rows], dtype=float)
+        vars(surface)["closing_volumes"] = closing  # where a cached property would put it
+    return closing
+
+
+def _left_over(surface: Surface, signs: Floats) -> Floats:
+    """(e,) how often the patches of a room run along each edge one way more than the other."""
+    topo = surface.topology
+    ways = signs[surface.patch_of_face, None] * topo.sense
+    return np.bincount(topo.edge_of_face.ravel(), ways.ravel(), len(topo.edges)).astype(float)
+
+
+def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
+    """The volumes of the fans over the connected pieces of a room's fixed boundary off Π."""
+    left = _left_over(surface, signs)
+    grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size)
+    edges = surface.topology.edges
+    lying = np.asarray(grounded[edges].all(axis=1))
+    _refuse_open(surface, room, np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying)))
+    for _, mask in surface.on_planes:
+        lying |= mask[edges].all(axis=1)
+    off = np.flatnonzero((left != 0.0) & ~lying)
+    if not len(off):
+        return
+    X, count, ends = surface.vertices - surface.origin, left[off], edges[off]
+    piece = components(ends, surface.n)[ends[:, 0]]
+    for k in np.unique(piece):
+        a, b = ends[piece == k].T
+        n = count[piece == k]
+        middle = X[np.unique([a, b])].mean(axis=0)
+        yield float((n * _cones(middle, X[b], X[a])).sum())
+        net = np.zeros(surface.n)
+        np.add.at(net, b, n)
+        np.add.at(net, a, -n)
+        tips = np.flatnonzero(net)  # where it comes down to Π: closed straight from tip to tip
+        if not grounded[tips].all():
+            place = surface.vertices[tips[~grounded[tips]][0]].round(4).tolist()
+            raise SurfaceError(
+                f"room {room.name!r} does not close: its fixed boundary ends at {place}, off Π; fix it down"
+                " to Π, or choose Π (plane=) through it",
+                what="rooms",
+                where=room.name,
+                found=place,
+            )
+        if len(tips):
+            yield float((net[tips] * _cones(middle, X[tips].mean(axis=0), X[tips])).sum())
+
+
+def _closed_by_support(surface: Surface, edges: Ints, lying: Bools) -> Bools:
+    """(e,) edges that something closes: on Π or another sliding plane, fixed, or along one straight line."""
+    fixed = surface.fixed.copy()
+    for _, along in surface.on_line:
+        fixed &= ~along
+    closed = fixed[edges].all(axis=1) | (lying & surface.held[edges].all(axis=1))
+    for _, mask in surface.on_planes:
+        closed |= mask[edges].all(axis=1)
+    for line, along in surface.on_line:
+        if isinstance(line, Line):
+            on_it = along | (fixed & (line.distance(surface.vertices) <= ON_PLANE * surface.size))
+            closed |= on_it[edges].all(axis=1)
+    return np.asarray(closed)
+
+
+def _refuse_open(surface: Surface, room: Room, edges: Iterable[int]) -> None:
+    """Refuse open edges by name, the first with its place."""
+    numbers = list(edges)
+    if not numbers:
+        return
+    ends = surface.topology.edges[numbers[0]]
+    place = surface.vertices[ends].mean(axis=0).round(4).tolist()
+    raise SurfaceError(
+        f"room {room.name!r} does not close: its patches end along {len(numbers)} edges that are neither held"
+        f" on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]} near {place}; name"
+        " the patches that are missing, with 1 where the normal points out of the room and -1 where it points"
+        " in, or hold that edge",
+        what="rooms",
+        where=room.name,
+        found=ends.tolist(),
+    )
+
+
+def _cones(a: Floats, b: Floats, c: Floats) -> Floats:
+    """(k,) signed volumes of the tetrahedra over triangles a, b, c seen from the origin."""
+    return np.asarray(np.einsum("...i,...i->...", a, np.cross(b, c)) / 6.0)
+
+
+@compiled
+def _add_gradients(mesh: kernels.Mesh, X: Floats, signs: Floats, out: Floats) -> None:
+    """Add ∂V_r/∂X to out (r,n,3), ∂V/∂a = b × c / 6 for a triangle a, b, c, with the patches' signs (r,k)."""
+    F, origin = mesh.faces, vector(mesh.origin)
+    for f in range(len(F)):
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
+        at_a, at_b, at_c = cross(b, c), cross(c, a), cross(a, b)
+        for r in range(len(signs)):
+            sixth = signs[r, mesh.patch[f]] / 6.0
+            if sixth != 0.0:
+                accumulate(out[r], i, scaled(sixth, at_a))
+                accumulate(out[r], j, scaled(sixth, at_b))
+                accumulate(out[r], k, scaled(sixth, at_c))

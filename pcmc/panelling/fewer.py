@@ -1,0 +1,256 @@
+"""Fewer families of panels: vertices slide along the shape until more triangles are congruent.
+
+Where a vertex lies within its sheet, or a junction's along its curve, is free: the shape is the same. A round
+joins families within a wider tolerance and moves the vertices so that the panels' edges come near the middle
+of their family's. It ends with a solve, so that forces balance on the moved mesh too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from ..base import validate
+from ..base.arrays import Bools, Floats, Ints
+from ..contact.pinching import place_wall_rows, standing_part
+from ..forces.functional import onto_circles
+from ..forces.motion_space import motion_space, perpendicular
+from ..meshing.quality import compare, worst_quality
+from ..solvers import solve
+from ..surface import Surface
+from ..surface.geometry import edge_vectors
+from .distance import distances
+from .families import families
+from .schedule import Panels, panels
+
+WIDER = (1.25, 1.12, 1.6, 2.2)  # times the tolerance: families within it are joined
+INSIDE = (0.3, 0.45)  # tolerances from the middle of its family that an edge may keep
+STEPS = 6  # of Gauss-Newton in a round
+DAMPING = 1e-3  # of motions along the shape; edges' equations have weight 1
+STIFF = 1.0  # damping of motions that change the shape
+QUALITY = 0.6  # of the worst triangle's quality that is kept
+SHORTEST = 0.05  # part of a step that is tried
+
+OnRound = Callable[[int, int], object]  # called with the round and the number of families
+
+
+@dataclass(frozen=True, eq=False)
+class FewerFamilies:
+    """The panels of a surface before and after its vertices moved. ``print`` compares them.
+
+    Attributes
+    ----------
+    before, after : the panels, with their surfaces and certificates.
+    change : the largest distance of a panel's corner from the shape before, length.
+    moved : the largest motion of a panel's corner, along the shape for the most part, length.
+    rounds : how many rounds were made.
+    """
+
+    before: Panels
+    after: Panels
+    change: float
+    moved: float
+    rounds: int
+
+    @property
+    def surface(self) -> Surface:
+        """The surface after."""
+        return self.after.surface
+
+    def __str__(self) -> str:
+        old, new = self.before.certificate, self.after.certificate
+        rows = [
+            ("", "before", "after"),
+            ("families", str(self.before.count), str(self.after.count)),
+            ("at least", str(self.before.at_least), str(self.after.at_least)),
+            ("residual", f"{old.residual:.1e}", f"{new.residual:.1e}"),
+            ("curvature error", f"{old.curvature_error:.1e}", f"{new.curvature_error:.1e}"),
+            ("triangle quality", f"{old.quality:.3f}", f"{new.quality:.3f}"),
+            ("verdict", old.verdict.name.lower(), new.verdict.name.lower()),
+        ]
+        table = "\n".join(f"{name:>16}  {one:>13}  {other:>13}" for name, one, other in rows)
+        return f"{table}\nchange of shape {self.change:.3g}, vertices moved up to {self.moved:.3g}"
+
+
+def fewer_families(
+    surface: Surface,
+    tolerance: float,
+    change: float,
+    *,
+    at_rest: bool = True,
+    rounds: int = 24,
+    callback: OnRound | None = None,
+    mirror_images: str = "alike",
+    walls: bool = False,
+    anyway: bool = False,
+) -> FewerFamilies:
+    """Move the vertices of a surface so that its panels are of fewer families.
+
+    Parameters
+    ----------
+    surface, tolerance, mirror_images, walls, anyway : as in ``panels``.
+    change : the most that a panel's corner may leave the shape before, length, > 0. Sliding along a curved
+        shape takes a little of it: the shape before has flat triangles.
+    at_rest : whether each round ends with a solve. The result is then as certified as the surface was, and
+        the motions are along the shape. Without it, vertices also move across the shape: there are fewer
+        families, and the certificate shows the forces and curvature errors left.
+    rounds : the most that are made. It ends earlier where no way to join families helps.
+    callback : called after each round with its number and the number of families so far.
+
+    Raises
+    ------
+    SurfaceError : the surface is not certified, or has no panels.
+
+    Examples
+    --------
+    >>> from generators import two_squares
+    >>> from pcmc.solvers import solve
+    >>> result = fewer_families(solve(two_squares(4, alpha_aux=1.0)).surface, 0.02, change=0.05)
+    >>> result.before.count > result.after.count, result.after.certificate.certified
+    (True, True)
+    """
+    change = validate.positive("change", change)
+    validate.flag("at_rest", at_rest)
+    validate.integer("rounds", rounds, least=1)
+    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
+    before = panels(surface, tolerance, anyway=anyway, **options)
+    search = _Search(before, change, at_rest)
+    made = search.run(rounds, callback)
+    after = before
+    if search.best is not surface:
+        after = panels(search.best, tolerance, anyway=True, **options)
+    corners = np.unique(search.faces)
+    motion = np.linalg.norm(after.surface.vertices - surface.vertices, axis=1)[corners]
+    return FewerFamilies(before, after, search.leaves(after.surface.vertices), float(motion.max()), made)
+
+
+class _Search:
+    """The best surface so far, and what a round needs."""
+
+    def __init__(self, before: Panels, change: float, at_rest: bool) -> None:
+        self.start = self.best = before.surface
+        self.faces: Ints = self.start.faces[before.panels["face"].to_numpy()]
+        self.corners = np.unique(self.faces)
+        self.tolerance, self.change, self.at_rest = before.tolerance, change, at_rest
+        self.apart = before.mirror_images == "apart"
+        self.count = before.count
+        self.certified = before.certificate.certified
+        self.quality = QUALITY * worst_quality(self.start.vertices, self.faces)
+
+    def run(self, rounds: int, callback: OnRound | None) -> int:
+        """Try the settings in turn; keep to one as long as it helps. Returns the rounds made."""
+        settings = list(product(WIDER, INSIDE))
+        current = misses = made = 0
+        while made < rounds and misses < len(settings):
+            surface = self._round(*settings[current])
+            made += 1
+            count = self.count if surface is None else self._families(surface.vertices)
+            if surface is not None and count < self.count:
+                self.best, self.count, misses = surface, count, 0
+            else:
+                current, misses = (current + 1) % len(settings), misses + 1
+            if callback is not None:
+                callback(made, self.count)
+        return made
+
+    def leaves(self, X: Floats) -> float:
+        """The largest distance of a panel's corner from the shape before."""
+        return float(distances(X[self.corners], self.start.vertices, self.faces).max())
+
+    def _families(self, X: Floats) -> int:
+        return int(families(self._lengths(X), self.tolerance, self.apart).family.max()) + 1
+
+    def _lengths(self, X: Floats) -> Floats:
+        return np.asarray(np.linalg.norm(edge_vectors(X[self.faces]), axis=2))
+
+    def _round(self, wider: float, inside: float) -> Surface | None:
+        """The best surface, its vertices moved towards wider families; None where that fails."""
+        X = self.best.vertices
+        targets = self._targets(X, wider * self.tolerance)
+        for _ in range(STEPS):
+            moved = self._step(X, targets, inside * self.tolerance)
+            if moved is None:
+                break
+            X = moved
+        if X is self.best.vertices:
+            return None
+        surface = self.best.moved(X)
+        if self.at_rest:
+            result = solve(surface, target="stationary")
+            if not result.converged or result.certificate.certified is not self.certified:
+                return None
+            surface = result.surface
+        return surface if self.leaves(surface.vertices) <= self.change else None
+
+    def _targets(self, X: Floats, tolerance: float) -> Floats:
+        """(m,3) the middle of the range that the family's corresponding edges have."""
+        lengths = self._lengths(X)
+        family, order, _ = families(lengths, tolerance, self.apart)
+        aligned = np.take_along_axis(lengths, order, axis=1)
+        low, high = np.full((2, family.max() + 1, 3), np.inf)
+        np.minimum.at(low, family, aligned)
+        np.minimum.at(high, family, -aligned)
+        targets = np.empty_like(lengths)
+        np.put_along_axis(targets, order, 0.5 * (low - high)[family], axis=1)
+        return targets
+
+    def _step(self, X: Floats, targets: Floats, inside: float) -> Floats | None:
+        """A damped Gauss-Newton step on the edges farther than ``inside`` from their targets, or None.
+
+        It is shortened until no triangle turns over or is much worse, and no corner leaves the shape.
+        """
+        edges = edge_vectors(X[self.faces])
+        lengths = np.linalg.norm(edges, axis=2)
+        off = lengths - targets
+        excess = np.sign(off) * np.maximum(np.abs(off) - inside, 0.0)
+        face, side = np.nonzero(excess)
+        if not len(face):
+            return None
+        surface = self.best
+        part = standing_part(surface)
+        space = motion_space(part.surface, part.classes, X)
+        frame, damping = self._frames(space.basis, space.dimension, part.resting | part.walls.held)
+        unit = edges[face, side] / lengths[face, side][:, None]
+        tail, head = self.faces[face, (side + 1) % 3], self.faces[face, (side + 2) % 3]
+        J = _length_jacobian(unit, tail, head, frame)
+        system = csc_array(J.T @ J + diags_array(damping.ravel()))
+        move = -splu(system, permc_spec="MMD_AT_PLUS_A").solve(J.T @ excess[face, side])
+        motion = np.einsum("vk,vkj->vj", move.reshape(-1, 3), frame)
+        share = 1.0
+        while share >= SHORTEST:
+            slid = onto_circles(surface, X + share * motion)
+            Y = place_wall_rows(surface, part.walls, slid, space)
+            turned, _, worst = compare(X, Y, self.faces)
+            if not turned and worst >= self.quality and (self.at_rest or self.leaves(Y) <= self.change):
+                return Y
+            share *= 0.5
+        return None
+
+    def _frames(self, basis: Floats, dimension: Ints, held: Bools) -> tuple[Floats, Floats]:
+        """The directions (n,3,3) in which each vertex may move, rows, zero for none; their damping (n,3)."""
+        free = self.start.free & ~held
+        frame, damping = np.zeros_like(basis), np.full((*dimension.shape, 3), STIFF)
+        sheet, curve = free & (dimension == 1), free & (dimension == 2)
+        frame[sheet, 0], frame[sheet, 1] = perpendicular(basis[sheet, 0])
+        damping[sheet, :2] = DAMPING
+        frame[curve, 0] = np.cross(basis[curve, 0], basis[curve, 1])
+        damping[curve, 0] = DAMPING
+        if not self.at_rest:
+            frame[sheet, 2] = basis[sheet, 0]
+            frame[curve, 1:] = basis[curve, :2]
+        return frame, damping
+
+
+def _length_jacobian(unit: Floats, tail: Ints, head: Ints, frame: Floats) -> csr_array:
+    """(k,3n) derivatives of the lengths of edges from ``tail`` to ``head`` along ``unit`` (k,3)."""
+    towards = np.einsum("ej,ekj->ek", unit, frame[head]), -np.einsum("ej,ekj->ek", unit, frame[tail])
+    columns = 3 * np.stack([head, tail], axis=1)[:, :, None] + np.arange(3)
+    rows = np.repeat(np.arange(len(unit)), 6)
+    values = np.stack(towards, axis=1)
+    return csr_array((values.ravel(), (rows, columns.ravel())), shape=(len(unit), 3 * len(frame)))

@@ -1,0 +1,199 @@
+"""Records as pandas tables; the columns that a reader wants first, as a table and as a picture; files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.errors import MissingExtra, OptionError
+from ..base.files import atomic_write, suffix_of, writing
+from ..base.units import Units
+from .store import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ..plot.figure import Image
+
+TABLES = (".csv", ".parquet")
+FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met")
+USUAL = ("apex", "rise", "area", "reaction per length")  # the first of each patch, the others of the roof
+GOOD = ("stable", "neutral")
+DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
+DIMENSIONS |= {"wall": "tension"}  # of numbers of a project that are no quantities of a roof
+
+
+def table(records: Iterable[Record]) -> pd.DataFrame:
+    """One row per case, in their order: parameters, status, verdict, message, numbers.
+
+    The same cases give the same table, in whatever order and wherever they ran. Wall times, which differ
+    from run to run, are in ``provenance``. A number that a case did not return is missing.
+    """
+    return _frame(
+        {"case": r.case}
+        | r.parameters
+        | {"status": r.status, "verdict": r.verdict, "message": r.message}
+        | r.numbers
+        for r in records
+    )
+
+
+def provenance(records: Iterable[Record]) -> pd.DataFrame:
+    """One row per case: wall time in seconds, when and where, versions, output of failures."""
+    return _frame({"case": r.case, "wall_time": r.wall_time} | r.provenance for r in records)
+
+
+def _frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd  # here: the processes of a sweep do not need it
+
+    ordered = sorted(rows, key=lambda row: int(row["case"]))
+    return pd.DataFrame(ordered, columns=None if ordered else ["case"]).set_index("case")
+
+
+def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
+    """Write a table to ``.csv`` or ``.parquet``; the file is complete or not there at all.
+
+    Floats are written with the digits that give the same float back. In Parquet, which has one
+    type per column, a column of mixed types is written as text.
+
+    Raises
+    ------
+    FileError : another suffix, or a file that cannot be written.
+    MissingExtra : ``.parquet`` without pyarrow.
+    """
+    path = Path(path)
+    suffix = suffix_of(path, TABLES, "a table")
+    with writing(path), atomic_write(path) as temporary:
+        if suffix == ".csv":
+            frame.to_csv(temporary, lineterminator="\n")
+            return
+        try:
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+        except ImportError:
+            raise MissingExtra("pyarrow", "files") from None
+        columns = {}
+        for name, column in frame.reset_index().items():
+            try:
+                columns[name] = pa.Array.from_pandas(column)
+            except (pa.ArrowInvalid, pa.ArrowTypeError, OverflowError):
+                texts = [None if value is None else str(value) for value in column]
+                columns[name] = pa.array(texts, pa.string())
+        pq.write_table(pa.table(columns), temporary)
+
+
+def columns_of(table: pd.DataFrame, name: str, parameters: Container[str] = ()) -> list[str]:
+    """The columns that a name stands for: one of its own, or all those of a quantity, the roof's last.
+
+    >>> import pandas as pd
+    >>> columns_of(pd.DataFrame({"a.apex": [1.0], "b.apex": [2.0], "apex": [2.0]}), "apex")
+    ['a.apex', 'b.apex', 'apex']
+    """
+    columns = [str(column) for column in table.select_dtypes("number") if column not in parameters]
+    columns.sort(key=lambda column: "." not in column)
+    return [c for c in columns if name in (c, c.rpartition(".")[2].replace("_", " "))]
+
+
+def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[str] = ()) -> pd.DataFrame:
+    """The parameters, how each case ended, and quantities, each as of ``columns_of``.
+
+    By default these are the apex of each patch, the greatest height over Π; and of the roof the rise of the
+    highest apex over the lowest support, the area, and the largest reaction per length; and the margins,
+    with what ends each. All are in the surface's units.
+
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"a": [1.0], "verdict": ["stable"], "residual": [1e-12], "west.apex": [2.0]})
+    >>> list(short_table(frame, ["a"])), list(short_table(frame, ["a"], ["residual"]))
+    (['a', 'verdict', 'west.apex'], ['a', 'verdict', 'residual'])
+    """
+    margins = [c for c in table if str(c).endswith((".margin", ".margin_value", ".margin_ends_by"))]
+    usual = [*(c for c in columns_of(table, USUAL[0], parameters) if "." in c), *USUAL[1:], *margins]
+    shown = [column for name in show for column in columns_of(table, name, parameters)] if show else usual
+    wanted = dict.fromkeys([*parameters, *FIRST, *shown])
+    return table[[name for name in wanted if name in table]]
+
+
+def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
+    """The names of numbers with their units in brackets, as far as these are known.
+
+    Parameters
+    ----------
+    units : of the project or surface; nothing is added without one.
+    cables : names whose tension is a force.
+
+    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
+    ['west.tension [kN/m]', 'hem.tension [kN]']
+    """
+    from ..quantities import dimension_of  # takes long to import
+
+    shown = {}
+    for name in names if units else ():
+        stem, _, quantity = name.rpartition(".")
+        if quantity == "margin_value":
+            quantity = stem.partition(" of ")[0]
+        cable = quantity == "tension" and (stem in cables or stem.startswith("plan.cables."))
+        with suppress(OptionError):
+            dimension = DIMENSIONS.get(quantity) or dimension_of("force" if cable else quantity)
+            shown[name] = f"{name} [{units.behind(dimension).strip()}]"
+    return shown
+
+
+def draw_sweep(
+    table: pd.DataFrame,
+    parameters: Sequence[str],
+    path: str | os.PathLike[str] | None = None,
+    labels: Mapping[str, str] | None = None,
+    show: str = "",
+) -> Image:
+    """A picture of a sweep over one or two varied numbers, × where not certified.
+
+    Parameters
+    ----------
+    labels : the names of columns as they are shown, such as ``with_units`` gives.
+    show : what is drawn, as of ``columns_of``; over two numbers the last of its columns. By default the
+        apexes over one number, the rise over two.
+
+    Raises
+    ------
+    OptionError : if not one or two numbers vary, or no case has a shape.
+    """
+    from ..plot import heatmap, lines
+
+    varied = [name for name in parameters if table[name].nunique() > 1]
+    if len(varied) not in (1, 2) or not all(table[name].dtype.kind in "if" for name in varied):
+        text = f"a sweep is drawn over one or two varied numbers, and {len(varied)} vary here"
+        raise OptionError(
+            f"{text}: {', '.join(varied) or 'none'}; fix the others", what="plot", found=len(varied)
+        )
+    names, good = labels or {}, table["verdict"].isin(GOOD)
+    quantity = show or ("apex" if len(varied) == 1 else "rise")
+    columns = [c for c in columns_of(table, quantity, parameters) if table[c].notna().any()]
+    if not columns:
+        raise OptionError(f"no case of this sweep has a shape with {quantity} to draw", what="plot", found=0)
+    if len(varied) == 1:
+        x = table[varied[0]].to_numpy(float)
+        order = np.argsort(x)
+        heights = {c.rpartition(".")[0] or "roof": np.where(good, table[c], np.nan) for c in columns}
+        if not show:
+            heights.pop("roof", None)  # the highest of the others
+        curves = {name: (x[order], y[order]) for name, y in heights.items() if np.isfinite(y).any()}
+        if not curves:
+            raise OptionError("no case of this sweep is certified; see its table", what="plot", found=0)
+        last = columns[-1]
+        label = names.get(last, last).removeprefix(f"{last.rpartition('.')[0]}.")
+        return lines(curves, path, x=names.get(varied[0], varied[0]), y=label, markers=True)
+    across, up = varied
+    drawn = columns[-1]
+    value = table.assign(**{drawn: table[drawn].where(good)}).pivot_table(drawn, up, across, dropna=False)
+    lost = (~good).groupby([table[up], table[across]]).any().unstack(fill_value=True)
+    title = f"{drawn} of the certified cases (×: not certified)"
+    marks = {title: lost.reindex(index=value.index, columns=value.columns, fill_value=True).to_numpy(bool)}
+    xs, ys = value.columns.to_numpy(float), value.index.to_numpy(float)
+    tables, label = {title: value.to_numpy(float)}, names.get(drawn, "")
+    across, up = (names.get(name, name) for name in varied)
+    return heatmap(xs, ys, tables, path, marks=marks, xlabel=across, ylabel=up, label=label, width=900)

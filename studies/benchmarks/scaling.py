@@ -1,0 +1,147 @@
+"""How time and memory grow with the number of triangles, up to four millions.
+
+Example 1 with a wall tension of 1, from its initial shape to rest, then its certificate. Every size has a
+process of its own that has loaded the compiled code before; memory is what comes on top of that.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pandas as pd
+
+from generators import two_squares
+from pcmc import certify, solve
+from pcmc.stability.factorisation import available
+
+from ..folder import Folder
+from ..orders import Order, slope
+from .timing import Row, peak_bytes
+
+SIDES = (61, 122, 245, 491, 961)  # squares a side, for 16 000 to 4 000 000 triangles
+FEW = (4, 8, 16)  # of the quick form
+SLOW_SIDES = SIDES[:3]  # where MKL is not installed
+REPEATED = 100_000  # triangles up to which times are medians of three
+AT_REST = 1e-10  # relative residual
+SECONDS, GIGABYTES, EXPONENT = 90.0, 8.0, 1.15  # asked
+FITTED = ("solve_seconds", "solve_processor_seconds", "solve_gigabytes", "certify_seconds")
+
+
+def measure(quick: bool) -> pd.DataFrame:
+    """A row per size: times and peaks of memory of the solution and of the certificate."""
+    fast = available()[0] == "pardiso"
+    rows = []
+    for squares in FEW if quick else SIDES if fast else SLOW_SIDES:
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            rows.append(pool.submit(_one_size, squares).result())
+    return pd.DataFrame(rows)
+
+
+def _one_size(squares: int) -> dict[str, float]:
+    """Medians of one size; the peak of memory is that of the first run."""
+    _run(8)  # loads compiled code
+    loaded = peak_bytes()
+    first = _run(squares)
+    runs = [first] + [_run(squares) for _ in range(2 if first["triangles"] <= REPEATED else 0)]
+    row = {key: float(np.median([run[key] for run in runs])) for key in first}
+    for what in ("solve", "certify"):
+        row[f"{what}_peak_gigabytes"] = first[f"{what}_gigabytes"]
+        row[f"{what}_gigabytes"] = first[f"{what}_gigabytes"] - loaded / 1e9
+    return row
+
+
+def _run(squares: int) -> dict[str, float]:
+    """One surface built, solved and certified: seconds of each, peaks so far."""
+    wall, processor = time.perf_counter(), time.process_time()
+    surface = two_squares(squares, alpha_aux=1.0)
+    built = time.perf_counter()
+    result = solve(surface, target="stationary", tolerance=AT_REST)
+    rested = time.perf_counter()
+    row = {
+        "triangles": float(surface.m),
+        "build_seconds": built - wall,
+        "solve_seconds": rested - wall,  # with the surface, from nothing to rest
+        "solve_processor_seconds": time.process_time() - processor,
+        "steps": float(result.iterations),
+        "residual": float(result.rows[-1]["residual"]),
+        "solve_gigabytes": peak_bytes() / 1e9,
+    }
+    assert result.converged, result.message
+    reached = result.surface
+    del surface, result
+    begin = time.perf_counter()
+    certificate = certify(reached)
+    return row | {
+        "certify_seconds": time.perf_counter() - begin,
+        "certify_gigabytes": peak_bytes() / 1e9,
+        "index": float(-1 if certificate.index is None else certificate.index),
+    }
+
+
+def exponents(table: pd.DataFrame) -> dict[str, Order]:
+    """The exponent of each fitted quantity: the slope of its logarithm over that of the triangles."""
+    size = table.triangles.to_numpy(dtype=float)
+    return {key: slope(size, table[key].to_numpy(dtype=float)) for key in FITTED}
+
+
+def rows(table: pd.DataFrame, quick: bool) -> list[Row]:
+    """What is asked of the largest size and of the exponents, and the answers."""
+    largest = table.iloc[table.triangles.argmax()]
+    bound = not quick and available()[0] == "pardiso"
+    size = f"{largest.triangles:,.0f} triangles"
+    sizes = f"{len(table)} sizes, {table.triangles.min():,.0f} to {table.triangles.max():,.0f} triangles"
+    fitted = {
+        key: (order.order, f"{sizes}; standard error {order.standard_error:.2g}")
+        for key, order in exponents(table).items()
+    }
+    most = EXPONENT if bound else None
+    start = f"{size}, {largest.steps:.0f} steps to a relative residual of {largest.residual:.1e}"
+    return [
+        Row("surface and solution", largest.solve_seconds, "s", start, most=SECONDS if bound else None),
+        Row("of this the surface", largest.build_seconds, "s", size),
+        Row("the same, processor", largest.solve_processor_seconds, "s", size),
+        Row(
+            "peak memory of the solution",
+            largest.solve_peak_gigabytes,
+            "GB",
+            f"{size}, imports included",
+            most=GIGABYTES if bound else None,
+        ),
+        Row("certificate", largest.certify_seconds, "s", f"{size}, index {largest['index']:.0f}"),
+        Row(
+            "peak memory with certificate",
+            largest.certify_peak_gigabytes,
+            "GB",
+            f"{size}, imports included",
+            most=GIGABYTES if bound else None,
+        ),
+        Row("exponent of time", *_at(fitted["solve_seconds"]), most=most),
+        Row("exponent of processor time", *_at(fitted["solve_processor_seconds"])),
+        Row("exponent of memory", *_at(fitted["solve_gigabytes"]), most=most),
+        Row("exponent of the certificate's time", *_at(fitted["certify_seconds"])),
+    ]
+
+
+def _at(fitted: tuple[float, str]) -> tuple[float, str, str]:
+    return fitted[0], "", fitted[1]
+
+
+def draw(table: pd.DataFrame, folder: Folder) -> None:
+    """Time and memory against triangles, with their slopes."""
+    from pcmc.plot import convergence
+
+    size = table.triangles
+    convergence(
+        {
+            "surface and solution, s": (size, table.solve_seconds),
+            "certificate, s": (size, table.certify_seconds),
+            "memory of the solution, GB": (size, table.solve_gigabytes),
+        },
+        folder.figure("scaling"),
+        x="triangles",
+        y="seconds, gigabytes",
+        title="Example 1 from its initial shape to rest",
+    )

@@ -1,0 +1,116 @@
+"""What Examples 2, 3 and 4 have in common: numbers of a run, and the same five pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pcmc import Surface, curvature_error
+from pcmc.base.arrays import Floats
+from pcmc.forces.curvature import METHODS
+
+from ..folder import Folder
+from .flow import errors, external_area
+
+
+def error_percent(surface: Surface) -> Floats:
+    """(n,) size of the relative curvature error, %; NaN where there is no mean curvature."""
+    return 100.0 * np.abs(curvature_error(surface))
+
+
+def error_scale(*surfaces: Surface) -> dict[str, Any]:
+    """How ``error_percent`` is coloured: from 0, the palest, to the largest of all surfaces."""
+    largest = max(float(np.nanmax(error_percent(surface))) for surface in surfaces)
+    label = "|H − H̄| / H̄, % (none on boundaries and junctions)"
+    return {"label": label, "cmap": "YlGnBu", "limits": (0.0, largest)}
+
+
+def numbers(folder: Folder, case: str, stages: Mapping[str, Surface]) -> dict[str, float]:
+    """Of a case: ‖∇E‖² at both ends, errors at each stage, and how smoothly E fell."""
+    record = folder.read_table("records").set_index("case").loc[case]
+    history = folder.read_table("histories")
+    E = history.energy[history.case == case].to_numpy()
+    measured = {
+        "initial_gradient_squared": record.initial_gradient_squared,
+        "gradient_squared": record.gradient_squared,
+        "least_gradient_squared": record.least_gradient_squared,
+        "at_iteration": record.at_row,
+        "iterations": len(E) - 1,
+        "share_of_rises": record.energy_rises / max(1, len(E) - 1),
+        "total_rise": np.maximum(np.diff(E), 0.0).sum() / (E[0] - E[-1]),
+        "energy_fell": E[0] - E[-1],
+        "last_tenth_of_fall": (E[-1 - len(E) // 10] - E[-1]) / (E[0] - E[-1]),
+        "forced_steps": record.forced_steps,
+        "triangles": record.triangles,
+    }
+    for stage, surface in stages.items():
+        measured |= {f"{stage}_{key}": value for key, value in errors(surface).items()}
+        measured[f"{stage}_area"] = external_area(surface)
+    for method in METHODS:
+        measured[f"error_ratio_{method}"] = (
+            measured[f"final_largest_error_{method}"] / measured[f"initial_largest_error_{method}"]
+        )
+    return measured
+
+
+def shapes(
+    folder: Folder,
+    case: str,
+    pictures: Mapping[str, tuple[str, str | None]],
+    history: str,
+    walls_view: str | tuple[float, float] = "diagonal",
+) -> None:
+    """For each stage its two views, its walls alone and its curvature error, and the history of E.
+
+    ``pictures``: by stage the figure of its shape and, if there is one, the figure of its error.
+    """
+    from pcmc.plot import draw, panel
+
+    stages = folder.read_mesh(case)
+    for stage, (shape, error) in pictures.items():
+        surface = stages[stage]
+        roofs, walls = ([p.name for p in surface.patches if p.auxiliary is x] for x in (False, True))
+        panel(
+            [surface] * 3,
+            folder.figure(shape),
+            views=["diagonal", "elevation", walls_view],
+            titles=["(a) diagonal view", "(b) elevation view", "the walls alone, larger"],
+            patches=[None, None, walls],
+            one_scale=False,
+            legend=True,
+            width=1500,
+        )
+        if error is not None:
+            draw(
+                surface,
+                folder.figure(error),
+                view="plan",
+                scalars=error_percent(surface),
+                patches=roofs,
+                width=800,
+                legend=True,
+                **error_scale(surface),
+            )
+    energy_history(folder, {"proposed method": case}, history)
+
+
+def energy_history(folder: Folder, cases: Mapping[str, str], name: str, title: str = "") -> None:
+    """E against the iteration for cases by their names in the picture."""
+    from pcmc.plot import histories
+
+    table = folder.read_table("histories")
+    frames = {label: table[table.case == case] for label, case in cases.items()}
+    histories(
+        frames, folder.figure(name), x="iteration", label="energy E", dashes=len(cases) > 1, title=title
+    )
+
+
+def gradient_history(folder: Folder, cases: Mapping[str, str], name: str) -> None:
+    """‖∇E‖² against the evaluation: the axis on which different methods can be compared."""
+    from pcmc.plot import histories
+
+    table = folder.read_table("histories")
+    frames = {label: table[table.case == case] for label, case in cases.items()}
+    histories(frames, folder.figure(name), x="evaluation", y="gradient_squared", label="‖∇E‖²")
