@@ -85,7 +85,7 @@ def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) ->
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
 
 
-def _count(rows: Ints | Floats) -> Ints:
+def _count(rows: Any) -> Ints:
     return np.arange(1, len(rows) + 1)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -178,7 +179,7 @@ def _line_ends(content: str) -> int:
     return content.count("\n") + content.count("\f")
 
 
-def _kinds(rest: Sequence[str]) -> tuple[Ints, Sequence[str], Ints]:
+def _kinds(rest: Sequence[str]) -> tuple[Ints, Any, Ints]:
     """The number of each text, the different texts, and where each is first."""
     code, kinds = pd.factorize(np.array(rest, dtype=object))
     return code, kinds, np.unique(code, return_index=True)[1]

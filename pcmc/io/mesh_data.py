@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, Vector
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units, conversion_note, length_factor
 from ..base.validate import choice
@@ -202,7 +202,7 @@ def to_surface(
         held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
     patches, names = data.patches, [p.name for p in data.patches]
     for key, values in (("tension", tensions), ("pressure", pressures)):
-        by_name = values if isinstance(values, Mapping) else dict.fromkeys(names, values)
+        by_name: Any = values if isinstance(values, Mapping) else dict.fromkeys(names, values)
         for name in by_name:
             if name not in names:
                 raise OptionError(unknown("patch", name, names), what=f"{key}s", where=name)
@@ -234,15 +234,19 @@ def scaled(value: Any, factor: float) -> Any:
             per_area = {key: getattr(value, key) / factor**2 for key in ("pressure", "weight", "snow")}
             return replace(value, tension=value.tension / factor, **per_area)
         case Plane() | Line():
-            return replace(value, point=tuple(factor * x for x in value.point))
+            return replace(value, point=_point(value.point, factor))
         case Circle():
-            centre = tuple(factor * x for x in value.centre)
-            return replace(value, centre=centre, radius=factor * value.radius)
+            return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
         case HeldCurve():
             return value.mapped(factor * np.eye(3), np.zeros(3))
         case Room():
             return replace(value, volume=factor**3 * value.volume)
     return value
+
+
+def _point(point: Vector, factor: float) -> Vector:
+    x, y, z = point
+    return factor * x, factor * y, factor * z
 
 
 def scaled_surface(surface: Surface, factor: float) -> Surface:

@@ -74,6 +74,7 @@ def write(
     form, solved = format_of(path, FORMATS), surface
     surface = solved if isinstance(solved, Surface) else getattr(solved, "surface", solved)
     expect_surface(surface)
+    assert isinstance(surface, Surface)  # for mypy
     if surface is not solved and form.certificate and certificate is None:
         certificate = getattr(solved, "certificate", None)
     if not isinstance(scalars, Mapping | None):
