@@ -19,7 +19,7 @@ from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
 from pcmc.forces.rooms import room_pressures
 from pcmc.io.mesh_data import scaled_surface
-from pcmc.plan import Area, Plan
+from pcmc.plan import PatchSpec, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
@@ -39,7 +39,7 @@ files = ["hall.pcmc"]
 
 def hall(west: float = 0.25, east: float = 0.5) -> pcmc.Surface:
     """Two rooms with a wall between them, 0.9 and 1 the pressures of the air, under snow."""
-    areas = [Area("west", 4.0, 0.9, at=[1, 1], snow=west), Area("east", 4.0, at=[9, 1], snow=east)]
+    areas = [PatchSpec("west", 4.0, 0.9, at=[1, 1], snow=west), PatchSpec("east", 4.0, at=[9, 1], snow=east)]
     return Plan(HALL, [[[5, 0], [5, 6]]], patches=areas, edge_length=1.0).surface()
 
 
