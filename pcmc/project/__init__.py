@@ -35,7 +35,7 @@ rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), i
     report = "roof.pdf"
 """
 
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder

@@ -16,7 +16,7 @@ from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.sheet import FORMATS
 from ..panelling import Panels
 from ..report.document import check_suffix as check_report
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from .output import Works
 
 CSV, INP = ".csv", ".inp"

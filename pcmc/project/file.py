@@ -22,7 +22,7 @@ from ..base.files import as_path, check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys, line_with
 from .documents import Documents, documents_of

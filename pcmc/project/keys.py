@@ -18,7 +18,7 @@ from ..meshing.walls import EDGES
 from ..plan import Area, CableLine, Divider, Hole, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .documents import Documents
