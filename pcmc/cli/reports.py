@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..certificate.balance import strained_junction
-from ..certificate.leaning import lean_texts
+from ..certificate.tables import lean_texts
 from ..contact.pinching import standing_part
 from ..design.outcome import values_text
 from ..project import Outcome

@@ -18,8 +18,7 @@ from math import inf
 import numpy as np
 
 from ..base.errors import SurfaceError
-from ..certificate.collapse import held_wall_down
-from ..certificate.slipping import describe_saddle, slipping_ends
+from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..contact.pinching import find_walls
 from ..energy.functional import energy
 from ..energy.rooms import check_rooms, room_pressures

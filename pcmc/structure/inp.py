@@ -118,8 +118,7 @@ def _supports(model: StructuralModel) -> Iterator[str]:
     """Node sets of the supports, and what these hold, in axes of their own where they slide."""
     held = model.held
     fixed, sliding = (np.flatnonzero(held & mask) for mask in (model.freedom == 0, model.freedom > 0))
-    for name, vertices in (("HELD", np.flatnonzero(held)), ("FIXED", fixed), ("SLIDING", sliding)):
-        yield _set(name, vertices)
+    yield _set("HELD", np.flatnonzero(held)) + _set("FIXED", fixed) + _set("SLIDING", sliding)
     for label, vertices in support_vertices(model.certificate.acting).items():
         yield _set(f"SUPPORT_{label}", vertices[held[vertices]])
     if len(fixed):
