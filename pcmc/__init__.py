@@ -5,7 +5,7 @@ The rooms of the package, from the ground up; a room imports only from those abo
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
 curves surface             lines, arcs, Béziers and planes as objects; what a surface is
-energy                     E with its derivatives, and its curvature
+forces                     E with its derivatives, and its curvature
 contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes and Morse index; the verdict on a finished surface
@@ -26,7 +26,6 @@ sweep explore cli          many cases; the page; the command
 
 import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 from .base import errors
@@ -37,11 +36,11 @@ if TYPE_CHECKING:
     from .certificate import Certificate, Verdict, certify
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
-    from .energy.curvature import curvature_error, mean_curvature, target_curvature
-    from .energy.functional import energy, gradient
-    from .energy.rooms import room_volume_gradients, room_volumes
-    from .energy.second_variation import hessian
     from .existence import solve
+    from .forces.curvature import curvature_error, mean_curvature, target_curvature
+    from .forces.functional import energy, gradient
+    from .forces.rooms import room_volume_gradients, room_volumes
+    from .forces.second_variation import hessian
     from .io import read, write
     from .io.repairing import Repaired, repair
     from .margins import Margin, margin
@@ -114,10 +113,10 @@ _NAMES = {
     "certificate": ("Certificate", "Verdict", "certify"),
     "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter"),
-    "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
-    "energy.functional": ("energy", "gradient"),
-    "energy.second_variation": ("hessian",),
-    "energy.rooms": ("room_volume_gradients", "room_volumes"),
+    "forces.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
+    "forces.functional": ("energy", "gradient"),
+    "forces.second_variation": ("hessian",),
+    "forces.rooms": ("room_volume_gradients", "room_volumes"),
     "existence": ("solve",),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
@@ -137,17 +136,6 @@ _NAMES = {
     "verification": ("Theorem", "verify"),
 }
 
-
-class _Package(ModuleType):
-    """``pcmc.energy`` is a function, although a folder has the same name."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        folder = isinstance(value, ModuleType)  # set by its import
-        if not (folder and name == "energy"):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 
 if not TYPE_CHECKING:
 

@@ -29,9 +29,9 @@ from ..certificate.reactions import support_forces
 from ..contact.pinching import standing_part
 from ..design.quantities import largest_pull
 from ..design.targets import Target, measure
-from ..energy.functional import energy_and_gradient
-from ..energy.motion_space import motion_space
-from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..forces.functional import energy_and_gradient
+from ..forces.motion_space import motion_space
+from ..forces.rigid_motions import rigid_modes, rigid_motions
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import Stiffness, lowest, stiffness
 from ..surface import Surface

@@ -13,8 +13,8 @@ from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.balance import overload
 from ..contact.pinching import standing_part
-from ..energy.functional import energy_and_gradient
-from ..energy.motion_space import motion_space
+from ..forces.functional import energy_and_gradient
+from ..forces.motion_space import motion_space
 from ..meshing.quality import triangle_quality
 from ..solvers.result import Result, Status
 from ..surface import Surface

@@ -10,8 +10,8 @@ import numpy as np
 from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.supports import held_curves
-from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
-from ..energy.volume_below import volume_below
+from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
+from ..forces.volume_below import volume_below
 from ..surface import Surface
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open

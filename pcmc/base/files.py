@@ -14,6 +14,8 @@ from .errors import FileError
 from .interrupts import defer_interrupts
 from .validate import refuse
 
+PathLike = str | os.PathLike[str]
+
 
 def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> FileError:
     """The error for a file that the system does not let be read, written or opened.

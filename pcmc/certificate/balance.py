@@ -12,7 +12,7 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.origin import uncancelled_pressures
 from ..surface.supports import common_point
-from ..surface.wall_tensions import balanced_wall
+from ..surface.values import balanced_wall
 from .proof import Overload, UnbalancedJunction, Unheld
 
 ROUNDED = 1e-9  # a load, or a tension, that exceeds what balances it by less may do so by rounding alone

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..energy.cables import directions
+from ..forces.cables import directions
 from ..surface import Surface
 from ..surface.cable import Cable
 from ..surface.geometry import cross_2d, segment_lengths

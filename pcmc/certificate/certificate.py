@@ -18,11 +18,11 @@ from ..base.arrays import Floats, Ints
 from ..base.units import NO_UNITS, Units
 from ..contact.pinching import standing_part
 from ..contact.pull import excess_pull
-from ..energy.functional import energy_and_gradient, patch_areas
-from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
-from ..energy.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
-from ..energy.rigid_motions import rigid_modes, rigid_motions
-from ..energy.volume_below import volume_below
+from ..forces.functional import energy_and_gradient, patch_areas
+from ..forces.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
+from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
+from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import SecondVariation, lowest

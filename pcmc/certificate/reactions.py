@@ -18,8 +18,8 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
-from ..energy import kernels
-from ..energy.functional import add_cables_and_weights, apply_supports
+from ..forces import kernels
+from ..forces.functional import add_cables_and_weights, apply_supports
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums

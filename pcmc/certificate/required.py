@@ -6,7 +6,7 @@ import math
 
 from ..base import validate
 from ..base.errors import SurfaceError
-from ..energy.functional import energy
+from ..forces.functional import energy
 from ..surface import Surface
 from .certificate import Certificate, certify
 
@@ -36,5 +36,5 @@ def require_certified(certificate: Certificate, anyway: bool) -> None:
     if not (certificate.certified or validate.flag("anyway", anyway)):
         verdict = certificate.verdict
         text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
-        text += " anyway=True (--anyway)"
+        text += " anyway=True (--allow-uncertified)"
         raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")

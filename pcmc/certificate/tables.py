@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints
-from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
-from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
+from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
+from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import Curve

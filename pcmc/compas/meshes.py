@@ -18,7 +18,7 @@ from ..base.arrays import Floats
 from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
-from ..energy.curvature import mean_curvature
+from ..forces.curvature import mean_curvature
 from ..io.import_warnings import import_warnings
 from ..io.mesh_data import FIXED, SLIDING, MeshData, given_support
 from ..surface import Surface, expect_surface

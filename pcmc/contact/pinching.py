@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..energy.functional import apply_supports
-from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
+from ..forces.functional import apply_supports
+from ..forces.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..energy.functional import energy_and_gradient
+from ..forces.functional import energy_and_gradient
 from ..surface import Surface
 from .pinching import Walls
 

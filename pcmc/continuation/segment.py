@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..energy.functional import patch_volumes
+from ..forces.functional import patch_volumes
 from .branch_point import BranchPoint, branch_point
 from .state import State
 

@@ -10,23 +10,23 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..contact.pull import excess_pull
-from ..energy.functional import (
+from ..forces.functional import (
     apply_supports,
     energy_and_gradient,
     energy_at,
     onto_circles,
 )
-from ..energy.jacobian import Linearisation, linearise
-from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.rooms import (
+from ..forces.jacobian import Linearisation, linearise
+from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.rooms import (
     prescribed_volumes,
     volume_gradients_at,
     volumes_at,
     with_room_pressures,
 )
-from ..energy.second_variation import assemble
-from ..energy.volume_below import volume_below_gradient, volumes_below
+from ..forces.second_variation import assemble
+from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
@@ -40,10 +40,8 @@ from ..stability.modes import (
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
-from .boundary_motion import BoundaryLine
 from .direction import ParameterLine
 
-Line = ParameterLine | BoundaryLine
 LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
 
@@ -60,7 +58,7 @@ class BranchMesh:
     roof : (patches,) 1 for the patches whose volumes over Π are that of the roof, 0 for walls.
     """
 
-    def __init__(self, surface: Surface, line: Line, backend: str | None = None) -> None:
+    def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting

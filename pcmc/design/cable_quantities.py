@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..certificate.cables import chord
-from ..energy.cables import add_pull
+from ..forces.cables import add_pull
 from ..surface import Surface
 from .measurement import Branches, Measurement, largest
 

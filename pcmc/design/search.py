@@ -26,7 +26,6 @@ from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
-from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus, NoStart
 from .quantities import vertices_up
 from .sensitivity import slopes
@@ -238,12 +237,10 @@ class Search:
 
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
-        values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
+        values: dict[str, dict[str, float]] = {f"{kind}s": {} for kind in KINDS}
         for parameter, value in zip(self.parameters, self.values(x).tolist(), strict=True):
-            values[parameter.kind] |= dict.fromkeys(parameter.names, value)
-        changed = with_pressures(surface, values["tension"], values["pressure"], snows=values["snow"])
-        others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
-        return changed.retensioned(**others) if others else changed
+            values[f"{parameter.kind}s"] |= dict.fromkeys(parameter.names, value)
+        return surface.retensioned(**values)
 
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""

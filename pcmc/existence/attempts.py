@@ -9,7 +9,7 @@ from typing import Any
 from .. import solvers
 from ..base.errors import NoBranch
 from ..continuation import BoundaryMotion, Branch, Direction, follow
-from ..energy.functional import gradient
+from ..forces.functional import gradient
 from ..solvers.result import Callback, Progress, Result, Status
 from ..surface import Surface
 from .folding import until_turned

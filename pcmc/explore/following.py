@@ -16,8 +16,7 @@ from ..project.values import single_points, values_of
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Surface
-from ..surface.renewed import KINDS, all_values
-from ..surface.wall_pressures import with_pressures
+from ..surface.values import KINDS, all_values
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
@@ -94,14 +93,15 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
     here, there = all_values(start), all_values(end)
     if part < 1.0:  # at the end to the last digit
         for kind, values in there.items():
-            there[kind] = {k: (1.0 - part) * here[kind][k] + part * value for k, value in values.items()}
+            changed = {k: value for k, value in values.items() if value != here[kind][k]}
+            there[kind] = values | {k: (1.0 - part) * here[kind][k] + part * v for k, v in changed.items()}
     return start.retensioned(walls=[p.name for p in end.patches if p.wall], **there)
 
 
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, kinds as in ``values_of``; walls follow the pressures of their rooms."""
     given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
-    changed, points = with_pressures(surface, **given), values.get("points") or {}
+    changed, points = surface.retensioned(**given), values.get("points") or {}
     known = dict(zip(values_of(surface)["points"], single_points(surface).tolist(), strict=True))
     X = surface.vertices.copy()
     for name, place in points.items():

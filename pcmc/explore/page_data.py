@@ -17,7 +17,7 @@ from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
-from ..energy.curvature import curvature_error, mean_curvature
+from ..forces.curvature import curvature_error, mean_curvature
 from ..margins import Margin
 from ..margins.varied import named
 from ..panelling.distance import difference

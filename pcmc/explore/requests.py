@@ -10,7 +10,7 @@ from ..base.errors import unknown
 from ..base.names import checked_name
 from ..design import Parameter
 from ..margins.targets import Target
-from ..surface.renewed import KINDS
+from ..surface.values import KINDS
 
 LONGEST_NAME = 1000  # characters
 MOST_AIMS = 100  # targets, and parameters, of one request

@@ -25,9 +25,9 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
-from ..energy.flat_pieces import flat_pieces
-from ..energy.plane_pieces import add_plane_volumes
-from ..energy.rooms import room_pressures, room_volumes
+from ..forces.flat_pieces import flat_pieces
+from ..forces.plane_pieces import add_plane_volumes
+from ..forces.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from .evolver_reading import ROUNDING, read

@@ -21,7 +21,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
 from ..base.units import NEWTONS, TABLE, Units, length_factor
-from ..energy.functional import patch_areas
+from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.origin import file_origin
 from .libraries import load_library

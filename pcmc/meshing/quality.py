@@ -9,8 +9,8 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..contact.pinching import StandingPart, place_wall_rows
-from ..energy.functional import apply_supports, onto_circles
-from ..energy.motion_space import motion_space
+from ..forces.functional import apply_supports, onto_circles
+from ..forces.motion_space import motion_space
 from ..surface import Surface
 from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
 from ..surface.topology import SHEET

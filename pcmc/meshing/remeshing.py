@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..contact.pinching import lift, standing_part
-from ..energy.curvature import mean_curvature
+from ..forces.curvature import mean_curvature
 from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
 from .angles import improve_angles

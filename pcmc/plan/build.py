@@ -13,13 +13,13 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..curves.pieces import to_space
-from ..energy.rooms import check_rooms
+from ..forces.rooms import check_rooms
 from ..meshing.angles import improve_angles
 from ..meshing.planar import SIDES, PlanarMesh, signed_areas
 from ..meshing.walls import UpperEdge, WallMesh, build_walls
 from ..surface import Cable, Patch, Plane, Room, Surface
 from ..surface.geometry import segment_lengths
-from ..surface.wall_tensions import balanced_wall
+from ..surface.values import balanced_wall
 from .areas import patches_of
 from .corners import most_in_corners
 from .draft import Draft, drafted

@@ -12,7 +12,7 @@ import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
 from ..curves.curves import Curve
-from ..surface.wall_tensions import balanced_wall
+from ..surface.values import balanced_wall
 from .corners import most_in_corners
 from .drawing import Drawing
 from .edges import cable_for

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import FileError, MissingExtra
 from ..curves.curves import Curve
 from ..plan import plan_from
-from .drawn import FALLBACK, LENGTHS, read
+from .drawn import FALLBACK, LENGTHS, height_targets, read
 from .file import Project
 from .start import surface_of
 
@@ -154,9 +154,7 @@ def proposal_text(project: Project) -> str:
 
 def _targets(tomlkit: Any, drawing: Drawing, names: list[str]) -> Any:
     table = tomlkit.table()
-    points = (drawing.heights - [0.0, 0.0, drawing.level]).tolist()
-    meet = [{"quantity": "height", "of": [x, y], "value": z} for x, y, z in points]
-    table["meet"] = _list(tomlkit, [_inline(tomlkit, entry) for entry in meet])
+    table["meet"] = _list(tomlkit, [_inline(tomlkit, entry) for entry in height_targets(drawing)])
     table["vary"] = names
     table["vary"].comment("the tensions that may change for it")
     return table

@@ -16,7 +16,7 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
-from ..surface.renewed import KINDS, all_values
+from ..surface.values import KINDS, all_values
 from .file import Project, project_of
 from .start import surface_of
 

@@ -13,16 +13,15 @@ from typing import Any, NamedTuple
 
 from .. import io
 from ..base.errors import OptionError, unknown
-from ..base.files import as_path, read_bytes
-from ..energy.rooms import refuse_varied_pressure
+from ..base.files import PathLike, as_path, read_bytes
+from ..forces.rooms import refuse_varied_pressure
 from ..surface import Surface
-from ..surface.renewed import KINDS, all_values
-from ..surface.wall_pressures import with_pressures
-from .checking import is_curve
+from ..surface.values import KINDS, all_values
+from .checking import in_file
 from .drawn import files_of, is_drawing
-from .file import PathLike, Project, in_file, is_project, project_of, read_data
+from .file import Project, is_project, project_of, read_data
 from .keys import WALL, main_sections, solve_section
-from .mesh import mesh_file
+from .settings import MeshFile
 from .shifts import AXES, shifted
 from .start import start_of
 
@@ -68,7 +67,7 @@ def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
     for names, path, table in items:
         steps = ["NAME" if path[k - 1 : k] in (("patches",), ("rooms",)) else p for k, p in enumerate(path)]
         section = sections.get(".".join(step for step in steps if isinstance(step, str)))
-        if section is not None and isinstance(table, Mapping) and not is_curve(section, table):
+        if section is not None and isinstance(table, Mapping) and not section.is_curve(table):
             known = (key.name for key in section.keys if key.kind in NUMERIC)
             possible |= {".".join((*names, key)): (*path, key) for key in known}
     return given | {name: path for name, path in possible.items() if name not in given}
@@ -181,7 +180,7 @@ def digest(path: PathLike) -> str:
 def _project(source: _Source, values: Mapping[str, float]) -> Project:
     """The project with other numbers and shifted lines; loads are ignored."""
     if not source.data:
-        return Project(source.path, mesh=mesh_file(source.path))
+        return Project(source.path, mesh=MeshFile(source.path.name))
     data: Any = deepcopy(source.data)
     shifts: dict[str, dict[str, float]] = {}
     for name, value in values.items():
@@ -212,7 +211,7 @@ def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float])
         given[kind][part] = values[name]
     with in_file(source.path, OptionError):
         refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
-        return with_pressures(surface, **given)
+        return surface.retensioned(**given)
 
 
 def _names(surface: Surface) -> dict[str, tuple[str, str]]:

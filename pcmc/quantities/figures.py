@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import OptionError
 from ..certificate import Certificate
 from ..certificate.cables import chord
-from ..energy.volume_below import volumes_below
+from ..forces.volume_below import volumes_below
 from ..surface import Surface
 from .table import dimension_of
 

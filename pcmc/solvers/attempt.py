@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..energy.functional import patch_areas
+from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped

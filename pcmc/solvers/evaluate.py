@@ -9,11 +9,11 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
-from ..energy import kernels
-from ..energy.flat_pieces import flat_pieces
-from ..energy.functional import add_cables_and_weights, total
-from ..energy.motion_space import tension_forces
-from ..energy.plane_pieces import add_plane_forces, add_plane_volumes
+from ..forces import kernels
+from ..forces.flat_pieces import flat_pieces
+from ..forces.functional import add_cables_and_weights, total
+from ..forces.motion_space import tension_forces
+from ..forces.plane_pieces import add_plane_forces, add_plane_volumes
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, dot, point, scaled, vector

@@ -14,10 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..energy.functional import apply_supports
-from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
-from ..energy.pattern import hessian_pattern
-from ..energy.second_variation import assemble
+from ..forces.functional import apply_supports
+from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
+from ..forces.pattern import hessian_pattern
+from ..forces.second_variation import assemble
 from ..stability.factorisation import factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET

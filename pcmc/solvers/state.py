@@ -23,10 +23,10 @@ from ..contact.pinching import (
     top_spacing,
 )
 from ..contact.pull import excess_pull, pull_directions
-from ..energy.functional import energy_and_gradient, energy_at, onto_circles
-from ..energy.loose_parts import relative_forces, rounding_left
-from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.rooms import (
+from ..forces.functional import energy_and_gradient, energy_at, onto_circles
+from ..forces.loose_parts import relative_forces, rounding_left
+from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.rooms import (
     closing_volumes,
     prescribed_volumes,
     volume_gradients_at,

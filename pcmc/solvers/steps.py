@@ -9,11 +9,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from ..energy.jacobian import linearise
-from ..energy.motion_space import MotionSpace
-from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.rigid_motions import rigid_modes, rigid_motions
-from ..energy.second_variation import assemble
+from ..forces.jacobian import linearise
+from ..forces.motion_space import MotionSpace
+from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.second_variation import assemble
 from ..meshing.quality import edge_lengths
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser

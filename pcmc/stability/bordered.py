@@ -16,7 +16,7 @@ class BorderedFactor:
 
     Examples
     --------
-    >>> from pcmc.energy.pattern import Pattern
+    >>> from pcmc.forces.pattern import Pattern
     >>> from pcmc.stability.factorisation import factoriser
     >>> pattern = Pattern(np.array([0, 1, 2]), np.array([0, 1]), np.empty((0, 3)))
     >>> factor = factoriser(pattern, "superlu").factor(np.array([2.0, -1.0]))

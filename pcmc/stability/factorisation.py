@@ -29,7 +29,7 @@ from scipy.sparse.linalg import splu
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import MissingExtra, PcmcError
-from ..energy.pattern import Pattern
+from ..forces.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
 __all__ = ("BACKENDS", "Factor", "Factoriser", "SingularMatrix", "available", "factoriser")

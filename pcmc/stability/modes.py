@@ -18,11 +18,11 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from ..base.arrays import Floats
 from ..contact.pinching import standing_part
-from ..energy.motion_space import MotionSpace, VertexClasses, motion_space
-from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.rigid_motions import rigid_modes, rigid_motions
-from ..energy.rooms import volume_columns
-from ..energy.second_variation import assemble
+from ..forces.motion_space import MotionSpace, VertexClasses, motion_space
+from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.rooms import volume_columns
+from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from .factorisation import Factor, Factoriser, SingularMatrix, factoriser

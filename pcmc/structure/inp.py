@@ -16,7 +16,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
-from ..energy.cables import directions
+from ..forces.cables import directions
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from .loads import Step

@@ -14,7 +14,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
-from ..energy.cables import directions
+from ..forces.cables import directions
 from ..surface.geometry import area_vectors
 from .model import StructuralModel
 from .tables import Block, read

@@ -23,10 +23,10 @@ from .geometry import bounding_size
 from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .origin import uncancelled_pressures, volume_origin
 from .patch import Patch
-from .renewed import renewed
 from .room import Room, room_signs
 from .summary import summary
 from .topology import Topology, topology
+from .values import wall_changes, with_values
 from .walls import wall_patches
 
 MESH = ("vertices", "faces", "patch_of_face", "patches")
@@ -375,21 +375,44 @@ class Surface:
         """The same surface with other tensions, pressures, weights or snow, given by patch name.
 
         ``walls`` names patches that are walls whatever their pressure; ``cables`` gives tensions by the name
-        of the cable, ``volumes`` volumes by the name of the room.
+        of the cable, ``volumes`` volumes by the name of the room. The pressure of a wall changes with the
+        difference of its two rooms' pressures, and its snow with that of the snow over them, unless the wall
+        itself is named.
+
+        Raises
+        ------
+        SurfaceError : an edge under one of the ``snows`` is free; see ``with_snow``.
+
+        Examples
+        --------
+        >>> from pcmc.plan import Divider, Plan
+        >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=1.0,
+        ...             patches={"west": {"tension": 4.0}, "east": {"tension": 4.0}}).surface()
+        >>> hall.retensioned(pressures={"west": 1.25}).pressures.tolist()
+        [1.25, 1.0, 0.25]
         """
-        by_patch: dict[str, Any] = {"tension": tensions, "pressure": pressures}
-        by_patch |= {"weight": weights, "snow": snows}
-        for key, given in (by_patch | {"cable": cables, "volume": volumes}).items():
-            if not isinstance(given or {}, Mapping):
-                validate.refuse(f"{key}s", given, "a mapping from names to numbers", error=SurfaceError)
+        by_patch = {"tension": tensions, "pressure": pressures, "weight": weights, "snow": snows}
+        for key, values in (by_patch | {"cable": cables, "volume": volumes}).items():
+            if not isinstance(values or {}, Mapping):
+                validate.refuse(f"{key}s", values, "a mapping from names to numbers", error=SurfaceError)
         if isinstance(walls, str) or not isinstance(walls, Iterable):
             validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
-        walled = dict.fromkeys(walls, True)
-        return self._with(
-            patches=renewed("patch", self.patches, **by_patch, wall=walled),
-            cables=renewed("cable", self.cables, tension=cables),
-            rooms=renewed("room", self.rooms, volume=volumes),
+        given: dict[str, Any] = {key: dict(values or {}) for key, values in by_patch.items()}
+        declared = dict.fromkeys(walls, True)
+        patches = with_values(self.patches, "patch", {**given, "wall": declared})
+        following: dict[str, dict[str, float]] = {}
+        for key in ("pressure", "snow"):
+            old, new = (np.array([getattr(p, key) for p in parts]) for parts in (self.patches, patches))
+            change = wall_changes(self, new - old, {self.patch_index(name) for name in given[key]})
+            following[key] = {patches[k].name: float(old[k] + change[k]) for k in np.flatnonzero(change)}
+        follow = dict.fromkeys((*following["pressure"], *following["snow"]), True)
+        changed = self._with(
+            patches=with_values(patches, "patch", {**following, "wall": follow}),
+            cables=with_values(self.cables, "cable", {"tension": cables or {}}),
+            rooms=with_values(self.rooms, "room", {"volume": volumes or {}}),
         )
+        snowed = bool(snows) and not np.array_equal(changed.snows, self.snows)
+        return changed.with_held_snow() if snowed else changed
 
     def __repr__(self) -> str:
         """Size, patches, walls and supports, a line each."""
@@ -426,7 +449,8 @@ class Surface:
         every = [patch.name for patch in self.patches]
         roof = [name for name, wall in zip(every, self.walls.tolist(), strict=True) if not wall]
         names = list(patches) if patches is not None else roof or every
-        return self.retensioned(snows=dict.fromkeys(names, snow)).with_held_snow()
+        snows = {patch.name: patch.snow for patch in self.patches} | dict.fromkeys(names, snow)
+        return self.retensioned(snows=snows).with_held_snow()
 
     def with_held_snow(self) -> Surface:
         """The surface itself; SurfaceError where its snow ends at a free edge, as in ``with_snow``."""

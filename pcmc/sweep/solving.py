@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .. import existence, solvers
 from ..base import validate
 from ..base.errors import OptionError, unknown
-from ..energy.functional import gradient
+from ..forces.functional import gradient
 from ..solvers import find_method
 from ..solvers.result import Result
 from .case_script import resolve
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from ..certificate import Certificate
     from ..project import Outcome
 
-Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 
-
-def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
+def _split(
+    generator: str, method: str, arguments: Mapping[str, Any]
+) -> tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]:
     """The generator, and which arguments are its own and which the solver's."""
     try:
         build = resolve(generator)

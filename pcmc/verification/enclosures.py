@@ -1,6 +1,6 @@
 """∇E and its derivative in frozen frames, each number enclosed in a ball.
 
-E is a sum over triangles and cable edges. With the formulas of ``energy.kernels`` and ``energy.weight`` a
+E is a sum over triangles and cable edges. With the formulas of ``forces.kernels`` and ``forces.weight`` a
 triangle of tension α, weight w and pressure p acts like one of tension τ = α + w z̄, and
 
     ∂E/∂i     = ½ τ ν × e_i + w A n/3 - p (x_j × x_k)/6
@@ -20,9 +20,9 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
-from ..energy.flat_pieces import flat_pieces
-from ..energy.motion_space import MotionSpace, VertexClasses
-from ..energy.pattern import Pattern, pair_place, row_place
+from ..forces.flat_pieces import flat_pieces
+from ..forces.motion_space import MotionSpace, VertexClasses
+from ..forces.pattern import Pattern, pair_place, row_place
 from ..surface import Surface
 from ..surface.geometry import vector
 from . import balls

@@ -37,7 +37,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.compiled import compiled
-from ..energy.motion_space import MotionSpace
+from ..forces.motion_space import MotionSpace
 from ..surface.geometry import add, cross, dot, norm, point, scaled, sub, vector
 from .balls import SAFE
 from .enclosures import Elements

@@ -26,10 +26,10 @@ from scipy.sparse import block_array, csr_array
 
 from ..base.arrays import Floats
 from ..contact.pinching import StandingPart
-from ..energy.flat_pieces import flat_pieces
-from ..energy.motion_space import MotionSpace
-from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.rooms import closing_volumes, prescribed_volumes
+from ..forces.flat_pieces import flat_pieces
+from ..forces.motion_space import MotionSpace
+from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.rooms import closing_volumes, prescribed_volumes
 from ..stability.modes import full_matrix
 from .balls import SAFE, U
 from .enclosures import Elements, coordinates, elements, forces, second_variation, volume

@@ -31,10 +31,10 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, standing_part
 from ..contact.pull import pull_and_capacity
-from ..energy.loose_parts import relative_forces
-from ..energy.motion_space import MotionSpace, motion_space
-from ..energy.rigid_motions import rigid_modes, rigid_motions
-from ..energy.rooms import volume_defects
+from ..forces.loose_parts import relative_forces
+from ..forces.motion_space import MotionSpace, motion_space
+from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.rooms import volume_defects
 from ..stability.backward_error import backward_error
 from ..stability.factorisation import SingularMatrix, factoriser
 from ..surface import Surface, expect_surface

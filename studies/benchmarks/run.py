@@ -21,7 +21,7 @@ from rich.table import Table
 from generators import two_squares
 from pcmc import Surface
 from pcmc.base.arrays import Floats
-from pcmc.energy.functional import energy_and_gradient
+from pcmc.forces.functional import energy_and_gradient
 
 from ..folder import Folder, write_json
 from . import scaling

@@ -16,10 +16,10 @@ import numpy as np
 from generators import two_squares
 from pcmc import Surface, certify, solve
 from pcmc.base.arrays import Floats
-from pcmc.energy.functional import energy_and_gradient
-from pcmc.energy.motion_space import VertexClasses, motion_space, vertex_classes
-from pcmc.energy.pattern import Pattern, hessian_pattern
-from pcmc.energy.second_variation import assemble
+from pcmc.forces.functional import energy_and_gradient
+from pcmc.forces.motion_space import VertexClasses, motion_space, vertex_classes
+from pcmc.forces.pattern import Pattern, hessian_pattern
+from pcmc.forces.second_variation import assemble
 from pcmc.stability.factorisation import Factoriser, available, factoriser
 
 from ..reference import evolver

@@ -9,7 +9,7 @@ import numpy as np
 
 from pcmc import Surface, curvature_error
 from pcmc.base.arrays import Floats
-from pcmc.energy.curvature import METHODS
+from pcmc.forces.curvature import METHODS
 
 from ..folder import Folder
 from .flow import errors, external_area

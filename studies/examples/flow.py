@@ -11,9 +11,9 @@ import pandas as pd
 
 from pcmc import Surface, curvature_error, gradient, mean_curvature, solve, target_curvature
 from pcmc.base.arrays import Floats, Ints
-from pcmc.energy import kernels
-from pcmc.energy.curvature import METHODS
-from pcmc.energy.functional import patch_areas
+from pcmc.forces import kernels
+from pcmc.forces.curvature import METHODS
+from pcmc.forces.functional import patch_areas
 from pcmc.meshing.quality import minimum_angle, triangle_quality
 from pcmc.solvers.result import Progress
 

@@ -18,7 +18,7 @@ from generators.schwarz_p import AREA as SCHWARZ_P
 from pcmc import Plane, Room, Surface, Target, room_volumes
 from pcmc.base.arrays import Floats
 from pcmc.design.targets import measure
-from pcmc.energy.functional import patch_areas
+from pcmc.forces.functional import patch_areas
 
 DOUBLE_BUBBLE = 27.0 * np.pi / (9.0 * np.pi) ** (2.0 / 3.0)  # area around two volumes of 1
 TRIPLE_BUBBLE = generators.triple_bubble_exact().area  # around three

@@ -22,7 +22,7 @@ from generators import catenoid_fold, lens_circle
 from generators.exact import ExactSolution
 from pcmc import Surface, energy, solve
 from pcmc.base.arrays import Floats
-from pcmc.energy.functional import patch_areas, volume
+from pcmc.forces.functional import patch_areas, volume
 
 from ..folder import Folder
 from ..orders import slope

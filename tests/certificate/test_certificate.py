@@ -13,7 +13,7 @@ from pcmc.certificate import Verdict
 from pcmc.certificate.reactions import support_forces
 from pcmc.certificate.tables import conormal_sum
 from pcmc.contact.pinching import standing_part
-from pcmc.energy.functional import patch_areas, volume
+from pcmc.forces.functional import patch_areas, volume
 from pcmc.meshing.quality import triangle_quality
 from pcmc.plan import Divider, Plan
 from pcmc.stability.modes import morse_index

@@ -18,7 +18,7 @@ from pcmc.contact.pinching import (
     top_spacing,
 )
 from pcmc.contact.pull import pull_and_capacity
-from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.state import State
 

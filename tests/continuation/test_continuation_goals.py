@@ -77,7 +77,7 @@ def test_goal_beyond_the_fold_of_the_same_step_is_met_after_it(small_cap):
 def test_rates_of_goals_are_their_slopes_along_the_branch(parameter):
     weights = {parameter: 1.0} if isinstance(parameter, str) else {}
     line = Direction(weights, {} if weights else {"left": 1.0})
-    start = two_squares(4, alpha_aux=1.0).retensioned({}, {"left": 0.9})  # not alike: one apex
+    start = two_squares(4, alpha_aux=1.0).retensioned({}, {"left": 0.9, "wall": 0.0})  # not alike: one apex
     start = solve(start, target="stationary").surface
     tracer = Tracer(start, line.line(start), {}, FollowOptions(), None)
     segment = tracer.step(0.05).segment

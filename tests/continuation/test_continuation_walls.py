@@ -10,7 +10,6 @@ from pcmc.contact.pinching import standing_part
 from pcmc.contact.pull import pull_and_capacity
 from pcmc.continuation import Ending
 from pcmc.plan import Divider, Plan
-from pcmc.surface.wall_pressures import with_pressures
 
 
 def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
@@ -153,10 +152,10 @@ def test_a_branch_in_one_rooms_pressure_does_not_depend_on_where_the_plan_is_dra
     assert end["pressure wall 1"] == pytest.approx(0.3, rel=1e-12)
     assert here.last.walls.tolist() == [False, False, True]
     assert certify(here.last).detail == ""
-    direct = solve(with_pressures(two_rooms(0, 0), None, {"west": 1.3}))
+    direct = solve(two_rooms(0, 0).retensioned(None, {"west": 1.3}))
     assert direct.energy == pytest.approx(end["energy"], rel=1e-4)
     named = Direction(pressures={"west": 1.0, "wall 1": 0.5}, relative=True)
-    assert named.line(two_rooms(0, 0)).pressure_rates.tolist() == [1.0, 0.0, 0.5]
+    assert named.line(two_rooms(0, 0)).rates["pressures"].tolist() == [1.0, 0.0, 0.5]
 
 
 def test_a_wall_that_follows_its_rooms_stays_a_wall():

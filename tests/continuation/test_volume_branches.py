@@ -16,7 +16,7 @@ from pcmc import Direction, Room, Target
 from pcmc.base.errors import OptionError
 from pcmc.design import Parameter, meet, sensitivities
 from pcmc.design.targets import measure
-from pcmc.energy.rooms import room_pressures, room_volumes
+from pcmc.forces.rooms import room_pressures, room_volumes
 
 
 def heavy_profile(volume: float, alpha: float, weight: float) -> tuple[float, float]:

@@ -5,9 +5,9 @@ import pytest
 from motion_cases import SURFACES, seam
 
 from pcmc import hessian
-from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.pattern import hessian_pattern
-from pcmc.energy.second_variation import assemble
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pattern import hessian_pattern
+from pcmc.forces.second_variation import assemble
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 

@@ -18,9 +18,9 @@ from pcmc import Cable, Direction, Parameter, Patch, Plane, Surface, Target, Ver
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate.balance import load_ratio, unbalanced
 from pcmc.design.targets import measure
-from pcmc.energy.functional import energy_and_gradient, energy_at
-from pcmc.energy.motion_space import vertex_classes
-from pcmc.energy.second_variation import hessian
+from pcmc.forces.functional import energy_and_gradient, energy_at
+from pcmc.forces.motion_space import vertex_classes
+from pcmc.forces.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

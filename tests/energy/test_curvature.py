@@ -89,7 +89,9 @@ def test_no_curvature_where_sheets_touch(method):
 
 
 def test_targets_and_errors_by_patch():
-    surface = three_patches(3).retensioned({"wall0": 0.0}, pressures={"roof1": 2.0})
+    surface = three_patches(3)
+    unpressed = {p.name: 0.0 for p in surface.patches if p.auxiliary}
+    surface = surface.retensioned({"wall0": 0.0}, pressures={"roof1": 2.0, **unpressed})
     target, H, error = (f(surface) for f in (target_curvature, mean_curvature, curvature_error))
     inside = surface.topology.interior
     for k, patch in enumerate(surface.patches):

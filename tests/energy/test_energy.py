@@ -7,7 +7,7 @@ import pytest
 from shapes import cap, generic, octahedron, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, hessian
-from pcmc.energy.functional import (
+from pcmc.forces.functional import (
     apply_supports,
     energy_and_gradient,
     energy_at,

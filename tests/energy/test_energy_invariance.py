@@ -10,7 +10,7 @@ from shapes import generic, hexagon, pyramid, rotation, shaken, three_patches
 
 from pcmc import Patch, Plane, Surface, energy, gradient
 from pcmc.base import compiled
-from pcmc.energy.functional import energy_and_gradient, patch_areas
+from pcmc.forces.functional import energy_and_gradient, patch_areas
 
 seeds = st.integers(0, 2**32 - 1)
 small = st.floats(-10.0, 10.0)

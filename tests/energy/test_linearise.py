@@ -8,9 +8,9 @@ from starts import two_squares
 
 from pcmc import Plane, Surface, solve
 from pcmc.contact.pinching import standing_part
-from pcmc.energy.functional import energy_and_gradient
-from pcmc.energy.jacobian import linearise
-from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.forces.functional import energy_and_gradient
+from pcmc.forces.jacobian import linearise
+from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.surface.topology import SHEET
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")

@@ -14,8 +14,8 @@ from generators.grid import cut_squares
 from pcmc import Direction, Patch, Plane, Room, Surface, Target
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from pcmc.design import Parameter, meet, sensitivities
-from pcmc.energy.functional import energy_and_gradient
-from pcmc.energy.rooms import (
+from pcmc.forces.functional import energy_and_gradient
+from pcmc.forces.rooms import (
     prescribed_volumes,
     room_pressures,
     room_volume_gradients,

@@ -10,7 +10,7 @@ from pcmc.contact.pinching import standing_part
 from pcmc.design import sensitivities
 from pcmc.design.targets import measure
 from pcmc.plan import Area, Divider, Plan
-from pcmc.surface.wall_pressures import wall_pressure_changes, with_pressures
+from pcmc.surface.values import wall_changes
 
 HALL = """
 [plan]
@@ -36,29 +36,29 @@ def hall(west=1.0, east=1.0):
 def test_changed_pressures_are_those_of_the_plan_drawn_with_them(start):
     for given in ({"east": 0.8}, {"west": 1.3}, {"west": 1.3, "east": 0.8}):
         rooms = dict(zip(("west", "east"), start, strict=True)) | given
-        found, wanted = with_pressures(hall(*start), None, given), hall(**rooms)
+        found, wanted = hall(*start).retensioned(None, given), hall(**rooms)
         assert [p.wall for p in found.patches] == [p.wall for p in wanted.patches]
         np.testing.assert_allclose(found.pressures, wanted.pressures, atol=1e-15)
         assert not found.uncancelled.any()
 
 
 def test_tensions_and_a_pressure_of_the_wall_itself_are_as_given():
-    found = with_pressures(hall(), {"west": 7.0}, {"west": 1.3, "wall 1": 0.1})
+    found = hall().retensioned({"west": 7.0}, {"west": 1.3, "wall 1": 0.1})
     assert found.tensions.tolist() == [7.0, 6.0, 1.0]
     assert found.pressures.tolist() == [1.3, 1.0, 0.1]
 
 
 def test_a_wall_that_follows_remains_a_wall():
-    found = with_pressures(two_squares(3), None, {"left": 1.25})
+    found = two_squares(3).retensioned(None, {"left": 1.25})
     assert found.pressures.tolist() == [1.25, 1.0, 0.25]
     assert found.walls.tolist() == [False, False, True]
-    assert with_pressures(found, None, {"left": 1.0}).pressures.tolist() == [1.0, 1.0, 0.0]
+    assert found.retensioned(None, {"left": 1.0}).pressures.tolist() == [1.0, 1.0, 0.0]
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".3dm", ".ifc"])
 def test_a_pinched_wall_with_a_pressure_comes_back_where_patches_are_written_apart(suffix, tmp_path):
     pinched = pcmc.solve(two_squares(16, alpha_aux=2.0), target="stationary").surface
-    surface = with_pressures(pinched, None, {"left": 1.02})
+    surface = pinched.retensioned(None, {"left": 1.02})
     assert standing_part(surface).surface.m < surface.m
     pcmc.write(tmp_path / f"a{suffix}", surface)
     again = pcmc.read(tmp_path / f"a{suffix}")
@@ -72,16 +72,16 @@ def test_a_wall_that_passes_several_rooms_has_no_one_pressure():
         edge_length=1.0,
         patches=[Area("west", 6.0, at=[3, 4]), Area("south", 6.0, at=[9, 2]), Area("north", 6.0, at=[9, 6])],
     ).surface()
-    both = with_pressures(surface, None, {"south": 0.9, "north": 0.9})
+    both = surface.retensioned(None, {"south": 0.9, "north": 0.9})
     assert np.abs(both.pressures).tolist() == pytest.approx([1.0, 0.9, 0.9, 0.1, 0.0])
-    one = {p.name: p.pressure for p in with_pressures(surface, None, {"south": 0.9}).patches}
+    one = {p.name: p.pressure for p in surface.retensioned(None, {"south": 0.9}).patches}
     assert (one["spine"], abs(one["rib"])) == (0.0, pytest.approx(0.1))
 
 
 def test_without_walls_or_changes_nothing_follows():
     bubble = double_bubble(1.0)
     for surface, change in ((bubble, np.ones(3)), (two_squares(3), np.zeros(3))):
-        assert not wall_pressure_changes(surface, change).any()
+        assert not wall_changes(surface, change).any()
 
 
 def test_the_command_and_its_targets_press_walls_too(tmp_path, monkeypatch, capsys):
@@ -108,7 +108,7 @@ def test_sensitivities_to_a_room_s_pressure_are_slopes_with_its_wall_following(k
     target, step = Target(kind, "west"), 1e-3
 
     def found(west):
-        solved = pcmc.solve(with_pressures(at_rest, None, {"west": west}), **tight).surface
+        solved = pcmc.solve(at_rest.retensioned(None, {"west": west}), **tight).surface
         return measure(solved, target).value
 
     slope = (8 * (found(1 + step) - found(1 - step)) - found(1 + 2 * step) + found(1 - 2 * step)) / (

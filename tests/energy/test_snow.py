@@ -13,17 +13,16 @@ from generators import hypar_roof, spherical_cap
 from pcmc import Parameter, Patch, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
 from pcmc.design.targets import measure
-from pcmc.energy.rooms import room_pressures
 from pcmc.existence.attempts import Attempts
 from pcmc.existence.loads import raise_loads
 from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
+from pcmc.forces.rooms import room_pressures
 from pcmc.io.scaling import scaled_surface
 from pcmc.plan import Area, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
-from pcmc.surface.wall_pressures import with_pressures
 from studies.reference import evolver
 
 TOML = """
@@ -71,10 +70,10 @@ def test_the_energy_is_that_of_the_net_pressures():
 
 def test_walls_follow_the_air_of_their_rooms_and_the_difference_of_the_snow():
     snowy = hall()
-    warmer = with_pressures(snowy, None, {"west": 1.15})
+    warmer = snowy.retensioned(None, {"west": 1.15})
     np.testing.assert_allclose(warmer.pressures, [1.15, 1.0, 0.15], rtol=1e-14)
     assert warmer.snows.tolist() == snowy.snows.tolist()
-    even = with_pressures(snowy, snows={"east": 0.25})
+    even = snowy.retensioned(snows={"east": 0.25})
     np.testing.assert_allclose(even.pressures, snowy.pressures)
     assert even.snows.tolist() == [0.25, 0.25, 0.0]
     assert even.uncancelled.max() == warmer.uncancelled.max() == 0.0
@@ -194,7 +193,7 @@ def test_snow_can_be_sought():
     roof = pcmc.solve(hall()).surface
     slopes = pcmc.sensitivities(roof, of, Parameter("east", "snow"))
     for sign in (1.0, -1.0):
-        moved = pcmc.solve(with_pressures(roof, snows={"east": 0.5 + 1e-4 * sign})).surface
+        moved = pcmc.solve(roof.retensioned(snows={"east": 0.5 + 1e-4 * sign})).surface
         change = [measure(moved, target).value - measure(roof, target).value for target in of]
         np.testing.assert_allclose(change, 1e-4 * sign * slopes.to_numpy()[:, 0], rtol=5e-3, atol=1e-12)
 
@@ -232,9 +231,9 @@ def test_a_branch_in_the_snow_keeps_the_wall_between_the_rooms():
     assert branch.last.snows.tolist() == pytest.approx([0.25, 0.3, -0.05], abs=1e-12)
     np.testing.assert_array_equal(branch.last.pressures, roof.pressures)
     assert branch.points["snow east"].iloc[-1] == pytest.approx(0.3)
-    there = pcmc.solve(with_pressures(roof, snows={"east": 0.3})).surface
+    there = pcmc.solve(roof.retensioned(snows={"east": 0.3})).surface
     assert pcmc.energy(branch.last) == pytest.approx(pcmc.energy(there), rel=1e-7)
-    line, more = pcmc.Direction(snows={"east": 1.0}).line(roof), with_pressures(roof, snows={"east": 1.5})
+    line, more = pcmc.Direction(snows={"east": 1.0}).line(roof), roof.retensioned(snows={"east": 1.5})
     rate = line.energy_derivative(roof, roof.vertices, 0.5)  # E is linear in the snow
     assert rate == pytest.approx(pcmc.energy(more) - pcmc.energy(roof), rel=1e-12)
     force = pcmc.gradient(more) - pcmc.gradient(roof)

@@ -13,7 +13,7 @@ from generators import calibration, fans
 from generators.calibration import PRINTED
 from pcmc import energy, gradient
 from pcmc.base.errors import OptionError
-from pcmc.energy.functional import patch_areas, volume
+from pcmc.forces.functional import patch_areas, volume
 from pcmc.meshing.quality import edge_lengths
 
 # Smallest angle, degrees: of the patches under pressure, and of the walls. A wall's follow from the

@@ -17,7 +17,7 @@ from tents import tent
 import pcmc
 from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
 from pcmc.base.units import FORCES, LENGTHS, Units
-from pcmc.energy.functional import patch_areas
+from pcmc.forces.functional import patch_areas
 
 
 def roof_of(path):

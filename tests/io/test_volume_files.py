@@ -7,7 +7,7 @@ from volume_cases import cap, cylinder, raised
 import generators
 import pcmc
 from pcmc import Line, Patch, Room, Surface
-from pcmc.energy.rooms import prescribed_volumes, room_pressures, room_volumes, with_room_pressures
+from pcmc.forces.rooms import prescribed_volumes, room_pressures, room_volumes, with_room_pressures
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
 from studies.reference import evolver

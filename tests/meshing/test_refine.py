@@ -6,7 +6,7 @@ from refusals import refused
 
 from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.energy.functional import patch_areas, patch_volumes
+from pcmc.forces.functional import patch_areas, patch_volumes
 from pcmc.meshing.refinement import held_midpoints, prolongation, refine
 
 

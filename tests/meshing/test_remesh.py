@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 import generators
 from pcmc import Patch, Surface, solve
 from pcmc.base.errors import MissingExtra, OptionError
-from pcmc.energy.functional import patch_areas
+from pcmc.forces.functional import patch_areas
 from pcmc.meshing.curve_cutting import CurveMesh, cut_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine

@@ -11,8 +11,8 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.continuation import Direction
 from pcmc.drawings import drawing_set
-from pcmc.energy.functional import patch_areas
 from pcmc.explore.page_data import control_groups, outline
+from pcmc.forces.functional import patch_areas
 from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
 from pcmc.project.values import values_of

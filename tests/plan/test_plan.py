@@ -9,7 +9,7 @@ from pcmc import Plane, Surface, Verdict, solve
 from pcmc.base.errors import PlanWarning
 from pcmc.curves.curves import arc, bezier, circle, join, polyline
 from pcmc.curves.pieces import to_local
-from pcmc.energy.functional import patch_areas
+from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Area, Divider, Hole, Plan, draft, patch_names, plan_from

@@ -13,7 +13,7 @@ from volume_cases import cap_height
 import pcmc
 from pcmc import Verdict
 from pcmc.base.errors import PlanError, PlanWarning
-from pcmc.energy.rooms import room_volumes
+from pcmc.forces.rooms import room_volumes
 from pcmc.plan import Area, CableLine, Divider, Hole, Plan
 
 # ---- cables in a plan

@@ -12,7 +12,7 @@ from refusals import refused
 import pcmc
 from pcmc import Verdict, cli, io
 from pcmc.base.errors import LostWarning, OptionError
-from pcmc.energy.rooms import room_volumes
+from pcmc.forces.rooms import room_volumes
 from pcmc.plan import Area, Divider, Plan
 from pcmc.project import run, varied
 

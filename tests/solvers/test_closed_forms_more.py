@@ -40,7 +40,7 @@ from generators import (
 )
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.base.errors import OptionError
-from pcmc.energy.functional import patch_areas, volume
+from pcmc.forces.functional import patch_areas, volume
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 

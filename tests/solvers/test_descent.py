@@ -5,7 +5,7 @@ import pytest
 from shapes import disc
 
 from pcmc import Patch, Surface
-from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.solvers.smoother import HarmonicExtension
 from pcmc.stability.factorisation import available
 

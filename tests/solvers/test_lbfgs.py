@@ -10,7 +10,7 @@ from shapes import cap, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, solve
 from pcmc.base.errors import OptionError
-from pcmc.energy.functional import energy_and_gradient, energy_at
+from pcmc.forces.functional import energy_and_gradient, energy_at
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.solvers.lbfgs import Coordinates, LbfgsOptions, lbfgs
 from pcmc.solvers.result import Status

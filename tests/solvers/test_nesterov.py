@@ -8,7 +8,7 @@ from shapes import cap, octahedron, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, solve
 from pcmc.base.errors import OptionError
-from pcmc.energy.functional import energy_and_gradient
+from pcmc.forces.functional import energy_and_gradient
 from pcmc.solvers.nesterov import NesterovOptions, _Flow, nesterov
 from pcmc.solvers.result import Status
 

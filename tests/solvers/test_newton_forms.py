@@ -7,8 +7,8 @@ from starts import double_bubble, joined_caps, sphere, spherical_cap
 from generators import double_bubble_exact, joined_caps_exact, sphere_exact, spherical_cap_exact
 from pcmc import certify, energy, solve
 from pcmc.certificate import Verdict
-from pcmc.energy.functional import volume
-from pcmc.energy.rigid_motions import rigid_motions
+from pcmc.forces.functional import volume
+from pcmc.forces.rigid_motions import rigid_motions
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Status
 

@@ -11,9 +11,9 @@ from refusals import refused
 from scipy.sparse import csr_array
 
 from pcmc.base.errors import MissingExtra, OptionError, PcmcError
-from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.pattern import Pattern, hessian_pattern
-from pcmc.energy.second_variation import assemble
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pattern import Pattern, hessian_pattern
+from pcmc.forces.second_variation import assemble
 from pcmc.stability import factorisation as factor
 from pcmc.stability.factorisation import SingularMatrix, available, factoriser
 

@@ -10,9 +10,9 @@ from starts import double_bubble, sphere, two_squares
 import pcmc
 from generators import four_fans
 from pcmc import Patch, Surface, hessian
-from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.pattern import Pattern
-from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pattern import Pattern
+from pcmc.forces.rigid_motions import rigid_modes, rigid_motions
 from pcmc.stability import modes
 from pcmc.stability.factorisation import factoriser
 from pcmc.stability.modes import lowest, negatives_without, stiffness

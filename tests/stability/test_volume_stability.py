@@ -10,8 +10,8 @@ from volume_cases import DOUBLE, TRIPLE, connected_caps, cylinder, order
 import generators
 import pcmc
 from pcmc.base.errors import FreeSurfaceWarning
-from pcmc.energy.functional import patch_areas
-from pcmc.energy.rooms import room_volume_gradients, room_volumes
+from pcmc.forces.functional import patch_areas
+from pcmc.forces.rooms import room_volume_gradients, room_volumes
 from pcmc.stability.modes import lowest, morse_index, second_variation
 
 

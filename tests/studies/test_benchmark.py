@@ -12,7 +12,7 @@ import pytest
 
 from generators import spherical_cap_exact, two_squares
 from pcmc import hessian
-from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.sweep import Sweep
 from studies.__main__ import main
 from studies.alpha_grid.grid import TENSIONS

@@ -10,7 +10,7 @@ import pytest
 
 from generators import four_fans, spherical_cap, two_caps, two_squares
 from pcmc import curvature_error, solve
-from pcmc.energy.functional import energy_and_gradient
+from pcmc.forces.functional import energy_and_gradient
 from studies.benchmarks.run import numpy_energy_and_gradient
 from studies.examples import example1
 from studies.examples.flow import NOISE, Case, errors, start_of, turn

@@ -9,7 +9,6 @@ import pcmc
 from generators import spherical_cap
 from pcmc.design.targets import measure
 from pcmc.plan import plan_from
-from pcmc.surface.wall_pressures import with_pressures
 
 TIGHT = {"tolerance": 1e-13, "min_quality": 0.0}
 
@@ -42,7 +41,7 @@ def cap(**arguments):
 def changed(surface, parameter, value):
     given = {parameter.patch: value}
     tension = parameter.kind == "tension"
-    return with_pressures(surface, given if tension else None, None if tension else given)
+    return surface.retensioned(given if tension else None, None if tension else given)
 
 
 def difference(surface, targets, parameter, step, **options):

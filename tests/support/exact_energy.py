@@ -12,10 +12,10 @@ from flint import arb, arb_mat, ctx
 
 from pcmc import Surface
 from pcmc.contact.pinching import standing_part
-from pcmc.energy.flat_pieces import flat_pieces
-from pcmc.energy.motion_space import motion_space
-from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
-from pcmc.energy.rooms import closing_volumes
+from pcmc.forces.flat_pieces import flat_pieces
+from pcmc.forces.motion_space import motion_space
+from pcmc.forces.rigid_motions import rigid_modes, rigid_motions
+from pcmc.forces.rooms import closing_volumes
 
 ctx.prec = 800
 STEP = arb(10) ** -40

@@ -7,7 +7,7 @@ from shapes import pyramid
 
 import generators
 from pcmc import Patch, Plane, Room, Surface
-from pcmc.energy.rooms import room_volumes
+from pcmc.forces.rooms import room_volumes
 
 DOUBLE, TRIPLE = 9.139421678069, 13.128168244433  # least areas around volumes of 1
 

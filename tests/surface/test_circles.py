@@ -14,12 +14,12 @@ import pcmc
 from generators import three_patches
 from pcmc import Circle, Patch, Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.energy.functional import apply_supports, energy_and_gradient, energy_at, onto_circles
-from pcmc.energy.jacobian import linearise
-from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.pattern import hessian_pattern
-from pcmc.energy.rigid_motions import rigid_motions
-from pcmc.energy.second_variation import assemble, hessian
+from pcmc.forces.functional import apply_supports, energy_and_gradient, energy_at, onto_circles
+from pcmc.forces.jacobian import linearise
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pattern import hessian_pattern
+from pcmc.forces.rigid_motions import rigid_motions
+from pcmc.forces.second_variation import assemble, hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

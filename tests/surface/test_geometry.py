@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapes import generic, octahedron, rotation, shaken
 
-from pcmc.energy.functional import patch_areas
+from pcmc.forces.functional import patch_areas
 from pcmc.surface import geometry
 from pcmc.surface.geometry import (
     angles,

@@ -13,9 +13,9 @@ import pcmc
 from generators import two_squares
 from pcmc import Line, Patch, Surface, certify, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.energy.functional import apply_supports, energy_and_gradient, energy_at
-from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.second_variation import hessian
+from pcmc.forces.functional import apply_supports, energy_and_gradient, energy_at
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

@@ -13,10 +13,10 @@ from generators import barrel, four_fans, schwarz_p, spherical_cap, two_squares
 from generators.schwarz_p import AREA
 from pcmc import Cable, Circle, Line, Patch, Plane, Room, Surface, cli, cut, mirrored
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
-from pcmc.energy.curvature import mean_curvature
-from pcmc.energy.functional import energy_and_gradient, patch_volumes
-from pcmc.energy.jacobian import linearise
-from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.forces.curvature import mean_curvature
+from pcmc.forces.functional import energy_and_gradient, patch_volumes
+from pcmc.forces.jacobian import linearise
+from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.io import load
 from pcmc.meshing.refinement import refine
 from pcmc.surface import unfolded

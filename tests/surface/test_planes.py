@@ -13,18 +13,18 @@ from generators import schwarz_p, spherical_cap
 from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import SurfaceError
 from pcmc.certificate.balance import unheld
-from pcmc.energy.flat_pieces import flat_pieces
-from pcmc.energy.functional import (
+from pcmc.forces.flat_pieces import flat_pieces
+from pcmc.forces.functional import (
     apply_supports,
     energy_and_gradient,
     energy_at,
     patch_volumes,
     weighted,
 )
-from pcmc.energy.jacobian import linearise
-from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.pattern import hessian_pattern
-from pcmc.energy.second_variation import assemble, hessian
+from pcmc.forces.jacobian import linearise
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pattern import hessian_pattern
+from pcmc.forces.second_variation import assemble, hessian
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

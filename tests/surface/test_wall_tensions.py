@@ -8,7 +8,7 @@ from pcmc import solve
 from pcmc.base.errors import OptionError, PlanError
 from pcmc.certificate.verdict import Verdict
 from pcmc.plan import Divider, Plan
-from pcmc.surface.wall_tensions import balanced_wall
+from pcmc.surface.values import balanced_wall
 
 HALL = [[0, 0], [12, 0], [12, 6], [0, 6]]
 

@@ -14,9 +14,9 @@ import pcmc
 from pcmc import Patch, Surface, solve, verify
 from pcmc.contact.pinching import standing_part
 from pcmc.contact.pull import pull_and_capacity
-from pcmc.energy.motion_space import motion_space
-from pcmc.energy.pattern import hessian_pattern
-from pcmc.energy.second_variation import assemble
+from pcmc.forces.motion_space import motion_space
+from pcmc.forces.pattern import hessian_pattern
+from pcmc.forces.second_variation import assemble
 from pcmc.stability.modes import full_matrix, second_variation
 from pcmc.verification import balls, enclosures, theorem
 from pcmc.verification.lipschitz import lipschitz

@@ -132,10 +132,10 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     """
     pressures = surface.pressures + change @ surface.room_signs
     pressures[surface.auxiliary & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
-    touched = np.flatnonzero(surface.room_signs.any(axis=0))
     names = [patch.name for patch in surface.patches]
-    new = {names[k]: float(pressures[k]) for k in touched}
-    other = surface.retensioned(None, new, [names[k] for k in touched if surface.walls[k]])
+    walls = surface.walls & surface.room_signs.any(axis=0)
+    new = dict(zip(names, pressures.tolist(), strict=True))
+    other = surface.retensioned(None, new, [names[k] for k in np.flatnonzero(walls)])
     for kept in ("origin", "closing_volumes"):  # neither depends on the pressures in a room that is closed
         if kept in vars(surface):
             vars(other)[kept] = vars(surface)[kept]

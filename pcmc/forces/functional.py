@@ -24,9 +24,9 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from . import kernels
-from .cables import add_cables, add_pull
+from .cables import add_cables
 from .plane_pieces import add_plane_forces, add_plane_volumes
-from .weight import add_weights, moments
+from .weight import add_weights
 
 
 def energy(surface: Surface) -> float:
@@ -132,28 +132,6 @@ def weighted(
     X = surface.vertices if X is None else X
     areas, volumes, forces = kernels.measure(kernels.energy_mesh(surface, alpha, p), X)
     return areas, add_plane_volumes(surface, X, volumes), add_plane_forces(surface, p, X, forces)
-
-
-def gradient_by(surface: Surface, kind: str, index: int, X: Floats | None = None) -> Floats:
-    """∂∇E/∂λ (n,3), supports not applied, λ one of the numbers that E is linear in.
-
-    ``kind`` is "tension", "pressure", "snow" or "weight" of the patch ``index``, or "cable", the tension of
-    that cable: ∇A_i, -∇V_i, ∇V_i, ∇∫z dA, ∇L.
-    """
-    X = surface.vertices if X is None else X
-    one = np.zeros(len(surface.patches))
-    if kind != "cable":
-        one[index] = 1.0
-    if kind == "tension":
-        return weighted(surface, one, X=X)[2]
-    if kind in ("pressure", "snow"):
-        return weighted(surface, 0.0, one if kind == "pressure" else -one, X)[2]
-    out = np.zeros_like(X)
-    if kind == "weight":
-        moments(surface, X, one, out)
-    else:
-        add_pull(X, surface.cables[index].edges, 1.0, out)
-    return out
 
 
 def patch_areas(surface: Surface) -> Floats:

@@ -33,7 +33,7 @@ def rounding_left(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     |X| is the largest coordinate and e the mean edge, root mean square, of the part with the shortest ones.
 
     >>> from pcmc import Patch
-    >>> from pcmc.energy.motion_space import vertex_classes
+    >>> from pcmc.forces.motion_space import vertex_classes
     >>> near = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=[0])
     >>> far = near.moved(near.vertices + 1e9)
     >>> rounding_left(far, vertex_classes(far), far.vertices) < 3e-7

@@ -1,0 +1,390 @@
+"""One equilibrium: a surface at positions X, and all that tells whether it is at rest there and stable.
+
+A P-CMC surface at rest solves r = Bᵀ∇E = 0, with B the basis of the motion space at X. Where rooms prescribe
+volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation.
+
+Solvers, branches, sensitivities and the certificate all read the same values here. Each is computed once,
+when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..base.arrays import Floats, Ints
+from ..contact.pinching import StandingPart, standing_part
+from ..contact.pull import excess_pull
+from ..forces.functional import apply_supports, energy_and_gradient
+from ..forces.jacobian import Linearisation, linearise
+from ..forces.loose_parts import relative_forces
+from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
+from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
+from ..forces.second_variation import assemble
+from ..surface import Surface
+from ..surface.geometry import face_areas, vertex_area_vectors
+from .bordered import BorderedFactor
+from .factorisation import Factor, Factoriser, SingularMatrix, factoriser
+
+STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
+TINY = float(np.finfo(float).tiny)
+CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its sign
+SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
+
+
+class _Unknowns(NamedTuple):
+    """What all positions share that have as many unknowns at each vertex (n,)."""
+
+    dimension: Ints
+    pattern: Pattern
+    factoriser: Factoriser
+    rigid_motions: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The standing part of a surface with its vertices at X, at rest or on the way there.
+
+    Attributes
+    ----------
+    part : what stands; its surface has the tensions and pressures, not the positions.
+    X : (n,3) the positions.
+    backend : of the factorisation; None for the fastest here.
+    least_volume : smaller prescribed volumes count as this large in ``volume_units``, length³.
+    """
+
+    part: StandingPart
+    X: Floats
+    backend: str | None = None
+    least_volume: float = 0.0
+    _last: _Unknowns | None = None
+
+    @classmethod
+    def of(cls, surface: Surface, backend: str | None = None) -> Equilibrium:
+        """That of the part of a surface that stands, where it is."""
+        part = standing_part(surface)
+        return cls(part, part.surface.vertices, backend)
+
+    def at(self, X: Floats, surface: Surface | None = None) -> Equilibrium:
+        """The same part at other positions, or with the tensions and pressures of another surface.
+
+        The pattern and what was found out about it go along, as long as they fit.
+        """
+        part = self.part if surface is None else replace(self.part, surface=surface)
+        known = self.unknowns if "unknowns" in self.__dict__ else self._last
+        return replace(self, part=part, X=X, _last=known)
+
+    @property
+    def surface(self) -> Surface:
+        """The standing surface; its vertices are not at X."""
+        return self.part.surface
+
+    @property
+    def classes(self) -> VertexClasses:
+        """What the vertices lie on."""
+        return self.part.classes
+
+    @cached_property
+    def shape(self) -> Surface:
+        """The standing surface with its vertices at X."""
+        return self.surface if self.X is self.surface.vertices else self.surface.moved(self.X)
+
+    # At rest
+
+    @cached_property
+    def _energy_and_gradient(self) -> tuple[float, Floats]:
+        return energy_and_gradient(self.surface, self.X, supports=False)
+
+    @property
+    def energy(self) -> float:
+        """E, force·length."""
+        return self._energy_and_gradient[0]
+
+    @property
+    def gradient_with_reactions(self) -> Floats:
+        """∇E (n,3), supports not applied, force."""
+        return self._energy_and_gradient[1]
+
+    @cached_property
+    def gradient(self) -> Floats:
+        """∇E (n,3), supports applied, force."""
+        return apply_supports(self.surface, self.gradient_with_reactions.copy(), self.X)
+
+    @cached_property
+    def space(self) -> MotionSpace:
+        """The motion space, whose basis is B."""
+        return motion_space(self.surface, self.classes, self.X)
+
+    @cached_property
+    def forces(self) -> Floats:
+        """r = Bᵀ∇E (N,), force."""
+        return self.space.to_coordinates(self.gradient)
+
+    @cached_property
+    def unbalanced(self) -> Floats:
+        """B r (n,3), the forces that are left, force."""
+        return self.space.to_vectors(self.forces)
+
+    @cached_property
+    def scale(self) -> float:
+        """The norm of the single triangles' forces, with which those left are compared."""
+        return force_scale(self.surface, self.classes, self.X)
+
+    @cached_property
+    def excess_pull(self) -> Floats:
+        """(n,) the pull on resting vertices beyond what their walls can take, force."""
+        if not self.part.resting.any():
+            return np.zeros(len(self.X))
+        return excess_pull(self.shape, self.part.walls, self.part.resting)
+
+    @cached_property
+    def jacobian(self) -> Linearisation:
+        """The derivative of r along motions of the vertices; B turns along with the surface."""
+        return linearise(self.surface, self.classes, self.space, self.X, self.gradient)
+
+    # Rooms of prescribed volume
+
+    @cached_property
+    def wanted_volumes(self) -> Floats:
+        """(r,) V̄, length³."""
+        return prescribed_volumes(self.surface)
+
+    @cached_property
+    def volume_defects(self) -> Floats:
+        """(r,) V - V̄, length³."""
+        return volumes_at(self.surface, self.X) - self.wanted_volumes
+
+    @cached_property
+    def volume_units(self) -> Floats:
+        """(r,) what brings the defect of a volume to the size of forces, force/length³."""
+        return self.scale / np.maximum(np.abs(self.wanted_volumes), self.least_volume)
+
+    @cached_property
+    def volume_gradients(self) -> Floats:
+        """(r,n,3) ∂V/∂X, supports applied, length²."""
+        return volume_gradients_at(self.surface, self.X)
+
+    @cached_property
+    def volume_columns(self) -> Floats:
+        """(N,r) Bᵀ ∂V/∂X, length²."""
+        columns = [self.space.to_coordinates(gradient) for gradient in self.volume_gradients]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.space.size, 0))
+
+    @cached_property
+    def residual(self) -> float:
+        """‖r‖ over the scale, with the volumes' relative defects; of loose parts the worst counts."""
+        if self.surface.topology.components.any():
+            forces = relative_forces(self.surface, self.classes, self.X, self.unbalanced)
+        else:
+            forces = float(np.linalg.norm(self.forces)) / self.scale
+        return float(np.hypot(forces, self._volume_residual))
+
+    @cached_property
+    def residual_with_pull(self) -> float:
+        """The same with ``excess_pull``."""
+        forces = np.column_stack([self.unbalanced, self.excess_pull])
+        relative = relative_forces(self.surface, self.classes, self.X, forces)
+        return float(np.hypot(relative, self._volume_residual))
+
+    @property
+    def _volume_residual(self) -> float:
+        if not self.surface.rooms:
+            return 0.0
+        return float(np.linalg.norm(self.volume_defects * self.volume_units)) / self.scale
+
+    # The second variation
+
+    @cached_property
+    def unknowns(self) -> _Unknowns:
+        """The sparsity pattern of A, and what factorises matrices of this pattern."""
+        dimension, last = self.space.dimension, self._last
+        if last is not None and np.array_equal(last.dimension, dimension):
+            return last
+        pattern = hessian_pattern(self.classes, self.space)
+        solver = factoriser(pattern, self.backend, self._strength_units())
+        return _Unknowns(dimension, pattern, solver, rigid_motions(self.surface))
+
+    def _strength_units(self) -> Floats | None:
+        """(N,) 1/√α of the tension around each unknown, as powers of two; None if all are of one order.
+
+        Factorised in these units, a patch that pulls far less than another still counts.
+        """
+        surface, classes = self.surface, self.classes
+        tension = surface.tensions[np.unique(classes.patch_of_face)]
+        if not len(tension) or tension.min() >= STRONG * tension.max():
+            return None
+        strongest = np.zeros(surface.n)
+        np.maximum.at(strongest, classes.faces, surface.tensions[classes.patch_of_face, None])
+        unknown = np.repeat(strongest, self.space.dimension)
+        return np.asarray(2.0 ** -np.round(0.5 * np.log2(unknown)))
+
+    @cached_property
+    def mass(self) -> Floats:
+        """M (N,), a third of the area of the active triangles around each unknown's vertex, length²."""
+        return np.repeat(vertex_area_vectors(self.X, self.classes.faces)[1] / 3.0, self.space.dimension)
+
+    @cached_property
+    def tension_mass(self) -> Floats:
+        """(N,) a third of tension times area, summed over the active triangles around a vertex."""
+        F = self.classes.faces
+        pull = self.surface.tensions[self.classes.patch_of_face] * face_areas(self.X[F]) / 3.0
+        return np.repeat(np.bincount(F.ravel(), np.repeat(pull, 3), len(self.X)), self.space.dimension)
+
+    @cached_property
+    def rigid(self) -> Floats:
+        """(N,k) orthonormal: the rigid motions that no support resists, as the motion space has them."""
+        return rigid_modes(self.space, self.unknowns.rigid_motions, self.X)
+
+    @cached_property
+    def excluded(self) -> Floats:
+        """(N,k) the rigid motions, and the unit gradients of the volumes that rooms prescribe.
+
+        Motions that cross all of them deform the surface and keep the volumes. A volume that no motion
+        changes excludes none.
+        """
+        if not self.surface.rooms:
+            return self.rigid
+        length = np.linalg.norm(self.volume_columns, axis=0)
+        return np.hstack([self.rigid, self.volume_columns[:, length > 0.0] / length[length > 0.0]])
+
+    def matrix(self, hessian: float = 1.0, stiffness: float = 0.0) -> Floats:
+        """Values of hessian · A + stiffness · BᵀLB in the pattern."""
+        pattern = self.unknowns.pattern
+        return assemble(self.surface, self.classes, self.space, pattern, self.X, hessian, stiffness)
+
+    @cached_property
+    def _plain_matrix(self) -> Floats:
+        return self.matrix()
+
+    def factorised(
+        self, shift: Floats | float = 0.0, stiffness: float = 0.0, soften: bool = True
+    ) -> SecondVariation:
+        """A + stiffness · BᵀLB - diag(shift), shift (N,), factorised; the factor before is used up.
+
+        Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part that
+        rests on Π. Then, with ``soften``, a little more stiffness is added: such motions do not lower the
+        energy.
+
+        Raises
+        ------
+        SingularMatrix : it is singular, also with a little stiffness added.
+        """
+        pattern, solver = self.unknowns.pattern, self.unknowns.factoriser
+        for added in (0.0, SOFT) if soften else (0.0,):
+            plain = stiffness + added == 0.0
+            data = self._plain_matrix if plain else self.matrix(1.0, stiffness + added)
+            if np.ndim(shift) or shift:
+                data = data.copy()
+                data[pattern.indptr[:-1]] -= shift
+            with suppress(SingularMatrix):
+                found = SecondVariation(self, solver.factor(data), stiffness, added)
+                if soften:
+                    _ = found.negative  # which may be what rounding hides
+                return found
+        raise SingularMatrix("the second variation is singular, also with a little stiffness added")
+
+
+@dataclass(frozen=True, eq=False)
+class SecondVariation:
+    """A = Bᵀ(∂²E)B of a surface at its positions, factorised, perhaps shifted.
+
+    Attributes
+    ----------
+    of : the surface at its positions.
+    factor : of A + (stiffness + added) BᵀLB, less a shift of its diagonal.
+    stiffness, added : what was asked for, and what was added to a singular matrix.
+    """
+
+    of: Equilibrium
+    factor: Factor
+    stiffness: float = 0.0
+    added: float = 0.0
+
+    @cached_property
+    def negative(self) -> int:
+        """Number of negative eigenvalues, of those below the shift, among the motions that count."""
+        return negatives_without(self.factor, self.of.excluded)
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """(N,N) sparse symmetric A, without the shift, with what was added."""
+        more = self.stiffness + self.added
+        data = self.of._plain_matrix if more == 0.0 else self.of.matrix(1.0, more)
+        return self.of.unknowns.pattern.symmetric(data)
+
+    @cached_property
+    def added_matrix(self) -> csr_array | None:
+        """(N,N) what was added to a singular matrix; None if nothing was."""
+        if not self.added:
+            return None
+        return self.of.unknowns.pattern.symmetric(self.of.matrix(0.0, self.added))
+
+    @cached_property
+    def bordered(self) -> Factor | BorderedFactor:
+        """The inverse, where rooms prescribe volumes with the borders -G and Gᵀ in units of force."""
+        if not self.of.surface.rooms:
+            return self.factor
+        return BorderedFactor(self.factor, self.of.volume_columns * self.of.volume_units)
+
+    @cached_property
+    def _behind(self) -> Floats:
+        return self.factor.solve(self.of.excluded)
+
+    def solve(self, right: Floats) -> Floats:
+        """The inverse (N,) among the motions that count: with none of the excluded ones."""
+        y, Q = self.factor.solve(right), self.of.excluded
+        if Q.shape[1]:
+            y = y - self._behind @ np.linalg.solve(Q.T @ self._behind, Q.T @ y)
+        return y
+
+
+def negatives_without(factor: Factor, columns: Floats) -> int:
+    """Negative eigenvalues on the complement of the columns (N,k).
+
+    Haynsworth: the bordered matrix [[A, Q], [Qᵀ, 0]] has the inertia of A restricted to the
+    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q.
+
+    Raises
+    ------
+    SingularMatrix : the inertia of A, or that of QᵀA⁻¹Q, is hidden by rounding.
+    """
+    k = columns.shape[1]
+    if not k:
+        return factor.negative
+    solved = factor.solve(columns)
+    # a rigid motion costs nothing, so its entries are far larger than those of a volume
+    size = np.sqrt(np.linalg.norm(solved, axis=0)) + TINY
+    small = (columns.T @ solved) / np.outer(size, size)
+    values = np.linalg.eigvalsh(0.5 * (small + small.T))
+    if not np.abs(values).min() > CLOSE:
+        raise SingularMatrix("the second variation is singular among the motions that keep the volumes")
+    return factor.negative + int((values > 0.0).sum()) - k
+
+
+def morse_index(surface: Surface) -> int:
+    """Number of independent motions that lower the energy of a surface at rest to second order.
+
+    Counted in the motion space, by inertia; rigid motions that no support resists are left out. Where rooms
+    prescribe volumes, only motions that keep them count.
+
+    Raises
+    ------
+    SingularMatrix : the second variation has no inertia that can be counted.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> morse_index(roof)
+    0
+    """
+    return Equilibrium.of(surface).factorised().negative

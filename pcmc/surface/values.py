@@ -1,0 +1,134 @@
+"""The values of a surface by name: tensions, pressures, weights, snow, pulls of cables, volumes of rooms.
+
+Those of a wall follow from its neighbours': its pressure is the difference of its two rooms', its snow that
+of the snow over them, and its tension must balance theirs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats
+
+if TYPE_CHECKING:
+    from .surface import Surface
+
+KINDS = {
+    **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
+    "cables": ("cables", "tension"),
+    "volumes": ("rooms", "volume"),
+}
+"""The kinds of values, as ``Surface.retensioned`` takes them: the parts of the surface, and their field."""
+PARTS = {"patches": "patch", "cables": "cable", "rooms": "room"}
+ALIKE = 1e-12  # of the largest change of a pressure; smaller differences are rounding
+SHARE = 0.3  # of the smaller tension: the wall's tension above the difference of its neighbours'
+
+
+def all_values(surface: Surface) -> dict[str, dict[str, float]]:
+    """The values of a Surface by kind and name, as ``Surface.retensioned`` takes them."""
+    return {
+        kind: {part.name: getattr(part, field) for part in getattr(surface, parts)}
+        for kind, (parts, field) in KINDS.items()
+    }
+
+
+def part_values(surface: Surface, kind: str) -> Floats:
+    """The values of one kind, in the order of the patches, cables or rooms."""
+    parts, field = KINDS[kind]
+    return np.array([getattr(part, field) for part in getattr(surface, parts)], dtype=float)
+
+
+def part_index(surface: Surface, kind: str, name: str) -> int:
+    """Index of the patch, cable or room of this name that has a value of this kind."""
+    parts = KINDS[kind][0]
+    names = [part.name for part in getattr(surface, parts)]
+    return names.index(validate.choice(PARTS[parts], name, names))
+
+
+def with_values(
+    parts: tuple[Any, ...], part: str, by_field: Mapping[str, Mapping[str, Any]]
+) -> tuple[Any, ...]:
+    """The parts with other values of their fields; OptionError for an unknown name.
+
+    >>> from pcmc import Patch
+    >>> with_values((Patch("roof", 1.0),), "patch", {"tension": {"roof": 2.0}, "pressure": {"roof": 3.0}})
+    (Patch(name='roof', tension=2.0, pressure=3.0),)
+    """
+    changes: dict[str, dict[str, Any]] = {part.name: {} for part in parts}
+    for field, by_name in by_field.items():
+        for name, value in by_name.items():
+            changes[validate.choice(part, name, list(changes))][field] = value
+    return tuple(replace(part, **changes[part.name]) if changes[part.name] else part for part in parts)
+
+
+def rates_of(surface: Surface, kind: str, by_name: Mapping[str, float]) -> Floats:
+    """The rates of change of the values of one kind, given by name; walls that are not named follow."""
+    named = {part_index(surface, kind, name): rate for name, rate in by_name.items()}
+    rates = np.zeros(len(getattr(surface, KINDS[kind][0])))
+    rates[list(named)] = list(named.values())
+    return rates + wall_changes(surface, rates, named) if kind in ("pressures", "snows") else rates
+
+
+def wall_changes(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:
+    """(k,) changes of the walls' pressures, or snow, that follow from those ``change`` (k,) of the patches'.
+
+    The changes cancel along the edges where one wall meets two sheets. They are 0 for the walls in
+    ``named``, and for a wall that stands between different rooms along its length.
+    """
+    follow = np.zeros(len(surface.patches))
+    if not change.any() or len(named) == len(follow):
+        return follow
+    wall = surface.walls.copy()
+    wall[list(named)] = False
+    if not wall.any():
+        return follow
+    topo = surface.topology
+    edge, sense = topo.edge_of_face.ravel(), topo.sense.ravel()
+    patch = np.repeat(surface.patch_of_face, 3)
+    of_wall, count = wall[patch], len(topo.edges)
+    net = np.bincount(edge[~of_wall], (change[patch] * sense)[~of_wall], count)
+    sheets = np.bincount(edge[~of_wall], minlength=count)
+    walls = np.bincount(edge[of_wall], minlength=count)
+    top = of_wall & (walls[edge] == 1) & (sheets[edge] == 2)
+    wanted = -net[edge[top]] * sense[top]
+    least, most = np.full((2, len(follow)), [[np.inf], [-np.inf]])
+    np.minimum.at(least, patch[top], wanted)
+    np.maximum.at(most, patch[top], wanted)
+    rounding = ALIKE * np.abs(change).max()
+    one = np.isfinite(least) & (most - least <= rounding) & (np.abs(most) > rounding)
+    follow[one] = most[one]
+    return follow
+
+
+def balanced_wall(neighbours: Sequence[Sequence[float]], most: float = math.inf) -> float:
+    """A tension for a wall: the difference of its neighbours' tensions and 0.3 of the smallest one.
+
+    A junction balances where the wall's tension is between the difference and the sum of the others'. Two
+    digits, or more where two would leave too little of that room.
+
+    Parameters
+    ----------
+    neighbours : for each part of the wall the tensions of the patches beside it, force/length; the part that
+        needs most counts, as far as all of them balance.
+    most : the most by which the wall may exceed the difference, force/length.
+
+    >>> balanced_wall([(5.0, 4.0)]), balanced_wall([(100.0, 1.0)]), balanced_wall([(3.0,)])
+    (2.2, 99.3, 0.9)
+    """
+    parts = [tensions for tensions in neighbours if tensions]
+    if not parts:
+        return 0.0
+    low = max(max(t) - min(t) for t in parts)
+    high = min(sum(t) if len(t) > 1 else math.inf for t in parts)
+    wanted = max(max(t) - min(t) + min(SHARE * min(t), most) for t in parts)
+    if low < high < math.inf:
+        wanted = min(wanted, 0.5 * (low + high))
+    spare = wanted - low
+    rounded = (float(f"{wanted:.{digits}g}") for digits in range(2, 17))
+    return next((value for value in rounded if abs(value - wanted) <= 0.2 * spare), wanted)
