@@ -16,16 +16,13 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.units import NO_UNITS, Units
-from ..contact.pinching import standing_part
-from ..contact.pull import excess_pull
-from ..forces.functional import energy_and_gradient, patch_areas
-from ..forces.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
-from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
-from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.functional import patch_areas
+from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
 from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
+from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import SecondVariation, lowest
+from ..stability.modes import lowest
 from ..stability.softness import Spectrum, count_soft
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
@@ -240,43 +237,34 @@ def certify(
         validate.refuse("evidence", evidence, "an Evidence or None")
     if whole is not False:
         surface = mirrored(surface, None if whole is True else whole)
-    part = standing_part(surface)
-    standing, classes, X = part.surface, part.classes, part.surface.vertices
-    excess = excess_pull(standing, part.walls, part.resting)
-    value, forces = energy_and_gradient(standing, X, supports=False)
-    space = motion_space(standing, classes, X)
-    rigid = rigid_modes(space, rigid_motions(standing), X)
-    left = space.to_vectors(space.to_coordinates(forces))
-    residual = relative_forces(standing, classes, X, np.column_stack([left, excess]))
-    rooms = room_table(surface)
-    if len(rooms):
-        residual = float(np.hypot(residual, np.linalg.norm(rooms["difference"])))
-
+    equilibrium = Equilibrium.of(surface)
+    part, left, residual = equilibrium.part, equilibrium.unbalanced, equilibrium.residual_with_pull
+    standing, X, pinchable = part.surface, part.surface.vertices, part.walls.pinchable
     qualities = triangle_quality(X, standing.faces)
-    in_wall = part.walls.pinchable[standing.patch_of_face]
+    in_wall = pinchable[standing.patch_of_face]
     quality = float(qualities[~in_wall].min(initial=1.0))
     at_rest = residual <= tolerance and quality > COLLAPSED
     spectrum, eigenvalues, fields = Spectrum(), np.empty(0), np.empty((0, 0, 3))
     if at_rest:
-        spectrum, eigenvalues, fields = _stability(standing, classes, space, rigid, modes)
+        spectrum, eigenvalues, fields = _stability(equilibrium, modes)
     findings = Findings(
         surface=surface,
-        pinchable=part.walls.pinchable,
+        pinchable=pinchable,
         residual=residual,
         tolerance=tolerance,
         quality=quality,
         spectrum=spectrum,
-        own_residuals=_own_residuals(standing, classes, left),
-        rounding=rounding_left(standing, classes, X),
+        own_residuals=_own_residuals(equilibrium),
+        rounding=rounding_left(standing, part.classes, X),
         evidence=evidence,
         tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
-        rigid=rigid.shape[1] if surface.rooms else 0,
+        rigid=equilibrium.rigid.shape[1] if surface.rooms else 0,
     )
     verdict, reason = judge(findings)
-    pulled = np.flatnonzero(excess)
+    pulled = np.flatnonzero(equilibrium.excess_pull)
     notes = (
-        only_coarse(surface, part.walls.pinchable) if at_rest and surface.tensions.any() else "",
+        only_coarse(surface, pinchable) if at_rest and surface.tensions.any() else "",
         f"at {len(pulled)} pinched vertices, the first {pulled[0]}, the sheets pull harder than the"
         " wall can hold: the wall will stand there once solved"
         if len(pulled)
@@ -289,8 +277,8 @@ def certify(
         verdict=verdict,
         detail="; ".join(filter(None, (reason, *notes))),
         residual=residual,
-        scale=force_scale(standing, classes, X),
-        energy=value,
+        scale=equilibrium.scale,
+        energy=equilibrium.energy,
         volume=volume_below(surface),
         index=spectrum.index,
         eigenvalues=eigenvalues,
@@ -309,19 +297,16 @@ def certify(
         tried=tried,
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
-        rooms=rooms,
+        rooms=room_table(surface),
         leaning=lean_table(standing),
         symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
 
 
-def _stability(
-    surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, modes: int
-) -> tuple[Spectrum, Floats, Floats]:
+def _stability(equilibrium: Equilibrium, modes: int) -> tuple[Spectrum, Floats, Floats]:
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
-    variation = SecondVariation.of(surface, classes, space, rigid)
-    square = surface.size**2
-    spectrum, system = count_soft(variation, NEUTRAL / square, NEAR / square)
+    square = equilibrium.shape.size**2
+    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)
@@ -330,16 +315,17 @@ def _stability(
     return spectrum, np.empty(0), np.empty((0, 0, 3))
 
 
-def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
-    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces.
+def _own_residuals(equilibrium: Equilibrium) -> Floats:
+    """(patches,) the forces left inside each patch over the norm of its own triangles' forces.
 
     Of a patch with several islands, the worst one counts.
     """
+    surface, classes = equilibrium.surface, equilibrium.classes
     island = islands(surface.topology)[classes.active]
     own = squared_forces(surface, classes, surface.vertices)
     island_of_vertex = np.zeros(surface.n, dtype=np.int64)
     island_of_vertex[classes.faces] = island[:, None]
-    inside = left * (classes.kind == SHEET)[:, None]
+    inside = equilibrium.unbalanced * (classes.kind == SHEET)[:, None]
     out = np.zeros(len(surface.patches))
     np.maximum.at(out, classes.patch_of_face, ratios(inside, island_of_vertex, own, island)[island])
     return np.sqrt(out)

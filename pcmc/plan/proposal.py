@@ -13,12 +13,12 @@ import shapely
 from ..base.errors import OptionError, PlanError, unknown
 from ..curves.curves import Curve
 from ..surface.values import balanced_wall
-from .corners import most_in_corners
 from .drawing import Drawing
 from .edges import cable_for
+from .layers import Label
 from .lines import Kind, Line
-from .parts import Area, CableLine, Divider, Hole, PlanData, check_count, check_keys
-from .texts import Label
+from .parts import CableLine, Divider, Hole, PatchSpec, PlanData, check_count, check_keys
+from .walls import most_in_corners
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
@@ -216,7 +216,7 @@ def _areas(
         own = default if label is None or label.tension is None else label.tension
         areas.append({"name": name, "tension": own, "at": point})
     for name, attributes in given.items():
-        check_keys(attributes, Area, f"patch {name!r}")
+        check_keys(attributes, PatchSpec, f"patch {name!r}")
         if attributes.get("at") is not None:
             at = [part for part in parts if _contains(part, attributes["at"])]
             chosen = [area for part, area in zip(parts, areas, strict=True) if part in at]

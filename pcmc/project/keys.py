@@ -16,7 +16,7 @@ from ..base.units import FORCES, LENGTHS
 from ..curves.curves import CURVES
 from ..drawings import FORMATS
 from ..meshing.walls import EDGES
-from ..plan import Area, CableLine, Divider, Hole, Plan
+from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
 from ..structure.model import Structure
@@ -210,7 +210,7 @@ def _plan_keys() -> tuple[Key, ...]:
 @cache
 def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
-    area = _of_class(Area, at="a point [x, y] or a list of points")
+    area = _of_class(PatchSpec, at="a point [x, y] or a list of points")
     mesh = _of_class(
         MeshFile,
         file="a text",

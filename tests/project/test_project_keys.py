@@ -148,7 +148,7 @@ def test_the_manual_lists_every_key_that_is_read():
     from dataclasses import fields
 
     from pcmc.design import Parameter, Target
-    from pcmc.plan import Area, Divider, Hole, Plan
+    from pcmc.plan import Divider, Hole, PatchSpec, Plan
     from pcmc.plot.scene import VIEWS
     from pcmc.project import AccuracyWanted, Remeshing
     from pcmc.project.keys import KINDS
@@ -157,7 +157,7 @@ def test_the_manual_lists_every_key_that_is_read():
 
     classes = {
         "plan": Plan,
-        "plan.patches.NAME": Area,
+        "plan.patches.NAME": PatchSpec,
         "plan.dividers": Divider,
         "plan.holes": Hole,
         "plan.plane": Plane,
@@ -167,10 +167,10 @@ def test_the_manual_lists_every_key_that_is_read():
     }
     listed = {(s.name, s.condition): s for s in sections()}
     for name, cls in classes.items():
-        unused = {Area: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
+        unused = {PatchSpec: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
         names = {f.name for f in fields(cls)} - unused
         # what Plan's lines are made from, and what stands for tensions
-        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, Area: {"rise", "apex"}}.get(cls, set())
+        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, PatchSpec: {"rise", "apex"}}.get(cls, set())
         assert {key.name for key in listed[name, ""].keys} == names
     for method in ("newton", "nesterov", "lbfgs"):
         options = {f.name: f.default for f in fields(find_method(method).options)}
