@@ -13,9 +13,9 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..forces.cables import directions
 from ..surface import Surface
-from ..surface.cable import Cable
 from ..surface.geometry import cross_2d, segment_lengths
-from ..surface.mirroring import mirrored
+from ..surface.parts import Cable
+from ..surface.symmetry import mirrored
 from ..surface.topology import Curve
 from .proof import WeakCable
 from .tables import conormal_sum, middle

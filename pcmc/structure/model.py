@@ -16,12 +16,12 @@ from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
-from ..forces.functional import apply_supports
 from ..forces.weight import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.supports import apply_supports
 from .loads import GRAVITY, Load, SelfWeight, Snow, Step, Wind, acting_together, check_loads, load_steps
 
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
