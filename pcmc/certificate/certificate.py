@@ -17,16 +17,15 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.units import NO_UNITS, Units
 from ..contact.pinching import standing_part
-from ..contact.pull import excess_pull
 from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
-from ..forces.functional import energy_and_gradient, patch_areas
-from ..forces.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
-from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
-from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.functional import patch_areas
+from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
+from ..forces.motion_space import VertexClasses
 from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
+from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import SecondVariation, lowest
+from ..stability.modes import lowest
 from ..stability.softness import Spectrum, count_soft
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
@@ -252,19 +251,10 @@ def certify(
         surface = mirrored(surface, None if whole is True else whole)
     part = standing_part(surface)
     standing, classes, X = part.surface, part.classes, part.surface.vertices
-    unheld = excess_pull(standing, part.walls, part.resting)
-    value, forces = energy_and_gradient(standing, X, supports=False)
+    equilibrium = Equilibrium.of(surface)
+    unheld, left = equilibrium.excess_pull, equilibrium.unbalanced
     below, areas = volume_below(surface), patch_areas(surface)
-    scale = force_scale(standing, classes, X)
-    space = motion_space(standing, classes, X)
-    rigid = rigid_modes(space, rigid_motions(standing), X)
-    in_motion_space = space.to_coordinates(forces)
-    left = space.to_vectors(in_motion_space)
-    lacking = np.column_stack([left, unheld])
-    residual = relative_forces(standing, classes, X, lacking)
-    rooms = room_table(surface)
-    if len(rooms):
-        residual = float(np.hypot(residual, np.linalg.norm(rooms["difference"])))
+    residual, rooms = equilibrium.residual_with_pull, room_table(surface)
 
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
@@ -272,7 +262,7 @@ def certify(
     at_rest = residual <= tolerance and quality > COLLAPSED
     spectrum, eigenvalues, fields = Spectrum(), *UNKNOWN
     if at_rest:
-        spectrum, eigenvalues, fields = _stability(standing, classes, space, rigid, modes)
+        spectrum, eigenvalues, fields = _stability(equilibrium, modes)
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
@@ -290,15 +280,15 @@ def certify(
         evidence=evidence,
         tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
-        rigid=rigid.shape[1] if surface.rooms else 0,
+        rigid=equilibrium.rigid.shape[1] if surface.rooms else 0,
     )
     verdict, reason = judge(findings)
     return Certificate(
         verdict=verdict,
         detail="; ".join(filter(None, (reason, *notes))),
         residual=residual,
-        scale=scale,
-        energy=value,
+        scale=equilibrium.scale,
+        energy=equilibrium.energy,
         volume=below,
         index=spectrum.index,
         eigenvalues=eigenvalues,
@@ -323,13 +313,10 @@ def certify(
     )
 
 
-def _stability(
-    surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, modes: int
-) -> tuple[Spectrum, Floats, Floats]:
+def _stability(equilibrium: Equilibrium, modes: int) -> tuple[Spectrum, Floats, Floats]:
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
-    variation = SecondVariation.of(surface, classes, space, rigid)
-    square = surface.size**2
-    spectrum, system = count_soft(variation, NEUTRAL / square, NEAR / square)
+    square = equilibrium.shape.size**2
+    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..contact.pull import excess_pull
 from ..forces.functional import (
@@ -18,25 +18,16 @@ from ..forces.functional import (
 )
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.motion_space import MotionSpace, force_scale, motion_space
-from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.rooms import (
     prescribed_volumes,
     volume_gradients_at,
     volumes_at,
     with_room_pressures,
 )
-from ..forces.second_variation import assemble
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
-from ..stability.factorisation import Factor, Factoriser, factoriser
-from ..stability.modes import (
-    Stiffness,
-    excluded_columns,
-    full_matrix,
-    lumped_mass,
-    negatives_without,
-)
+from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
@@ -67,22 +58,12 @@ class BranchMesh:
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
-        self._dimension: Ints | None = None
+        self._last = Equilibrium(part, self.surface.vertices, backend)
 
-    def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
-        """Values of Bᵀ(∂²E)B in its sparsity pattern, and its factor, valid until the next call."""
-        if self._dimension is None or not np.array_equal(self._dimension, space.dimension):
-            self._dimension = space.dimension
-            self._pattern: Pattern = hessian_pattern(self.classes, space)
-            self._factoriser: Factoriser = factoriser(self._pattern, self._backend)
-        values = assemble(surface, self.classes, space, self._pattern, X)
-        return values, self._factoriser.factor(values)
-
-    def stiffness(self, space: MotionSpace, X: Floats, values: Floats, factor: Factor) -> Stiffness:
-        """The Hessian just factorised, with its mass and its inertia."""
-        matrix, mass = full_matrix(self._pattern, values), lumped_mass(space, self.classes, X)
-        excluded = excluded_columns(self.surface, space, np.zeros((space.size, 0)), X)
-        return Stiffness(space, matrix, mass, factor, excluded, negatives_without(factor, excluded))
+    def second_variation(self, surface: Surface, X: Floats) -> SecondVariation:
+        """Bᵀ(∂²E)B, factorised; valid until the next call."""
+        self._last = self._last.at(X, surface)
+        return self._last.factorised(soften=False)
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats, Vector, cached_array
 from ..base.errors import SurfaceError
-from ..base.names import checked_name
+from ..base.validate import checked_name
 
 
 @dataclass(frozen=True)

@@ -182,14 +182,11 @@ def hessian(surface: Surface) -> csr_array:
     >>> (H @ flat.vertices.ravel()).reshape(3, 3).round(12).tolist()
     [[-0.5, -0.5, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
-    from scipy.sparse import csr_array, triu
-
     expect_surface(surface)
     every = MotionSpace.of(np.tile(np.eye(3), (surface.n, 1, 1)), np.full(surface.n, 3))
     pattern = hessian_pattern(surface, every)
     data = _assembled(surface, surface.topology, energy_mesh(surface), every, pattern, surface.vertices)
-    upper = pattern.matrix(data)
-    return csr_array(upper + triu(upper, 1).T)
+    return pattern.symmetric(data)
 
 
 def assemble(

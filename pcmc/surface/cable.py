@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats, Ints, read_only
 from ..base.errors import SurfaceError
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from . import checks
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from . import checks
 
 

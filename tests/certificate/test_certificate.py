@@ -16,7 +16,7 @@ from pcmc.contact.pinching import standing_part
 from pcmc.forces.functional import patch_areas, volume
 from pcmc.meshing.quality import triangle_quality
 from pcmc.plan import Divider, Plan
-from pcmc.stability.modes import morse_index
+from pcmc.stability.equilibrium import morse_index
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
