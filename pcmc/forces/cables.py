@@ -15,8 +15,8 @@ from ..base.arrays import Floats, Ints
 from ..base.compiled import inlined
 from ..base.errors import SurfaceError
 from ..surface import Surface
-from ..surface.cable import CableEdges
 from ..surface.geometry import norm, point, scaled, sub
+from ..surface.parts import CableEdges
 from ..surface.topology import Topology
 from .triangles import Block
 

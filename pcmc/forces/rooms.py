@@ -20,9 +20,10 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..surface import Line, Surface, expect_surface
-from ..surface.room import Room
+from ..surface.parts import Room
+from ..surface.supports import apply_supports
 from ..surface.topology import components
-from .functional import apply_supports, patch_volumes, weighted
+from .functional import patch_volumes, weighted
 
 ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
 UNCHANGED = 1e-13  # of the size, squared: a gradient of a volume that is rounding
