@@ -53,9 +53,9 @@ def certify(
 ) -> dict[str, Any]:
     """The certificate of the surface of COMPAS meshes, as plain data.
 
-    Options are those of ``pcmc.certify``. The answer has ``certified``, ``verdict``, ``detail``, the numbers of
-    ``Certificate.numbers``, the tables ``patches``, ``junctions``, ``boundaries`` and ``supports`` as lists of
-    rows, and ``warnings``. None stands for NaN.
+    Options are those of ``pcmc.certify``. The answer has ``certified``, ``verdict``, ``detail``, the numbers
+    of ``Certificate.numbers``, its tables ``patches``, ``junctions``, ``boundaries`` and ``supports`` as
+    lists of rows, and ``warnings``. None stands for NaN.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
