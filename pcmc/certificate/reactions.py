@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
-from ..forces import kernels
+from ..forces import triangles
 from ..forces.functional import add_cables_and_weights
 from ..surface import Surface
 from ..surface.checks import lying
@@ -41,7 +41,7 @@ def reactions(surface: Surface) -> Floats:
     """
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
-    forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
+    forces = triangles.measure(triangles.energy_mesh(surface, pressure=zero), X)[2]
     add_cables_and_weights(surface, X, forces)
     third = area_vectors(X[F]) / 3.0
     forces -= vertex_sums(third * surface.net_pressures[surface.patch_of_face, None], F, surface.n)

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..forces.weight import compressed, effective_tensions
+from ..forces.triangles import compressed, effective_tensions
 from ..stability.softness import Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld

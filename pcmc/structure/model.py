@@ -15,7 +15,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
-from ..forces.weight import effective_tensions
+from ..forces.triangles import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
