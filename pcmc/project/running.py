@@ -81,8 +81,8 @@ def designed(
 
     Returns
     -------
-    Outcome : ``surface`` is the roof, ``good`` whether it is what the project asks for; ``shown`` is the whole
-        roof with ``whole = true``.
+    Outcome : ``surface`` is the roof, ``good`` whether it is what the project asks for. With ``whole = true``
+        ``shown`` is the whole roof.
 
     Errors and warnings as of ``run``; KeyboardInterrupt for Ctrl-C, and nothing is kept.
 
