@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from .. import io
 from ..accuracy.adaptive import ACCURACY_OF, TRIANGLES
-from ..accuracy.goals import accuracies
+from ..accuracy.adaptive import accuracies
 from ..advice.rises import Rise
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
