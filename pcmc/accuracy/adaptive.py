@@ -27,11 +27,11 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
+from ..certificate.quantities import dimension_of
 from ..meshing.curve_projection import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..meshing.sizes import limit_growth, triangles_for
-from ..quantities import dimension_of
 from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface

@@ -16,9 +16,9 @@ from ..base.arrays import Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import certify
+from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import doubted_midpoints, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
-from ..quantities import dimension_of
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from ..certificate import Certificate
-from ..quantities import figures
+from ..certificate.quantities import figures
 from ..surface import Surface
 
 MOST_VARIANTS = 20

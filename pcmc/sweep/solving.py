@@ -74,8 +74,8 @@ def solve_case(
         ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the
         paper's squared sum); the certificate's numbers; each number of its tables as
         ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``; and, of a surface at rest, the
-        key figures of ``pcmc.quantities``: ``large.apex``, and ``rise`` or ``reaction per length`` of the
-        whole roof. A number with the name of one of the arguments is called ``name_reached``. With
+        key figures of ``pcmc.certificate.quantities``: ``large.apex``, and ``rise`` or ``reaction per
+        length`` of the whole roof. A number with the name of one of the arguments is called ``name_reached``. With
         ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the height, volume, energy, reaction
         and lowest eigenvalue ``height_error``, ``height_limit``, ``height_limit_error``, ``height_order`` and
         so on.
@@ -108,7 +108,7 @@ def row(result: Result, names: Container[str], outcome: Outcome | None = None) -
     With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between
     mirror planes: see the column ``extent``. Without an equilibrium the row has no numbers of the shape.
     """
-    from ..quantities import figures  # takes long to import
+    from ..certificate.quantities import figures  # takes long to import
 
     surface, certificate = result.surface, result.certificate
     numbers = {
