@@ -21,15 +21,7 @@ from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
 from .draft import Draft, drafted
-from .edges import (
-    HELD,
-    NONE,
-    check_pressures,
-    edge_cables,
-    mirror_planes,
-    raised_heights,
-    usual_cable,
-)
+from .edges import HELD, NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
 from .lines import SNAP, Kind, Line
 from .parts import PatchSpec, PlanData
 from .walls import Roof, rooms_of, upright_planes, walls_of
@@ -148,10 +140,7 @@ def _cables(draft: Draft, held: Bools) -> list[Cable]:
 def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     """The plan's patches and the patch (m,) of each triangle of its mesh.
 
-    Raises
-    ------
-    PlanError
-        Where the patches that are given and the parts between the dividers are not one to one.
+    PlanError where the patches that are given and the parts between the dividers are not one to one.
     """
     parts = int(mesh.region.max()) + 1
     area = signed_areas(mesh.points, mesh.triangles)
@@ -270,10 +259,8 @@ def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
 def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) -> list[HeldCurve]:
     """The fixed edges of the outline and of holes, the lines of supports, and straight feet of walls.
 
-    Parameters
-    ----------
-    X : (n,3) vertices of the surface.
-    feet : by the first two vertices of the upper edge of a wall, the vertices along its held bottom.
+    ``X`` (n,3) are the vertices of the surface; ``feet``, by the first two vertices of the upper edge of a
+    wall, the vertices along its held bottom.
     """
     curves = []
     supports = [Line("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
