@@ -75,16 +75,7 @@ class Log:
 class NewtonRun:
     """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
-    Attributes
-    ----------
-    state : the surface reached. stepper : what moves it.
-    status : why the run ended. note : a further finding, for the result's message.
-    rows : the history up to here, with those of the runs ``before``.
-    smooth_steps : descent steps to take before the next Newton step.
-    stuck : whether the last step failed: none lowers the residual or the energy.
-    best, steps_since_best : the least residual, and steps taken since it was last halved.
-    patience : how many steps down from a saddle may hardly lower E, if a minimum is sought.
-    before_descent : the positions where the present way down from a saddle began, and the version there.
+    ``rows`` are the history up to here, with those of the runs ``before``; ``status`` is why the run ended.
     """
 
     def __init__(
@@ -101,19 +92,21 @@ class NewtonRun:
         self.held = held
         self.state = State(surface, options.min_quality, held, options.backend)
         self.stepper = Stepper(self.state, options.target == "minimum")
-        self.status, self.note = Status.ITERATION_LIMIT, ""
+        self.status, self.note = Status.ITERATION_LIMIT, ""  # the note goes into the result's message
         self.first_quality = self.state.quality
         self._shown = self.state.at.X, self.state.version  # as in the last row
+        # how many steps down from a saddle may hardly lower E, if a minimum is sought
         self.patience = float(SLOW_DESCENT_STEPS[0]) if options.target == "minimum" else np.inf
         self._steps = 0
         self._descent: list[float] = []  # E after each step of the present way down from a saddle
-        self.before_descent = self._shown
+        self.before_descent = self._shown  # where that way began
         self._restart(smooth_steps)
 
     def _restart(self, smooth_steps: int = 0) -> None:
         """Measure progress from here."""
-        self.smooth_steps, self.stuck = smooth_steps, False
-        self.best, self.steps_since_best = self.state.at.residual, 0
+        self.smooth_steps = smooth_steps  # to take before the next Newton step
+        self.stuck = False  # by the last step: none lowers the residual or the energy
+        self.best, self.steps_since_best = self.state.at.residual, 0  # since it was last halved
 
     def run(self) -> NewtonRun:
         """Step until the end, or on from there; ``status`` then gives the reason."""

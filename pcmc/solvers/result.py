@@ -68,11 +68,8 @@ class Result:
     status : why the solver stopped; ``message`` is its sentence.
     method : the solver's name.
     energy : E of ``surface``, force·length.
-    iterations, evaluations : steps taken; passes over the triangles made, for E, ∇E or its
-        derivative along a motion.
-    rows : the rows of ``history``, each a mapping of its columns.
-    history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
-        ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
+    iterations, evaluations : steps taken; passes over the triangles, for E, ∇E or its derivative.
+    rows : of ``history``, with at least ``evaluation``, ``energy`` and ``gradient_squared`` (‖∇E‖²).
     note : a further finding of the solver, shown in the message.
     proofs : why there is no equilibrium, where that was proved.
     tried : what the search has tried, the given start first, if it found none.
@@ -120,14 +117,8 @@ class Result:
             Status.DEGENERATE: Evidence.COLLAPSED,
         }.get(first)
         tolerance = TOLERANCE if tolerance is None else tolerance
-        return certify(
-            self.surface,
-            modes=modes,
-            tolerance=tolerance,
-            evidence=evidence,
-            tried=self.tried,
-            whole=whole,
-        )
+        how = {"evidence": evidence, "tried": self.tried}
+        return certify(self.surface, modes=modes, tolerance=tolerance, whole=whole, **how)
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -156,18 +147,11 @@ class Result:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """What a callback gets after each iteration.
+    """What a callback gets after each iteration."""
 
-    Attributes
-    ----------
-    iteration : its number; 0 is the start.
-    surface : call it for the surface reached.
-    row : the row just added to the history.
-    """
-
-    iteration: int
-    surface: Callable[[], Surface]
-    row: Mapping[str, Any]
+    iteration: int  # its number; 0 is the start
+    surface: Callable[[], Surface]  # call it for the surface reached
+    row: Mapping[str, Any]  # the row just added to the history
 
 
 Callback = Callable[[Progress], None]
