@@ -19,7 +19,7 @@ from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from ..surface import Plane
 from .settings import COLOURS, PATCH_KEYS, WHEN, AccuracyWanted, MeshFile, Output, Remeshing
 
