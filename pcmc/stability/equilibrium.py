@@ -31,8 +31,7 @@ from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from ..surface.supports import apply_supports
-from .bordered import BorderedFactor
-from .factorisation import Factor, Factoriser, SingularMatrix, factoriser
+from .factorisation import BorderedFactor, Factor, Factoriser, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 TINY = float(np.finfo(float).tiny)
