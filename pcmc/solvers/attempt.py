@@ -11,6 +11,8 @@ import numpy as np
 from ..base import validate
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
+from ..stability.equilibrium import SecondVariation
+from ..stability.softness import clear_of_zero
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped
 from .state import State
@@ -100,6 +102,7 @@ class NewtonRun:
         self._steps = 0
         self._descent: list[float] = []  # E after each step of the present way down from a saddle
         self.before_descent = self._shown  # where that way began
+        self.clear: SecondVariation | None = None  # at rest, if it is clear of zero
         self._restart(smooth_steps)
 
     def _restart(self, smooth_steps: int = 0) -> None:
@@ -189,10 +192,14 @@ class NewtonRun:
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
-        if self.options.target == "minimum" and self.stepper.leave_saddle(self.state.at):
-            return True
+        if self.options.target == "minimum":
+            self.clear = clear_of_zero(self.state.at)
+            self.stepper.factorisations += self.clear is not None
+            if self.clear is None and self.stepper.leave_saddle(self.state.at):
+                return True
         if not self.state.resting.any():
             return False
+        self.clear = None
         self.stepper.free()  # at rest no factor is needed, and after a release another
         if self.state.lift_overpulled() or self.state.update_walls():
             self.stepper.kind = "release"

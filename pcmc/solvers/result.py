@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from ..certificate import Certificate
     from ..certificate.proof import Attempt, Proof
+    from ..stability.equilibrium import SecondVariation
 
 
 class Status(Enum):
@@ -74,6 +75,7 @@ class Result:
     proofs : why there is no equilibrium, where that was proved.
     tried : what the search has tried, the given start first, if it found none.
     room_changes : δ of each room of prescribed volume, by which its pressure has changed, force/length².
+    clear : the second variation factorised at rest, if it is clear of zero; used up by the first certificate.
     """
 
     surface: Surface
@@ -87,6 +89,7 @@ class Result:
     proofs: tuple[Proof, ...] = ()
     tried: tuple[Attempt, ...] = ()
     room_changes: tuple[float, ...] = ()
+    clear: list[SecondVariation] = field(default_factory=list)
 
     def __repr__(self) -> str:
         """How the solver ended, the verdict if the certificate was asked for, and the surface reached."""
@@ -117,8 +120,15 @@ class Result:
             Status.DEGENERATE: Evidence.COLLAPSED,
         }.get(first)
         tolerance = TOLERANCE if tolerance is None else tolerance
-        how = {"evidence": evidence, "tried": self.tried}
-        return certify(self.surface, modes=modes, tolerance=tolerance, whole=whole, **how)
+        return certify(
+            self.surface,
+            modes=modes,
+            tolerance=tolerance,
+            evidence=evidence,
+            tried=self.tried,
+            whole=whole,
+            clear=self.clear.pop() if self.clear else None,
+        )
 
     @cached_property
     def certificate(self) -> Certificate:

@@ -159,9 +159,9 @@ class HarmonicExtension:
         diagonal = upper.diagonal()
         self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         data = upper.data * np.repeat(self._scale, np.diff(upper.indptr)) * self._scale[upper.indices]
-        self._factor = factoriser(Pattern(upper.indptr, upper.indices, np.empty((0, 3))), backend).factor(
-            data
-        )
+        self._factor = factoriser(
+            Pattern(upper.indptr, upper.indices, np.empty((0, 3), dtype=np.int32)), backend
+        ).factor(data)
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices following the curves."""
