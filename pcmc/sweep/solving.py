@@ -74,8 +74,8 @@ def solve_case(
         ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the
         paper's squared sum); the certificate's numbers; each number of its tables as
         ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``; and, of a surface at rest, the
-        key figures of ``pcmc.certificate.quantities``: ``large.apex``, and ``rise`` or ``reaction per
-        length`` of the whole roof. A number with the name of one of the arguments is called ``name_reached``. With
+        key figures of the roof: ``large.apex``, and ``rise`` or ``reaction per length`` of the
+        whole roof. A number with the name of one of the arguments is called ``name_reached``. With
         ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the height, volume, energy, reaction
         and lowest eigenvalue ``height_error``, ``height_limit``, ``height_limit_error``, ``height_order`` and
         so on.
