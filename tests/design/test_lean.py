@@ -83,8 +83,13 @@ def test_the_command_says_which_walls_lean(tmp_path, capsys, upright):
 
 @pytest.mark.parametrize(
     "finer",
-    [refine, partial(remesh, edge_length=0.7), lambda surface: refine_near(surface, [6, 3, 0.5], 2, 1.5)],
-    ids=["refined", "remeshed", "refined near"],
+    [
+        pytest.param(refine, marks=pytest.mark.nightly, id="refined"),
+        pytest.param(partial(remesh, edge_length=0.7), id="remeshed"),
+        pytest.param(
+            lambda surface: refine_near(surface, [6, 3, 0.5], 2, 1.5), marks=pytest.mark.nightly, id="near"
+        ),
+    ],
 )
 @pytest.mark.parametrize("turned", [0.0, 2.0])
 def test_an_upright_wall_stays_upright_on_finer_meshes(finer, turned):

@@ -67,7 +67,7 @@ def lab(tmp_path):
         running.wait(30)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @needs_browser
 def test_the_page_is_a_cells_output_and_its_surface_is_in_the_next(lab, tmp_path):
     from selenium.common.exceptions import WebDriverException
