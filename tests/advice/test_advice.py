@@ -50,6 +50,9 @@ def outcome_of(tmp_path, text):
     return run_project(load(path), use_cache=False)
 
 
+WEAK, HEAVY = "a wall too weak for its neighbours", "tensions that cannot carry the load"
+
+
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
 @pytest.mark.parametrize("kind", night_but(WRONG, WEAK, HEAVY))
 def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, kind):

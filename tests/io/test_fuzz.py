@@ -100,9 +100,8 @@ files = ["a.obj", "b.pcmc"]
 
 # ---- structure that is almost right
 
-SLOW = settings(
-    max_examples=FLIPS // 2, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
-)
+CHECKS = list(HealthCheck)
+SLOW = settings(max_examples=FLIPS // 2, deadline=None, derandomize=True, suppress_health_check=CHECKS)
 NUMBERS = st.one_of(
     st.integers(-3, 8).map(str),
     st.sampled_from(
