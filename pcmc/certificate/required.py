@@ -36,5 +36,5 @@ def require_certified(certificate: Certificate, anyway: bool) -> None:
     if not (certificate.certified or validate.flag("anyway", anyway)):
         verdict = certificate.verdict
         text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
-        text += " anyway=True (--anyway)"
+        text += " anyway=True (--allow-uncertified)"
         raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")

@@ -7,13 +7,11 @@ from typing import Annotated
 
 import typer
 
-from .building import draw_, panels_, report_
-from .caching import cache_
-from .planning import plan
-from .repairing import repair_
+from .arguments import with_groups
+from .building import draw_, panels_, report_, structure
+from .preparing import cache_, plan, repair_
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
-from .structure import structure
 from .sweeping import sweep
 
 app = typer.Typer(
@@ -64,4 +62,4 @@ for name, command, summary in (
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),
 ):
-    app.command(name, short_help=summary)(command)
+    app.command(name, short_help=summary)(with_groups(command))

@@ -1,12 +1,15 @@
-"""Arguments that several commands have: files, NAME=VALUE, views."""
+"""Arguments that several commands have: files, NAME=VALUE, views, and groups of options."""
 
 from __future__ import annotations
 
 import ast
+import inspect
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -16,7 +19,7 @@ from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
 from ..forces.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY
-from ..project import Outcome, Project
+from ..project import MOST_CHECKED, Outcome, Project
 from ..project.output import OnStep
 from ..surface import Surface
 
@@ -28,39 +31,19 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
-Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
-_EVERY = "A bare VALUE applies to every patch under pressure"
-Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {_EVERY}.", "--tension")]
-Pressures = Annotated[
-    list[str] | None,
-    option("NAME=VALUE", f"Pressure on a patch. {_EVERY}; wall pressures are updated.", "--pressure"),
-]
-Weights = Annotated[
-    list[str] | None,
-    option("NAME=VALUE", "Weight of a patch per area. A bare VALUE applies to every patch.", "--weight"),
-]
-SNOW = "Snow on a patch, per area of the plan. A bare VALUE applies to every patch under pressure."
-Snows = Annotated[list[str] | None, option("NAME=VALUE", SNOW, "--snow")]
-Cables = Annotated[
-    list[str] | None, option("NAME=VALUE", "Tension of a cable. A bare VALUE applies to all.", "--cable")
-]
-Volumes = Annotated[
-    list[str] | None, option("NAME=VALUE", "Volume of a room that has one already.", "--volume")
-]
-ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
-Colour = Annotated[str, option("NAME", "patches, curvature, error or reactions.", "--colour", "--color")]
-START = "The start shape of a project, before it is solved, instead of its designed roof."
-Start = Annotated[bool, typer.Option("--start", help=START)]
-CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
-Cache = Annotated[bool, typer.Option("--cache/--no-cache", help=CACHE)]
-WHOLE = "Unfold a surface at its mirror planes: the whole roof instead of its piece."
-Whole = Annotated[bool, typer.Option("--whole", help=WHOLE)]
-UNITS = (
-    f"Unit of the lengths: {', '.join(LENGTHS)}. A file in another one is converted; by default the file's."
-)
-FileUnits = Annotated[str, option("NAME", UNITS, "--units")]
-MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
+def real(metavar: str, meaning: str) -> Any:
+    """An option with a number."""
+    return option(metavar, meaning, parser=number)
+
+
+def count(meaning: str) -> Any:
+    """An option with a whole number."""
+    return option("NUMBER", meaning, parser=integer)
+
+
+def flag(name: str, meaning: str) -> Any:
+    """An option without a value."""
+    return typer.Option(name, help=meaning)
 
 
 def number(text: str | float) -> float:
@@ -80,20 +63,50 @@ def integer(text: str | int) -> int:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
 
 
+EVERY = "A bare VALUE applies to every patch"
+LOADED = f"{EVERY} under pressure"
+MESH_CHECK = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
+START = "The start shape of a project, before it is solved, instead of its designed roof."
+CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
+WHOLE = "Unfold a surface at its mirror planes: the whole roof instead of its piece."
+UNITS = (
+    f"Unit of the lengths: {', '.join(LENGTHS)}. A file in another one is converted; by default the file's."
+)
+UNCERTIFIED = "Accept a roof that is not certified or misses its targets; every sheet and page is marked."
+INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
+Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
+ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
+Start = Annotated[bool, flag("--start", START)]
+Cache = Annotated[bool, flag("--cache/--no-cache", CACHE)]
+Whole = Annotated[bool, flag("--whole", WHOLE)]
+MeshCheck = Annotated[bool | None, flag("--mesh-check/--no-mesh-check", MESH_CHECK)]
+FileUnits = Annotated[str, option("NAME", UNITS)]
+OUTPUT = "-o", "--output"
+MANY_FILES = option("FILE", "File to write; may be repeated.", *OUTPUT)
+
+
 @dataclass(frozen=True)
 class Loads:
     """Values of the command line that replace those of a surface: each a list of NAME=VALUE, or VALUE."""
 
-    tension: list[str] | None = None
-    pressure: list[str] | None = None
-    weight: list[str] | None = None
-    cable: list[str] | None = None
-    volume: list[str] | None = None
-    snow: list[str] | None = None
+    tension: Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {LOADED}.")] = None
+    pressure: Annotated[
+        list[str] | None,
+        option("NAME=VALUE", f"Pressure on a patch. {LOADED}; wall pressures are updated."),
+    ] = None
+    weight: Annotated[list[str] | None, option("NAME=VALUE", f"Weight of a patch per area. {EVERY}.")] = None
+    snow: Annotated[
+        list[str] | None, option("NAME=VALUE", f"Snow on a patch, per area of the plan. {LOADED}.")
+    ] = None
+    cable: Annotated[
+        list[str] | None, option("NAME=VALUE", "Tension of a cable. A bare VALUE applies to all.")
+    ] = None
+    volume: Annotated[list[str] | None, option("NAME=VALUE", "Volume of a room that has one already.")] = None
 
-    def __bool__(self) -> bool:
-        """Whether there are any."""
-        return any(vars(self).values())
+    @property
+    def change(self) -> Callable[[Surface], Surface] | None:
+        """What gives a surface these values; None if there are none."""
+        return self.of if any(vars(self).values()) else None
 
     def of(self, surface: Surface) -> Surface:
         """The surface with these values; wall pressures follow those of their rooms."""
@@ -111,37 +124,68 @@ class Loads:
         )
 
 
+@dataclass(frozen=True)
+class Build:
+    """How a roof is prepared for what is built from it."""
+
+    whole: Whole = False
+    cache: Cache = True
+    allow_uncertified: Annotated[bool, flag("--allow-uncertified", UNCERTIFIED)] = False
+
+    def roof(self, project: Project, progress: OnStep) -> Outcome:
+        """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
+        roof, file = projects.opened(project, progress, use_cache=self.cache), project.path
+        roof = roof.unfolded() if self.whole else roof
+        if roof.certified and not roof.good and not self.allow_uncertified:
+            hint = f"pcmc solve {file} shows them, --allow-uncertified accepts the roof"
+            text = f"{file}: the roof misses its targets or its accuracy; {hint}"
+            raise FileError(text, what=str(file))
+        return roof
+
+
+def with_groups(function: Callable[..., int]) -> Callable[..., int]:
+    """A command as typer reads it: a parameter of a dataclass becomes an option for each of its fields."""
+    parameters: list[inspect.Parameter] = []
+    groups: dict[str, Any] = {}
+    for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
+        if is_dataclass(group := parameter.annotation):
+            groups[name], kinds = group, get_type_hints(group, include_extras=True)
+            for field in fields(group):
+                changes = {"name": field.name, "default": field.default, "annotation": kinds[field.name]}
+                parameters.append(parameter.replace(**changes))
+        else:
+            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+
+    @wraps(function)
+    def run(**given: Any) -> int:
+        for name, group in groups.items():
+            given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
+        return function(**given)
+
+    vars(run).update(__signature__=inspect.Signature(parameters), __annotations__={})
+    return run
+
+
 def load(file: Path, units: str = "") -> Project:
     """The project in a file, which may be a mesh or a drawing alone."""
-    check_input(file)
+    check_suffix(file)
     return projects.load(file, units=units)
 
 
-def opened(file: Path, say: OnStep, loads: Loads | None = None, *, units: str = "", **how: Any) -> Outcome:
-    """The roof in a file, with the loads of the command line; ``how`` as of ``pcmc.project.opened``."""
-    return projects.opened(load(file, units), say, changed=loads.of if loads else None, **how)
-
-
-def to_build(project: Project, say: OnStep, *, anyway: bool, cache: bool, whole: bool) -> Outcome:
-    """The roof of a project, for what is built: one that misses its targets is refused, unless ``anyway``.
-
-    With ``whole``, or where its project asks for it, the roof is unfolded at its mirror planes.
-    """
-    roof, file = projects.opened(project, say, use_cache=cache), project.path
-    if whole:
-        roof = roof.unfolded()
-    if roof.certified and not roof.good and not anyway:
-        hint = f"pcmc solve {file} shows them, --anyway accepts the roof"
-        text = f"{file}: the roof misses its targets or its accuracy; {hint}"
-        raise FileError(text, what=str(file))
-    return roof
-
-
-def check_input(file: Path) -> None:
+def check_suffix(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
     suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
     if suffix not in known:
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
+
+
+def check_outputs(
+    file: Path, surfaces: Sequence[Path] = (), *, others: Sequence[Path] = (), picture: Path | None = None
+) -> None:
+    """Refuse files that cannot be written, or that are read; ``surfaces`` need the suffix of a format."""
+    projects.check_names(surfaces, picture)
+    outputs = [*surfaces, *others, *filter(None, [picture])]
+    projects.check_outputs(outputs, inputs=projects.files_of(file))
 
 
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:

@@ -1,13 +1,14 @@
-"""The commands panels, draw and report: from the shape to what is built. Each returns the exit code."""
+"""The commands panels, draw, report and structure: from the shape to what is built.
+
+Each returns the exit code.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
-
-import typer
 
 from .. import project as projects
 from ..base import validate
@@ -16,45 +17,60 @@ from ..base.units import Units
 from ..certificate.required import require_certified
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
-from ..panelling import Panels, fewer_families
+from ..panelling import fewer_families
 from ..panelling.schedule import MIRROR_IMAGES
 from ..report.document import check_suffix as check_report
-from . import NOT_CERTIFIED, OK, arguments, checking
-from .arguments import MANY_FILES, Cache, FileUnits, Input, ViewName, Whole, number, option
-from .checking import CHECKED
+from ..structure import write_structure
+from ..surface import Surface
+from . import NOT_CERTIFIED, OK, arguments, reports
+from .arguments import (
+    MANY_FILES,
+    OUTPUT,
+    Build,
+    FileUnits,
+    Input,
+    MeshCheck,
+    ViewName,
+    check_outputs,
+    count,
+    flag,
+    number,
+    option,
+    real,
+)
 from .progress import working
 
 CSV = ".csv"
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
-ANYWAY = "Accept a surface that is not certified."
-MARKED = "Draw a surface that is not certified; every sheet is marked."
+PICTURE = "Picture to draw, coloured by family."
+MIRRORED = "alike: of one family; or apart."
 TOLERANCE = (
     "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 )
 SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
+HEIGHT = "Section at this height; may be repeated."
+LINE = "Section along this line; may be repeated."
+TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
 DATE = "Date to print; by default the project's. No clock is read."
-REPORTED = "Report on a surface that is not certified; every page is marked."
-TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
-Anyway = Annotated[bool, typer.Option("--anyway", help=ANYWAY)]
+THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
+DENSITY = "Mass per volume; above 0, self-weight is a load."
+SNOW = "Load per plan area, besides the snow of the form."
+WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
+Tolerance = Annotated[float | None, real("LENGTH", TOLERANCE)]
 
 
 def panels_(
+    *,
     file: Input,
-    tolerance: Annotated[
-        float, option("LENGTH", "Largest difference of edges within a family.", parser=number)
-    ],
+    tolerance: Annotated[float, real("LENGTH", "Largest difference of edges within a family.")],
     output: Annotated[list[Path] | None, MANY_FILES] = None,
-    picture: Annotated[Path | None, option("PNG", "Picture to draw, coloured by family.")] = None,
+    picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
-    change: Annotated[float | None, option("LENGTH", CHANGE, parser=number)] = None,
-    mirror_images: Annotated[
-        str, option("NAME", "alike: of one family; or apart.", "--mirror-images")
-    ] = MIRROR_IMAGES[0],
-    walls: Annotated[bool, typer.Option("--walls", help="Triangles of walls are panels, too.")] = False,
-    whole: Whole = False,
-    cache: Cache = True,
-    anyway: Anyway = False,
+    change: Annotated[float | None, real("LENGTH", CHANGE)] = None,
+    mirror_images: Annotated[str, option("NAME", MIRRORED)] = MIRROR_IMAGES[0],
+    walls: Annotated[bool, flag("--walls", "Triangles of walls are panels, too.")] = False,
+    build: Build,
 ) -> int:
     """Sort the panels of a roof into families of congruent triangles; write a schedule.
 
@@ -70,29 +86,39 @@ def panels_(
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    projects.check_names([], picture)
     projects.check_picture([seen], "patches")
-    outputs = [path for one in files for path in _paths(one)] + ([picture] if picture else [])
-    projects.check_outputs(outputs, inputs=projects.files_of(file))
-    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
-    with working() as say:
-        project = arguments.load(file)
-        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
-        surface = roof.shown.surface
-        say("sorting panels")
+    outputs: list[Path] = []
+    for path in files:
+        if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
+            text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
+            raise FileError(text, what=str(path), found=suffix)
+        outputs += projects.schedule_paths(path) if suffix == CSV else [path]
+    check_outputs(file, others=outputs, picture=picture)
+    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
+    options["anyway"] = build.allow_uncertified
+    with working() as progress:
+        roof = build.roof(arguments.load(file), progress)
+        progress("sorting panels")
         if change is None:
             schedule = roof.panels(tolerance, **options)
         else:
 
             def callback(made: int, count: int) -> None:
-                say(f"round {made}: {count} families")
+                progress(f"round {made}: {count} families")
 
-            fewer = fewer_families(surface, tolerance, change, callback=callback, **options)
+            shape = roof.shown.surface
+            fewer = fewer_families(shape, tolerance, change, callback=callback, **options)
             schedule = fewer.after
-        works = [work for path in files for work in _works(path, schedule, roof.units)]
+        works: list[Any] = []
+        writing = partial(write, surface=schedule.surface, units=roof.units)
+        for path in files:
+            is_table = path.suffix.lower() == CSV
+            works += projects.schedule_works(path, schedule) if is_table else [(path, writing)]
         if picture is not None:
-            works.append((picture, partial(_paint, schedule, seen)))
-        written = projects.write_all(works, say)
+            from ..plot import families
+
+            works.append((picture, lambda path: families(schedule, path, view=seen)))
+        written = projects.write_all(works, progress)
     print(schedule)
     if change is not None:
         print(f"\n{fewer}")
@@ -102,22 +128,17 @@ def panels_(
 
 
 def draw_(
+    *,
     file: Input,
     output: Annotated[list[Path], MANY_FILES],
     units: FileUnits = "",
     sheet: Annotated[str | None, option("NAME", SHEET)] = None,
-    scale: Annotated[
-        int | None, option("NUMBER", "1 to this; by default it fits.", parser=arguments.integer)
-    ] = None,
-    height: Annotated[
-        list[str] | None, option("Z", "Section at this height; may be repeated.", "--height")
-    ] = None,
-    line: Annotated[list[str] | None, option("X,Y,X,Y", "Section along this line; may be repeated.")] = None,
-    tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
-    panel_sheets: Annotated[bool, typer.Option("--panel-sheets", help=TRUE_SIZE)] = False,
-    whole: Whole = False,
-    cache: Cache = True,
-    anyway: Annotated[bool, typer.Option("--anyway", help=MARKED)] = False,
+    scale: Annotated[int | None, count("1 to this; by default it fits.")] = None,
+    height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
+    line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
+    tolerance: Tolerance = None,
+    panel_sheets: Annotated[bool, flag("--panel-sheets", TRUE_SIZE)] = False,
+    build: Build,
 ) -> int:
     """Draw a roof: plan, elevations, sections, setting-out points, panels; in .dxf, .pdf or .svg.
 
@@ -128,33 +149,31 @@ def draw_(
     """
     for path in output:
         check_drawing(path)
-    projects.check_outputs(output, inputs=projects.files_of(file))
+    check_outputs(file, others=output)
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
-    with working() as say:
-        project = arguments.load(file, units)
-        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
-        say("drawing")
-        documents = _chosen(roof.documents, sheet=sheet, tolerance=tolerance)
-        documents = replace(documents, panel_sheets=panel_sheets)
-        drawings = roof.drawing_set(documents, anyway=anyway, scale=scale, heights=heights, lines=lines)
-        written = projects.write_all(drawings.files(*output), say)
+    with working() as progress:
+        roof = build.roof(arguments.load(file, units), progress)
+        progress("drawing")
+        documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets)
+        options = {"scale": scale, "heights": heights, "lines": lines}
+        drawings = roof.drawing_set(documents, anyway=build.allow_uncertified, **options)
+        written = projects.write_all(drawings.files(*output), progress)
     sheets = f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}"
     print(f"{sheets}; written: {', '.join(map(str, written))}")
     return OK if roof.good else NOT_CERTIFIED
 
 
 def report_(
+    *,
     file: Input,
-    output: Annotated[Path, option("PDF", "File to write, .pdf.", "-o", "--output")],
+    output: Annotated[Path, option("PDF", "File to write, .pdf.", *OUTPUT)],
     units: FileUnits = "",
     force: Annotated[str, option("NAME", FORCE)] = "",
-    tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
+    tolerance: Tolerance = None,
     date: Annotated[str | None, option("TEXT", DATE)] = None,
-    mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
-    whole: Whole = False,
-    cache: Cache = True,
-    anyway: Annotated[bool, typer.Option("--anyway", help=REPORTED)] = False,
+    mesh_check: MeshCheck = None,
+    build: Build,
 ) -> int:
     """Write a report: pictures, plan to scale, verdict in words, forces, mesh check, panels; in .pdf.
 
@@ -164,37 +183,33 @@ def report_(
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
     check_report(output)
-    projects.check_outputs([output], inputs=projects.files_of(file))
-    with working() as say:
+    check_outputs(file, others=[output])
+    anyway = build.allow_uncertified
+    with working() as progress:
         project = arguments.load(file, units)
-        _expect_force(project, force)
-        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
-        say("certifying")
+        own = project.units.force
+        if force and own and force != own:
+            text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
+            raise OptionError(text, what="--force", found=force, expected=own)
+        roof = build.roof(project, progress)
+        progress("certifying")
         roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
         require_certified(roof.shown.certificate, anyway)
-    checking.mesh_check(roof, mesh_check)
-    checking.margins(roof)
-    documents = _chosen(roof.documents, tolerance=tolerance, date=date)
-    with working() as say:
-        say("laying out the pages")
+    reports.mesh_check(roof, mesh_check)
+    reports.margins(roof)
+    with working() as progress:
+        progress("laying out the pages")
+        documents = _documents(roof, tolerance=tolerance, date=date)
         listed = {file.name: "project" if roof.result is not None else "surface"}
         report = roof.report(documents, files=listed, anyway=anyway)
-        projects.write_all([(output, report.write)], say)
+        projects.write_all([(output, report.write)], progress)
     print(f"written: {output}")
     return OK if roof.good else NOT_CERTIFIED
 
 
-def _expect_force(project: projects.Project, force: str) -> None:
-    """Refuse another unit of force than the project has."""
-    own = project.units.force
-    if force and own and force != own:
-        text = f"--force: the forces of {project.path.name} are in {own}, not in {force}; leave out --force"
-        raise OptionError(text, what="--force", found=force, expected=own)
-
-
-def _chosen(documents: projects.Documents, **given: Any) -> projects.Documents:
+def _documents(roof: projects.Outcome, **given: Any) -> projects.Documents:
     """What a project says about its documents, with what the command line says instead."""
-    return replace(documents, **{name: value for name, value in given.items() if value is not None})
+    return replace(roof.documents, **{name: value for name, value in given.items() if value is not None})
 
 
 def _ends(text: str) -> Any:
@@ -206,23 +221,64 @@ def _ends(text: str) -> Any:
     return (a, b), (c, d)
 
 
-def _paths(path: Path) -> list[Path]:
-    """The files that the name of an output stands for."""
-    suffix = path.suffix.lower()
-    if suffix not in (CSV, *FORMATS):
-        text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
-        raise FileError(text, what=str(path), found=suffix)
-    return [path] if suffix != CSV else projects.schedule_paths(path)
+def structure(
+    *,
+    file: Input,
+    output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
+    thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None,
+    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None,
+    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None,
+    density: Annotated[float | None, real("VALUE", DENSITY)] = None,
+    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None,
+    snow: Annotated[float | None, real("VALUE", SNOW)] = None,
+    wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None,
+    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None,
+    build: Build,
+) -> int:
+    """Write a structural model for CalculiX: prestressed membranes, supports, loads.
+
+    A project is solved first; its [structure] has the values that no option gives.
+
+    \b
+    Example:
+      pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
+    """
+    projects.check_model(output)
+    check_outputs(file, others=[output])
+    with working() as progress:
+        project = arguments.load(file)
+        start = projects.surface_of(project)
+        patches = [patch.name for patch in start.patches]
+        given = {
+            "thickness": _thickness(start, thickness),
+            "young": young,
+            "poisson": poisson,
+            "density": density,
+            "gravity": gravity,
+            "snow": snow,
+            "wind": arguments.by_name(patches, wind, "--wind") if wind else None,
+            "cable_area": cable_area,
+        }
+        values = {} if project.structure is None else asdict(project.structure)
+        wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
+        wanted.check(start)
+        roof = build.roof(project, progress)
+        progress("certifying")
+        model = roof.model(wanted, build.allow_uncertified)
+        projects.write_all([(output, partial(write_structure, model=model))], progress)
+    if model.note:
+        print(model.note)
+    steps = ", ".join(step.name for step in model.steps)
+    print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
+    print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
+    return OK if roof.good else NOT_CERTIFIED
 
 
-def _works(path: Path, schedule: Panels, units: Units) -> list[Any]:
-    """Each file with the function that writes it."""
-    if path.suffix.lower() != CSV:
-        return [(path, partial(write, surface=schedule.surface, units=units))]
-    return projects.schedule_works(path, schedule)
-
-
-def _paint(schedule: Panels, view: Any, path: Path) -> None:
-    from ..plot import families
-
-    families(schedule, path, view=view)
+def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, float] | None:
+    """One number, or one by patch where a patch is named."""
+    if not given:
+        return None
+    names = [patch.name for patch in surface.patches]
+    values = arguments.by_name(names, given, "--thickness")
+    same = len(set(values.values())) == 1 and set(values) == set(names)
+    return next(iter(values.values())) if same else values

@@ -1,12 +1,17 @@
-"""What the commands print about a designed roof."""
+"""What the commands print about a designed roof: how it ended, its mesh check and its margins."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
+
+from ..accuracy import MeshCheck
 from ..certificate.balance import strained_junction
 from ..certificate.leaning import lean_texts
 from ..contact.pinching import standing_part
 from ..design.outcome import values_text
-from ..project import Outcome
+from ..project import MOST_CHECKED, Outcome
+from .progress import working
 
 FAR = 10.0  # degrees: walls that lean less are not reported
 UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
@@ -14,39 +19,38 @@ UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
     """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
-    before = "solved before (--no-cache solves it again)"
-    detail = _advised(outcome.certificate.detail, outcome)
-    message = _advised(outcome.solved.message, outcome)
+    surface, certificate, design, units = outcome.surface, outcome.certificate, outcome.design, outcome.units
+    message, detail = outcome.solved.message, certificate.detail
+    if outcome.advice:  # it has the remedy for a strained junction that was tried
+        strained = strained_junction(surface, standing_part(surface).walls.pinchable)
+        if strained is not None:
+            message, detail = (text.replace(strained.hint, "") for text in (message, detail))
     if verdict and detail:
         message = message.removesuffix(f"; {detail}")  # it follows the verdict
-    print(f"{outcome.surface.m} triangles; {before if outcome.cached else message}")
+    before = "solved before (--no-cache solves it again)"
+    print(f"{surface.m} triangles; {before if outcome.cached else message}")
     if outcome.accurate is not None:
-        print(outcome.accurate.text(outcome.units))
-    if outcome.design is not None:
-        print(f"targets {outcome.design.text(outcome.units)}")
-        if outcome.design.met:  # otherwise the message has the values
-            tables = (outcome.design.targets, outcome.design.parameters)
-            print(", with ".join(values_text(table, outcome.units) for table in tables))
+        print(outcome.accurate.text(units))
+    if design is not None:
+        print(f"targets {design.text(units)}")
+        if design.met:  # otherwise the message has the values
+            print(", with ".join(values_text(table, units) for table in (design.targets, design.parameters)))
     for note in outcome.notes:
         print(note)
-    if verdict and outcome.units:
-        print(outcome.units.sentence)
-    if verdict and len(rooms := outcome.certificate.rooms):
-        unit = outcome.units.behind("pressure")
-        held = [
-            f"{room!r} {pressure:.6g}{unit}"
-            for room, pressure in zip(rooms["room"], rooms["pressure"], strict=True)
-        ]
-        print(f"pressures that keep the volumes: {', '.join(held)}")
     if verdict:
-        print(outcome.certificate.verdict.value)
+        if units:
+            print(units.sentence)
+        if len(rooms := certificate.rooms):
+            pressures = zip(rooms["room"], rooms["pressure"], strict=True)
+            held = [f"{room!r} {pressure:.6g}{units.behind('pressure')}" for room, pressure in pressures]
+            print(f"pressures that keep the volumes: {', '.join(held)}")
+        print(certificate.verdict.value)
         if detail:
             print(detail)
-        if outcome.whole is not None and outcome.solved.certificate.index is not None:
-            whole = outcome.whole
+        if (whole := outcome.whole) is not None and outcome.solved.certificate.index is not None:
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
-        leaning = lean_texts(outcome.certificate.leaning, FAR)
-        if leaning and outcome.certificate.certified:
+        leaning = lean_texts(certificate.leaning, FAR)
+        if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
     if outcome.advice:
         print("\n  ".join(outcome.advice))
@@ -54,10 +58,25 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(f"written: {', '.join(map(str, outcome.files))}")
 
 
-def _advised(text: str, outcome: Outcome) -> str:
-    """A text without its own remedy for a junction where there is advice: that one was tried."""
-    if not outcome.advice:
-        return text
-    surface = outcome.surface
-    strained = strained_junction(surface, standing_part(surface).walls.pinchable)
-    return text if strained is None else text.replace(strained.hint, "")
+def mesh_check(roof: Outcome, wanted: bool | None = None) -> MeshCheck | None:
+    """The check of a roof at rest; None where it is not wanted, and, with a line why, not possible."""
+    if not roof.wants_mesh_check(wanted):
+        if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
+            print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
+        return None
+    sys.stdout.flush()
+    with working() as progress:
+        check = roof.check_mesh(progress)
+    if check is None:  # the surface and its files are good without it
+        print(f"no mesh check: {roof.mesh_failure}")
+    return check
+
+
+def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:
+    """Find and print the margins wanted; of a certified roof also those that its project asks for."""
+    own = roof.project.margin if roof.project is not None and roof.certified else ()
+    sys.stdout.flush()
+    for what in dict.fromkeys([*wanted, *own]):
+        with working() as progress:
+            found = roof.margin(what, progress)
+        print(f"margin: {found.text(roof.units)}")

@@ -8,7 +8,6 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from types import ModuleType
 from typing import Any
 
 from ..base import errors
@@ -18,25 +17,9 @@ from . import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.PlanWarning)
 FAILING = ("strict", "surrogateescape", "backslashreplace")  # error handlers; the second is the locale C's
-PLAIN = str.maketrans(
-    {
-        "²": "^2",
-        "³": "^3",
-        "±": "+-",
-        "°": " deg",
-        "×": "x",
-        "·": "*",
-        "≥": ">=",
-        "≤": "<=",
-        "–": "-",
-        "…": "...",
-        "→": "->",
-        "α": "alpha",
-        "λ": "lambda",
-        "Π": "Pi",
-    }
-)
-"""Signs of the field, as one types them in ASCII."""
+SIGNS = "²³±°×·≥≤–…→αλΠ"  # of the field
+TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types it in ASCII
+PLAIN = str.maketrans(dict(zip(SIGNS, TYPED.split("|"), strict=True)))
 
 
 def run(arguments: list[str]) -> int:
@@ -46,14 +29,15 @@ def run(arguments: list[str]) -> int:
         for kind in SHOWN:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
-        _replace_missing_letters(sys.stdout, sys.stderr)
+        _replace_missing_letters()
         with termination_as_interrupt():
             return _run(arguments)
 
 
 def _run(arguments: list[str]) -> int:
     try:
-        command, exits = _command()
+        command = _command()
+        arguments = ["--allow-uncertified" if one == "--anyway" else one for one in arguments]
         code = command(args=arguments or ["--help"], prog_name="pcmc", standalone_mode=False)
         if sys.stdout is not None:  # None if the shell closed it
             sys.stdout.flush()
@@ -73,9 +57,11 @@ def _run(arguments: list[str]) -> int:
         _say(f"error: {where}{error.strerror or error}")
         return BAD_INPUT
     except Exception as error:
-        if isinstance(error, exits.Abort):
+        import typer
+
+        if isinstance(error, typer.Abort):
             return _interrupted()
-        if isinstance(error, exits.Exit):
+        if isinstance(error, typer.Exit):
             return int(error.exit_code)
         if not hasattr(error, "format_message"):  # typer's errors have it
             raise
@@ -84,8 +70,8 @@ def _run(arguments: list[str]) -> int:
         return BAD_INPUT
 
 
-def _command() -> tuple[Callable[..., Any], ModuleType]:
-    """The command line, and the module that has its exceptions."""
+def _command() -> Callable[..., Any]:
+    """The command line."""
     for library in ("typer", "rich"):
         try:
             __import__(library)
@@ -98,13 +84,13 @@ def _command() -> tuple[Callable[..., Any], ModuleType]:
     if not gc.isenabled():  # ``main`` pauses it
         gc.freeze()
         gc.enable()
-    return typer.main.get_command(app), typer
+    return typer.main.get_command(app)
 
 
-def _replace_missing_letters(*streams: Any) -> None:
-    r"""Write letters that a stream's encoding lacks as one types them (m^2), others as \\xf6: never fail."""
+def _replace_missing_letters() -> None:
+    r"""Write letters that an encoding lacks as one types them (m^2), others as \\xf6: never fail."""
     codecs.register_error("pcmc.plain", _plain)
-    for stream in streams:
+    for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) in FAILING and hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="pcmc.plain")
 

@@ -15,47 +15,25 @@ from ..io import metres_note
 from ..project import Outcome
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import (
-    Cables,
-    Cache,
-    Colour,
-    FileUnits,
-    Input,
-    Loads,
-    Pressures,
-    Settings,
-    Snows,
-    Start,
-    ViewName,
-    Volumes,
-    Weights,
-    Whole,
-    option,
-)
+from .arguments import Cache, FileUnits, Input, Loads, Start, ViewName, Whole, count, flag, load, option
 from .progress import working
 from .reports import report
 
+OUT = "File to write; its suffix selects the format."
+SCALAR = "Scalar of the file that colours the vertices of a .glb or .usda."
+WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
+COLOUR = "--colour", "--color"
+
 
 def convert(
+    *,
     file: Input,
-    output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="File to write; its suffix selects the format.")
-    ],
-    tension: Settings = None,
-    pressure: Pressures = None,
-    weight: Weights = None,
-    snow: Snows = None,
-    cable: Cables = None,
-    volume: Volumes = None,
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=OUT)],
+    loads: Loads,
     start: Start = False,
     cache: Cache = True,
     units: FileUnits = "",
-    colour: Annotated[
-        str,
-        option(
-            "NAME", "Scalar of the file that colours the vertices of a .glb or .usda.", "--colour", "--color"
-        ),
-    ] = "",
+    colour: Annotated[str, option("NAME", SCALAR, *COLOUR)] = "",
     whole: Whole = False,
 ) -> int:
     """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm .ifc .usda.
@@ -66,10 +44,8 @@ def convert(
       pcmc convert roof.toml roof.ifc
       pcmc convert roof.pcmc roof.glb --colour error
     """
-    projects.check_names([output])
-    projects.check_outputs([output], inputs=projects.files_of(file))
-    loads = Loads(tension, pressure, weight, cable, volume, snow)
-    roof = _shown(file, loads, whole, start=start, use_cache=cache, units=units)
+    arguments.check_outputs(file, [output])
+    roof = _shown(file, units, whole, changed=loads.change, start=start, use_cache=cache)
     if roof is None:
         return NOT_CERTIFIED
     projects.write_all(projects.surface_files(roof, [output], colour))
@@ -77,12 +53,11 @@ def convert(
     return OK
 
 
-def _shown(file: Path, loads: Loads, whole: bool, **how: Any) -> Outcome | None:
+def _shown(file: Path, units: str, whole: bool, **how: Any) -> Outcome | None:
     """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
-    with working() as say:
-        roof = arguments.opened(file, say, loads, **how)
-    if whole:
-        roof = roof.unfolded()
+    with working() as progress:
+        roof = projects.opened(load(file, units), progress, **how)
+    roof = roof.unfolded() if whole else roof
     if roof.result is None:
         return roof
     report(roof)
@@ -93,16 +68,12 @@ def _shown(file: Path, loads: Loads, whole: bool, **how: Any) -> Outcome | None:
 
 
 def plot(
+    *,
     file: Input,
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
-    colour: Colour = "patches",
-    tension: Settings = None,
-    pressure: Pressures = None,
-    weight: Weights = None,
-    snow: Snows = None,
-    cable: Cables = None,
-    volume: Volumes = None,
+    colour: Annotated[str, option("NAME", "patches, curvature, error or reactions.", *COLOUR)] = "patches",
+    loads: Loads,
     start: Start = False,
     cache: Cache = True,
     whole: Whole = False,
@@ -115,21 +86,16 @@ def plot(
       pcmc plot roof.toml start.png --start
       pcmc plot half.pcmc roof.png --whole
     """
-    projects.check_names([], picture)
     seen = arguments.view_of(view)
     projects.check_picture([seen], colour)
-    projects.check_outputs([picture], inputs=projects.files_of(file))
-    loads = Loads(tension, pressure, weight, cable, volume, snow)
-    roof = _shown(file, loads, whole, start=start, use_cache=cache)
+    arguments.check_outputs(file, picture=picture)
+    roof = _shown(file, "", whole, changed=loads.change, start=start, use_cache=cache)
     if roof is None:
         return NOT_CERTIFIED
     painting = partial(projects.paint, roof.shown.surface, views=[seen], colour=colour, units=roof.units)
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK
-
-
-WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
 
 
 def explore(
@@ -141,9 +107,9 @@ def explore(
         list[str] | None, option("NAME=VALUE", "Parameter of the example; may be repeated.", "--set")
     ] = None,
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, option("NUMBER", "Port; 0 for any free one.", parser=arguments.integer)] = 0,
+    port: Annotated[int, count("Port; 0 for any free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
-    watch: Annotated[bool, typer.Option("--watch", help=WATCH)] = False,
+    watch: Annotated[bool, flag("--watch", WATCH)] = False,
     start_shape: Start = False,
     cache: Cache = True,
 ) -> int:
@@ -163,16 +129,16 @@ def explore(
     if watch and file is None:
         raise OptionError("explore: --watch needs a file", what="--watch")
     again = None
-    with working() as say:
-        say("building")
+    with working() as progress:
+        progress("building")
         if file is not None:
-            arguments.check_input(file)
+            arguments.check_suffix(file)
             read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
-            roof, again = read(progress=say, report=report), read if watch else None
+            roof, again = read(progress=progress, report=report), read if watch else None
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
             roof = Roof.of(_example(str(example), values), str(example))
-        say("solving")
+        progress("solving")
         explorer = start_roof(roof, host, port, again)
     open_and_wait(explorer, browser)
     return OK
@@ -183,10 +149,9 @@ def _example(name: str, parameters: dict[str, Any]) -> Surface:
     from ..sweep.case_script import resolve
 
     try:
-        if ":" not in name:
-            known: Any = resolve("generators:__all__")
-            if name not in known:
-                raise OptionError(unknown("example", name, known), what="--example", found=name)
+        known: Any = () if ":" in name else resolve("generators:__all__")
+        if ":" not in name and name not in known:
+            raise OptionError(unknown("example", name, known), what="--example", found=name)
         build = resolve(name if ":" in name else f"generators:{name}")
         inspect.signature(build).bind(**parameters)
     except OptionError:

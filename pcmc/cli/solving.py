@@ -8,36 +8,33 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..io import write
 from ..meshing.remeshing import remesh, size_note
-from . import NOT_CERTIFIED, OK, arguments, checking
+from . import NOT_CERTIFIED, OK, reports
 from .arguments import (
     MANY_FILES,
-    Cables,
+    UNCERTIFIED,
     Cache,
     FileUnits,
     Input,
     Loads,
-    Pressures,
-    Settings,
-    Snows,
+    MeshCheck,
     Start,
-    Volumes,
-    Weights,
     Whole,
-    number,
+    check_outputs,
+    count,
+    flag,
+    load,
     option,
+    real,
 )
-from .checking import CHECKED
 from .progress import working
-from .reports import report
 
+TARGET = "minimum, or stationary to accept saddles too (newton only)."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
 ACCURACY = (
     "Error bar wanted, such as height=1e-3: finer triangles where the error comes from; may be repeated."
@@ -49,34 +46,29 @@ RISE = "Find the tension with which the whole roof rises so much over its outlin
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
-VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
+VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
+Verify = Annotated[bool, flag("--verify", VERIFY)]
 
 
 def solve_(
+    *,
     file: Input,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
     picture: Annotated[Path | None, option("PNG", "Picture to draw.")] = None,
     method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
-    target: Annotated[
-        str | None, option("NAME", "minimum, or stationary to accept saddles too (newton only).")
-    ] = None,
-    tension: Settings = None,
-    pressure: Pressures = None,
-    weight: Weights = None,
-    snow: Snows = None,
-    cable: Cables = None,
-    volume: Volumes = None,
-    rise: Annotated[float | None, option("LENGTH", RISE, parser=number)] = None,
-    apex: Annotated[float | None, option("LENGTH", APEX, parser=number)] = None,
-    span_ratio: Annotated[float | None, option("NUMBER", SPAN_RATIO, "--span-ratio", parser=number)] = None,
+    target: Annotated[str | None, option("NAME", TARGET)] = None,
+    loads: Loads,
+    rise: Annotated[float | None, real("LENGTH", RISE)] = None,
+    apex: Annotated[float | None, real("LENGTH", APEX)] = None,
+    span_ratio: Annotated[float | None, real("NUMBER", SPAN_RATIO)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
-    anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
-    accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
-    accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF, "--accuracy-of")] = None,
-    most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
-    mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
-    verify: Annotated[bool, typer.Option("--verify", help=VERIFY)] = False,
+    allow_uncertified: Annotated[bool, flag("--allow-uncertified", UNCERTIFIED)] = False,
+    accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY)] = None,
+    accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF)] = None,
+    most_triangles: Annotated[int | None, count(MOST_TRIANGLES)] = None,
+    mesh_check: MeshCheck = None,
+    verify: Verify = False,
     cache: Cache = True,
     whole: Whole = False,
     units: FileUnits = "",
@@ -94,59 +86,49 @@ def solve_(
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
-    project = _project(file, folder, output, picture, units)
+    project = load(file, units).in_folder(file.parent if folder is None else folder)
+    project = replace(project, files=output or project.files, picture=picture or project.picture)
     project = projects.raised(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
     given: dict[str, Any] = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
     given["accuracy"] = ", ".join(accuracy) if accuracy else None
-    goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
-    wanted = project.mesh_check if mesh_check is None else mesh_check
-    project = replace(project, method=method or project.method, options=options, wanted=goal)
-    verify = verify or project.verify
-    project = replace(project, mesh_check=wanted, verify=verify, whole=whole or project.whole)
+    project = replace(
+        project,
+        method=method or project.method,
+        options=options,
+        wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
+        mesh_check=project.mesh_check if mesh_check is None else mesh_check,
+        verify=verify or project.verify,
+        whole=whole or project.whole,
+    )
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
-    with working() as say:
-        loads = Loads(tension, pressure, weight, cable, volume, snow)
-        changed = loads.of if loads else None
-        how: dict[str, Any] = {"anyway": anyway, "use_cache": cache, "check_after": False}
-        outcome = projects.run_project(project, say, changed=changed, **how)
-    report(outcome)
-    if verify and outcome.certificate.tried == () == outcome.certificate.proofs:
+    with working() as progress:
+        how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
+        outcome = projects.run_project(project, progress, changed=loads.change, **how)
+    reports.report(outcome)
+    if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
     if project.outputs and not outcome.files:
-        print("nothing written (use --anyway to write it)")
-    if check := checking.mesh_check(outcome):
+        print("nothing written (use --allow-uncertified to write it)")
+    if check := reports.mesh_check(outcome):
         print(f"\n{check.brief(outcome.units)}")
-    checking.margins(outcome)
+    reports.margins(outcome)
     return OK if outcome.good else NOT_CERTIFIED
 
 
-def _project(
-    file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None, units: str
-) -> projects.Project:
-    """The project, with the output files of the command line if there are any."""
-    arguments.check_input(file)
-    project = projects.load(file, units=units).in_folder(file.parent if folder is None else folder)
-    return replace(project, files=output or project.files, picture=picture or project.picture)
-
-
 def certify_(
+    *,
     file: Input,
-    tension: Settings = None,
-    pressure: Pressures = None,
-    weight: Weights = None,
-    snow: Snows = None,
-    cable: Cables = None,
-    volume: Volumes = None,
-    meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
-    margin: Annotated[list[str] | None, option("WHAT", MARGIN, "--margin")] = None,
+    loads: Loads,
+    meshes: Annotated[int | None, count(MESHES)] = None,
+    margin: Annotated[list[str] | None, option("WHAT", MARGIN)] = None,
     start: Start = False,
     cache: Cache = True,
-    whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
-    verify: Annotated[bool, typer.Option("--verify", help=VERIFY)] = False,
+    whole: Annotated[bool, flag("--whole", WHOLE_INDEX)] = False,
+    verify: Verify = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
@@ -160,40 +142,35 @@ def certify_(
     """
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
-    with working() as say:
-        loads = Loads(tension, pressure, weight, cable, volume, snow)
-        roof = arguments.opened(file, say, loads, start=start, use_cache=cache)
-        if whole:
-            roof = roof.unfolded()
-        say("certifying")
+    with working() as progress:
+        roof = projects.opened(load(file), progress, changed=loads.change, start=start, use_cache=cache)
+        roof = roof.unfolded() if whole else roof
+        progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
-        report(roof, verdict=False)
+        reports.report(roof, verdict=False)
     print(certificate.text(roof.units))
-    checking.margins(roof, margin or ())
+    reports.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
-        with working() as say:
-            say("checking the mesh")
+        with working() as progress:
+            progress("checking the mesh")
             check = check_mesh(surface, meshes)
         print(f"\n{check.text(roof.units)}")
     return OK if roof.good else NOT_CERTIFIED
 
 
 def remesh_(
+    *,
     file: Input,
-    edge_length: Annotated[float, option("LENGTH", "Edge length of the triangles.", parser=number)],
+    edge_length: Annotated[float, real("LENGTH", "Edge length of the triangles.")],
     output: Annotated[list[Path], MANY_FILES],
-    near_curves: Annotated[
-        float | None, option("LENGTH", "Edge length at junctions and boundaries.", parser=number)
-    ] = None,
-    chord: Annotated[float | None, option("LENGTH", CHORD, parser=number)] = None,
+    near_curves: Annotated[float | None, real("LENGTH", "Edge length at junctions and boundaries.")] = None,
+    chord: Annotated[float | None, real("LENGTH", CHORD)] = None,
     units: FileUnits = "",
-    solved: Annotated[
-        bool, typer.Option("--solve/--no-solve", help="Solve and certify the new mesh.")
-    ] = True,
+    solve: Annotated[bool, flag("--solve/--no-solve", "Solve and certify the new mesh.")] = True,
 ) -> int:
     """Remesh a surface to an edge length, then solve and certify it. Patches and supports stay.
 
@@ -202,25 +179,25 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
-    projects.check_names(output)
-    projects.check_outputs(output, inputs=projects.files_of(file))
-    if not solved:
-        with working() as say:
-            say("remeshing")
-            roof = arguments.opened(file, say, start=True, units=units)
+    check_outputs(file, output)
+    with working() as progress:
+        project = load(file, units)
+        if solve:
+            project = replace(project.in_folder(file.parent), files=output, picture=None)
+            project = replace(project, remeshing=(stage,), documents=projects.Documents())
+            outcome = projects.run_project(project, progress)
+        else:
+            progress("remeshing")
+            roof = projects.opened(project, progress, start=True)
             surface = remesh(roof.surface, **stage.options)
             writing = partial(write, surface=surface, units=roof.units)
-            projects.write_all([(path, writing) for path in output], say)
+            projects.write_all([(path, writing) for path in output], progress)
+    if not solve:
         if note := size_note(surface, edge_length):
             print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
-    project = replace(_project(file, None, output, None, units), remeshing=(stage,), picture=None)
-    project = replace(project, documents=projects.Documents())
-    with working() as say:
-        outcome = projects.run_project(project, say)
-    report(outcome)
-    if outcome.files:
-        return OK
-    print("nothing written (use --no-solve to write the new mesh)")
-    return NOT_CERTIFIED
+    reports.report(outcome)
+    if not outcome.files:
+        print("nothing written (use --no-solve to write the new mesh)")
+    return OK if outcome.files else NOT_CERTIFIED

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,9 +14,14 @@ from ..io import FORMATS, READ_ONLY
 from ..plot.figure import check_suffix
 from ..project import check_outputs, files_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK
-from .arguments import DXF, TOML, integer, number, option, values_of
+from .arguments import DXF, TOML, count, flag, option, real, values_of
 from .progress import sweeping
 
+if TYPE_CHECKING:
+    from ..sweep import Sweep
+
+METHOD = "newton, nesterov or lbfgs; default: the project's."
+MESH_CHECK = "Solve each case on two finer meshes, too, for error bars."
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
 SEARCH = "Try further starts where the first leads to no equilibrium: slower, but tells what ends each way."
 PLOT = "Picture over one varied number or two: of the first --show, else apexes or the rise."
@@ -28,28 +32,18 @@ STORE = "File for finished cases. The same command again runs only the missing o
 def sweep(
     what: Annotated[str, typer.Argument(metavar="WHAT", help=WHAT)],
     values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
-    method: Annotated[
-        str | None, option("NAME", "newton, nesterov or lbfgs; default: the project's.")
-    ] = None,
+    method: Annotated[str | None, option("NAME", METHOD)] = None,
     store: Annotated[Path | None, option("FILE", STORE)] = None,
     csv: Annotated[Path | None, option("FILE", "Table to write (.csv or .parquet).")] = None,
-    every: Annotated[bool, typer.Option("--all", help="Write all columns, not only the first ones.")] = False,
+    every: Annotated[bool, flag("--all", "Write all columns, not only the first ones.")] = False,
     plot: Annotated[Path | None, option("FILE", PLOT)] = None,
     show: Annotated[list[str] | None, option("QUANTITY", SHOW)] = None,
-    workers: Annotated[
-        int | None, option("NUMBER", "Local processes; default: one per processor.", parser=integer)
-    ] = None,
+    workers: Annotated[int | None, count("Local processes; default: one per processor.")] = None,
     scheduler: Annotated[str | None, option("ADDRESS", "Dask scheduler to use: tcp://HOST:8786.")] = None,
-    time_limit: Annotated[
-        float, option("SECONDS", "Time limit per case, in seconds.", parser=number)
-    ] = 600.0,
-    mesh_check: Annotated[
-        bool, typer.Option("--mesh-check", help="Solve each case on two finer meshes, too, for error bars.")
-    ] = False,
-    search: Annotated[bool, typer.Option("--search", help=SEARCH)] = False,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
-    ] = False,
+    time_limit: Annotated[float, real("SECONDS", "Time limit per case, in seconds.")] = 600.0,
+    mesh_check: Annotated[bool, flag("--mesh-check", MESH_CHECK)] = False,
+    search: Annotated[bool, flag("--search", SEARCH)] = False,
+    retry_failed: Annotated[bool, flag("--retry-failed", "Run the stored cases that failed again.")] = False,
 ) -> int:
     """Solve every combination of the values; exit code 0 if all are certified.
 
@@ -83,16 +77,14 @@ def sweep(
         check_suffix(plot)
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
-    given: dict[str, list[Any]] = {}
-    for name, listed in map(values_of, values):
-        if name in given:
-            raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
-        given[name] = listed
-    grid = {name: listed for name, listed in given.items() if len(listed) > 1}
-    grid = grid or given  # one case, whose names are checked as those of any other
-    fixed = {name: listed[0] for name, listed in given.items() if name not in grid}
+    options = {"mesh_check": mesh_check, "search": search}
+
+    def resume(kept: int, missing: int) -> None:
+        if kept:
+            print(f"{store}: {kept} cases are finished, {missing} to run")
+
     with sweeping() as draw:
-        cases = _cases(what, grid, fixed, method, {"mesh_check": mesh_check, "search": search})
+        cases = _cases(what, values, method, options)
         table = run(
             cases,
             store,
@@ -101,50 +93,47 @@ def sweep(
             time_limit=time_limit,
             retry_failed=retry_failed,
             on_record=draw,
-            on_resume=partial(_print_kept, store),
+            on_resume=resume,
         )
     if table.empty:
         return INTERRUPTED
-    first = short_table(table, list(grid), show or ())
+    first = short_table(table, list(cases.grid), show or ())
     if csv is not None:
         write_table(csv, table if every else first)
     labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, table))
     if plot is not None:
-        draw_sweep(table, list(grid), plot, labels, *(show or ())[:1])
+        draw_sweep(table, list(cases.grid), plot, labels, *(show or ())[:1])
     print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}", na_rep=""))
     for name in show or ():
-        if not columns_of(table, name, list(grid)):
+        if not columns_of(table, name, list(cases.grid)):
             print(f"no case has {name}")
-    _print_failures(table[table["status"].isin(FAILED)])
+    failed = table[table["status"].isin(FAILED)]
+    for message, alike in failed.groupby("message", sort=False):  # each reason once
+        others = f" and {len(alike) - 1} more" if len(alike) > 1 else ""
+        print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
     good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
     return OK if good.all() else NOT_CERTIFIED
 
 
-def _cases(
-    what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None, wanted: dict[str, bool]
-) -> Any:
+def _cases(what: str, values: list[str], method: str | None, options: dict[str, bool]) -> Sweep:
+    """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
 
+    given: dict[str, list[Any]] = {}
+    for name, listed in map(values_of, values):
+        if name in given:
+            raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
+        given[name] = listed
+    grid = {name: listed for name, listed in given.items() if len(listed) > 1}
+    grid = grid or given  # one case, whose names are checked as those of any other
+    fixed = {name: listed[0] for name, listed in given.items() if name not in grid}
     if Path(what).suffix.lower() in (TOML, DXF, *FORMATS, *READ_ONLY):
-        return project_sweep(what, grid, fixed, method=method, **wanted)
+        return project_sweep(what, grid, fixed, method=method, **options)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
-    about = {"generator": what, "method": method or "newton"}
-    return Sweep(solve_case, grid, about | {name: True for name, on in wanted.items() if on} | fixed)
-
-
-def _print_kept(store: Path | None, kept: int, missing: int) -> None:
-    """Say how many finished cases the store gives."""
-    if kept:
-        print(f"{store}: {kept} cases are finished, {missing} to run")
-
-
-def _print_failures(failed: Any) -> None:
-    """Print why cases failed, each reason once."""
-    for message, cases in failed.groupby("message", sort=False):
-        others = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
-        print(f"case {cases.index[0]}{others}: {cases['status'].iloc[0]}: {message}")
+    about: dict[str, Any] = {name: True for name, wanted in options.items() if wanted}
+    return Sweep(solve_case, grid, about | {"generator": what, "method": method or "newton"} | fixed)

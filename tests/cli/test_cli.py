@@ -91,7 +91,7 @@ def test_not_certified_is_1_and_writes_nothing_unless_asked(folder, capsys):
     assert cli.main(arguments) == 1
     assert "nothing written" in capsys.readouterr().out
     assert not (folder / "x.obj").exists()
-    assert cli.main([*arguments, "--anyway"]) == 1
+    assert cli.main([*arguments, "--allow-uncertified"]) == 1
     assert (folder / "x.obj").exists()
 
 

@@ -168,7 +168,7 @@ def test_an_uncertified_roof_writes_nothing_or_marked_documents(tmp_path, monkey
     (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
     assert cli.main(["solve", "roof.toml"]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["roof.toml"]
-    assert cli.main(["solve", "roof.toml", "--anyway"]) == 1
+    assert cli.main(["solve", "roof.toml", "--allow-uncertified"]) == 1
     assert (tmp_path / "roof.inp").exists()
     if shutil.which("pdftotext"):
         for name in ("report.pdf", "sheets.pdf"):

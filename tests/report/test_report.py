@@ -215,7 +215,7 @@ def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys
     assert error.count("\n") == 1
     assert "misses its targets" in error
     assert not (tmp_path / output).exists()
-    assert cli.main([name, "roof.toml", "-o", output, *options, "--anyway"]) == 1
+    assert cli.main([name, "roof.toml", "-o", output, *options, "--allow-uncertified"]) == 1
     if name == "report":
         assert all("TARGETS NOT MET" in page for page in words_of(output))
 

@@ -317,7 +317,7 @@ def test_the_command_writes_a_model(tmp_path, monkeypatch, capsys):
     other = ["structure", "other.pcmc", "-o", "roof.inp", "--young", "1e6", "--thickness", "roof=0.001"]
     assert cli.main(other) == 2
     assert not (tmp_path / "roof.inp").exists()
-    assert cli.main([*other, "--anyway"]) == 1
+    assert cli.main([*other, "--allow-uncertified"]) == 1
     assert (tmp_path / "roof.inp").exists()
 
 
@@ -360,7 +360,7 @@ def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
     assert "targets" in capsys.readouterr().err
     assert not (tmp_path / "roof.inp").exists()
-    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--anyway"]) == 1
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--allow-uncertified"]) == 1
     assert (tmp_path / "roof.inp").exists()
 
 
