@@ -44,6 +44,8 @@ def test_from_coarse_to_fine_takes_fewer_steps_on_the_finest_mesh(backend):
 def factorisers(monkeypatch):
     """Those alive, counted whenever another is made."""
     made, alive = [], []
+    gc.collect()
+    gc.freeze()  # what other tests left need not be searched each time
 
     def counted(module):
         make = module.factoriser
@@ -61,6 +63,7 @@ def factorisers(monkeypatch):
     counted(modes)
     yield alive
     gc.collect()
+    gc.unfreeze()
     assert not any(each() is not None for each in made)
 
 
