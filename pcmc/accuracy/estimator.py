@@ -30,10 +30,9 @@ from ..contact.pinching import standing_part
 from ..design.quantities import largest_pull
 from ..design.targets import Target, measure
 from ..forces.functional import energy_and_gradient
-from ..forces.motion_space import motion_space
-from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import Stiffness, lowest, stiffness
+from ..stability.modes import lowest
 from ..surface import Surface
 
 STEP = 1e-5  # of the size: length of the steps that differences of ∇E are taken over
@@ -98,7 +97,7 @@ class _FineMesh:
 
     coarse: Surface
     fine: Surface
-    system: Stiffness | None
+    system: SecondVariation | None
     stiffness: Floats
     free: Floats
     held: Floats
@@ -107,9 +106,9 @@ class _FineMesh:
     def of(cls, coarse: Surface, fine: Surface) -> _FineMesh:
         part = standing_part(fine)
         shown, X = part.surface, part.surface.vertices
-        space = motion_space(shown, part.classes, X)
+        equilibrium = Equilibrium.of(fine)
         try:
-            system = stiffness(shown, part.classes, space, rigid_modes(space, rigid_motions(shown), X))
+            system = equilibrium.factorised()
         except SingularMatrix:
             system = None  # the duals are unknown; every quantity takes the shares of the energy
         tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
@@ -118,7 +117,7 @@ class _FineMesh:
         missing = np.zeros_like(X)
         missing[coarse.n :] = _interpolation_error(coarse, X)
         held = np.where(fine.fixed[:, None], missing, 0.0)
-        return cls(coarse, shown, system, k, space.project(missing), held)
+        return cls(coarse, shown, system, k, equilibrium.space.project(missing), held)
 
     def shares(self, goal: Goal) -> Floats:
         """(e,) the share of each coarse edge in the error of a quantity."""
@@ -138,7 +137,7 @@ class _FineMesh:
             own = self.stiffness * self._missing(mode) ** 2
         else:
             slope = _slope(self.fine, quantity, of)
-        dual = self.system.space.to_vectors(self.system.solve(self.system.space.to_coordinates(slope)))
+        dual = self.system.of.space.to_vectors(self.system.solve(self.system.of.space.to_coordinates(slope)))
         reaction = slope - _along(self.fine, dual)
         at_held = np.abs(np.einsum("nd,nd->n", reaction, self.held))[n:]
         return np.asarray(self.stiffness * missing * self._missing(dual) + at_held + own)
@@ -147,7 +146,7 @@ class _FineMesh:
         """(e,) size of the interpolation error of a field of motions, in the motion space."""
         error = np.zeros_like(field)
         error[self.coarse.n :] = _interpolation_error(self.coarse, field)
-        space = self.system.space if self.system is not None else None
+        space = self.system.of.space if self.system is not None else None
         error = error if space is None else space.project(error)
         return np.asarray(np.linalg.norm(error[self.coarse.n :], axis=1))
 

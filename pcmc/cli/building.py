@@ -113,7 +113,7 @@ def panels_(
         writing = partial(write, surface=schedule.surface, units=roof.units)
         for path in files:
             is_table = path.suffix.lower() == CSV
-            works += projects.schedule_works(path, schedule) if is_table else [(path, writing)]
+            works += projects.schedule_jobs(path, schedule) if is_table else [(path, writing)]
         if picture is not None:
             from ..plot import families
 
@@ -207,9 +207,9 @@ def report_(
     return OK if roof.good else NOT_CERTIFIED
 
 
-def _documents(roof: projects.Outcome, **given: Any) -> projects.Documents:
+def _documents(roof: projects.Outcome, **given: Any) -> projects.Output:
     """What a project says about its documents, with what the command line says instead."""
-    return replace(roof.documents, **{name: value for name, value in given.items() if value is not None})
+    return replace(roof.output, **{name: value for name, value in given.items() if value is not None})
 
 
 def _ends(text: str) -> Any:

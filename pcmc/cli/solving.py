@@ -87,8 +87,9 @@ def solve_(
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = load(file, units).in_folder(file.parent if folder is None else folder)
-    project = replace(project, files=output or project.files, picture=picture or project.picture)
-    project = projects.raised(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
+    own = project.output
+    own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
+    project = projects.with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
@@ -101,7 +102,7 @@ def solve_(
         wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
         mesh_check=project.mesh_check if mesh_check is None else mesh_check,
         verify=verify or project.verify,
-        whole=whole or project.whole,
+        output=own,
     )
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
@@ -111,7 +112,7 @@ def solve_(
     reports.report(outcome)
     if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
-    if project.outputs and not outcome.files:
+    if project.output.paths and not outcome.files:
         print("nothing written (use --allow-uncertified to write it)")
     if check := reports.mesh_check(outcome):
         print(f"\n{check.brief(outcome.units)}")
@@ -183,8 +184,8 @@ def remesh_(
     with working() as progress:
         project = load(file, units)
         if solve:
-            project = replace(project.in_folder(file.parent), files=output, picture=None)
-            project = replace(project, remeshing=(stage,), documents=projects.Documents())
+            written = projects.Output(files=output)
+            project = replace(project.in_folder(file.parent), remeshing=(stage,), output=written)
             outcome = projects.run_project(project, progress)
         else:
             progress("remeshing")

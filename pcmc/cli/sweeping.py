@@ -65,9 +65,8 @@ def sweep(
     from ..quantities import dimension_of
     from ..sweep import draw_sweep, run, short_table, write_table
     from ..sweep.projects import column_labels
-    from ..sweep.short_table import columns_of
     from ..sweep.store import FAILED
-    from ..sweep.table import TABLES
+    from ..sweep.tables import TABLES, columns_of
 
     inputs = files_of(what) if Path(what).exists() else ()
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)

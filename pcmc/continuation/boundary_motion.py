@@ -21,6 +21,7 @@ from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..forces.functional import energy_and_gradient
 from ..surface import Surface
+from .direction import ParameterLine
 
 DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ
 SAME_PLACE = 1e-9  # of the surface's size: how far P(start) may be from the fixed vertices
@@ -65,7 +66,7 @@ class BoundaryMotion:
             )
             hint = "as the boundary moves; remove the room, and give its pressure"
             raise OptionError(f"{message} {hint}", what="parameter", found=surface.rooms[0].name)
-        line = BoundaryLine(self.start, self.positions, int(surface.pinned.sum()))
+        line = BoundaryLine(self.start, {}, {}, self.positions, int(surface.pinned.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.pinned], axis=1)
         if off.max() > SAME_PLACE * surface.size:
             worst = int(np.flatnonzero(surface.pinned)[off.argmax()])
@@ -81,41 +82,20 @@ class BoundaryMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryLine:
-    """The fixed vertices as functions of λ; tensions and pressures stay.
+class BoundaryLine(ParameterLine):
+    """The ``count`` fixed vertices as functions P of λ; no tension or pressure varies."""
 
-    Attributes
-    ----------
-    value : λ at the start.
-    positions : P.
-    count : number of fixed vertices.
-    """
-
-    value: float
     positions: Callable[[float], npt.ArrayLike]
     count: int
-
-    @property
-    def volume_rates(self) -> Floats:
-        """(0,) no prescribed volume varies."""
-        return np.zeros(0)
 
     @property
     def scale(self) -> float:
         """The size of λ in the metric of arclength: its value at the start, or 1."""
         return abs(self.value) or 1.0
 
-    def allows(self, value: float) -> bool:
-        """Every λ is as good as P makes it."""
-        return True
-
     def surface_at(self, surface: Surface, value: float) -> Surface:
-        """The surface; its tensions and pressures do not depend on λ."""
+        """The surface itself."""
         return surface
-
-    def columns(self, surface: Surface, value: float) -> dict[str, float]:
-        """No tension or pressure varies."""
-        return {}
 
     def boundary(self, value: float) -> Floats:
         """P(λ) (count,3)."""
@@ -135,7 +115,3 @@ class BoundaryLine:
         """Σ ⟨∇E, dP/dλ⟩ over the fixed vertices at X (n,3), force·length per unit of λ."""
         forces = energy_and_gradient(surface, X, supports=False)[1]
         return float((forces[surface.pinned] * self.velocity(value)).sum())
-
-    def gradient(self, surface: Surface, X: Floats) -> Floats:
-        """∂∇E/∂λ where no vertex moves: zero (n,3)."""
-        return np.zeros_like(X)

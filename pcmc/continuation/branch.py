@@ -16,9 +16,9 @@ from ..design import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
 from .boundary_motion import BoundaryMotion
-from .direction import Direction
+from .direction import Direction, ParameterLine
 from .options import Ending, FollowOptions
-from .state import QUANTITIES, BranchMesh, Line
+from .state import QUANTITIES, BranchMesh
 from .switching import ALONG, leaving
 from .tracing import Tracer
 
@@ -49,7 +49,7 @@ class Branch:
     ending: Ending
     detail: str = ""
     event_surfaces: Mapping[int, Surface] = field(default_factory=dict, repr=False)
-    _line: Line | None = field(default=None, repr=False)
+    _line: ParameterLine | None = field(default=None, repr=False)
     _options: FollowOptions = field(default=FollowOptions(), repr=False)
 
     @property
@@ -138,7 +138,7 @@ class Branch:
         )
         return one, other
 
-    def _require_line(self) -> Line:
+    def _require_line(self) -> ParameterLine:
         if self._line is None:
             message = "switch: this branch was put together from tables; only one that follow gave can switch"
             raise OptionError(message, what="branch")
@@ -269,8 +269,7 @@ def _direction(parameter: object) -> Direction | BoundaryMotion:
     if isinstance(parameter, str):
         return Direction({parameter: 1.0})
     if isinstance(parameter, Parameter):
-        weights = {parameter.patch: 1.0}
-        by_kind: dict[str, Any] = {f"{parameter.kind}s": weights}
+        by_kind: dict[str, Any] = {f"{parameter.kind}s": dict.fromkeys(parameter.names, 1.0)}
         return Direction(**by_kind)
     validate.refuse(
         "parameter", parameter, "the name of a patch, a Parameter, a Direction or a BoundaryMotion"

@@ -10,8 +10,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
+from ..stability.equilibrium import SecondVariation
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import Stiffness, lowest
+from ..stability.modes import lowest
 from .correction import BorderedMatrix, NotOnBranch
 from .state import BranchMesh, State
 
@@ -89,8 +90,7 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
     tangent = Tangent(direction / length, slope / length, weights, scale)
     rates = at.volume_units * s[size:] / length
     with _counted():
-        stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
-        return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative, rates)
+        return BranchPoint(at, tangent, _eigenvalues(matrix.second), matrix.second.negative, rates)
 
 
 @contextmanager
@@ -105,9 +105,8 @@ def _counted() -> Iterator[None]:
 def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, nearest first, and their motions (k,n,3)."""
     with _counted():
-        values, factor = at.mesh.hessian(at.surface, at.space, at.X)
-        stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
-        every, fields = lowest(stiffness, stiffness.negative + count + 1)
+        second = at.mesh.second_variation(at.surface, at.X)
+        every, fields = lowest(second, second.negative + count + 1)
     nearest = np.argsort(np.abs(every))[:count]
     return every[nearest], np.array([at.motion(at.space.to_coordinates(fields[i])) for i in nearest])
 
@@ -120,7 +119,7 @@ def along_branch(at: BranchPoint, count: int) -> float:
     return float(np.linalg.norm(np.einsum("vi,kvi->k", tangent.row, modes) / np.sqrt(squares)))
 
 
-def _eigenvalues(stiffness: Stiffness) -> Floats:
+def _eigenvalues(second: SecondVariation) -> Floats:
     """All negative eigenvalues and at least one more, ascending."""
-    values = lowest(stiffness, stiffness.negative + 2)[0]
+    values = lowest(second, second.negative + 2)[0]
     return values if len(values) else np.array([np.inf])  # nothing moves at these volumes

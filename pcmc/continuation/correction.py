@@ -108,12 +108,12 @@ class BorderedMatrix:
         self.at, self.row = at, row
         self.rate = rate if at.carried is None else rate + float((row * at.carried).sum())
         try:
-            self.values, self.factor = at.mesh.hessian(at.surface, at.space, at.X)
+            self.second = at.mesh.second_variation(at.surface, at.X)
         except SingularMatrix as error:
             raise NotOnBranch(f"the Hessian has no factorisation ({error})") from None
-        self.inverse: Factor | BorderedFactor = self.factor
+        self.inverse: Factor | BorderedFactor = self.second.factor
         if at.mesh.surface.rooms:
-            self.inverse = BorderedFactor(self.factor, at.room_columns)
+            self.inverse = BorderedFactor(self.second.factor, at.room_columns)
         f = at.parameter_derivative
         size = float(np.linalg.norm(f)) or 1.0
         self.unit = size / float(np.linalg.norm(row) + abs(rate))

@@ -2,8 +2,7 @@
 
     α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ,    V̄_r(λ) = c_r + v_r λ
 
-and in the same way weights, snow and the tensions of cables. E is linear in all but the volumes, so
-∂E/∂λ = Σ w_i A_i - Σ (u_i - ṡ_i) V_i + Σ ẇ_i ∫ z dA + Σ τ̇_c L_c, whatever λ is.
+and in the same way weights, snow and the tensions of cables.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..forces.functional import apply_supports, weighted
-from ..forces.rooms import prescribed_volumes, refuse_varied_pressure
+from ..forces.parameters import Rates, energy_by, gradient_by
+from ..forces.rooms import refuse_varied_pressure
 from ..surface import Surface
-from ..surface.values import wall_changes
-from .loads import Loads
+from ..surface.supports import apply_supports
+from ..surface.values import KINDS, part_index, part_values, rates_of
 
-KINDS = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
+VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
 SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same λ
 
 
@@ -40,7 +39,7 @@ class Direction:
     cables : rate of the tension by the cable's name.
     volumes : weight v_r by the name of a room of prescribed volume, whose pressure is a result.
     relative : False: α_i = w_i λ, so that with ``{"roof": 1.0}`` λ is the tension of "roof" itself.
-        True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for pressures and volumes.
+        True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for all others.
 
     Examples
     --------
@@ -59,14 +58,14 @@ class Direction:
     cables: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for key in KINDS:
-            weights = getattr(self, key)
+        for kind in VARIED:
+            weights = getattr(self, kind)
             if not isinstance(weights, Mapping):
-                validate.refuse(f"Direction.{key}", weights, "weights by name, such as {'roof': 1.0}")
+                validate.refuse(f"Direction.{kind}", weights, "weights by name, such as {'roof': 1.0}")
             for name, weight in weights.items():
-                if validate.number(f"Direction.{key}", weight, where=name) == 0.0:
-                    validate.refuse(f"Direction.{key}", weight, "a weight other than 0", name)
-        if not any(getattr(self, key) for key in KINDS):
+                if validate.number(f"Direction.{kind}", weight, where=name) == 0.0:
+                    validate.refuse(f"Direction.{kind}", weight, "a weight other than 0", name)
+        if not self.named:
             message = "Direction: name at least one patch whose tension or pressure varies, a room or a cable"
             raise OptionError(message, what="Direction")
 
@@ -80,159 +79,131 @@ class Direction:
             raise OptionError(message, what="lower", found=lower)
         return cls({upper: denominator})
 
+    @property
+    def named(self) -> dict[str, Mapping[str, float]]:
+        """The weights by kind and name."""
+        return {kind: getattr(self, kind) for kind in VARIED if getattr(self, kind)}
+
     def line(self, surface: Surface) -> ParameterLine:
-        """The tensions and pressures along this direction, starting from those of a surface."""
-        w, u = _rates(surface, self.tensions), _rates(surface, self.pressures)
-        v = _volume_rates(surface, self.volumes)
-        loads = Loads.of(surface, self.weights, self.cables, self.snows)
-        value = 0.0 if self.relative else _common_value(surface, w, u, v, loads)
-        followed = wall_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
-        # zero, and not only to rounding: so a value of λ that is asked for gives exactly the values named
-        a, b, c = (
-            values if self.relative else np.where(rates != 0.0, 0.0, values)
-            for values, rates in (
-                (surface.tensions, w),
-                (surface.pressures - followed * value, u),
-                (prescribed_volumes(surface), v),
-            )
-        )
-        u = u + followed
-        refuse_varied_pressure(surface, np.flatnonzero(u))
-        if not (surface.tensions[w != 0.0] > 0.0).all():
-            name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
+        """The values along this direction, starting from those of a surface."""
+        rates = {kind: rates_of(surface, kind, weights) for kind, weights in self.named.items()}
+        value = 0.0 if self.relative else self._common_value(surface)
+        start = {}
+        for kind, of_kind in rates.items():
+            start[kind] = part_values(surface, kind) - of_kind * value
+            if not self.relative:
+                # not only to rounding: so a value of λ that is asked for gives exactly the values named
+                start[kind][[part_index(surface, kind, name) for name in self.named[kind]]] = 0.0
+        line = ParameterLine(value, start, rates)
+        refuse_varied_pressure(surface, np.flatnonzero(rates.get("pressures", ())))
+        _refuse_slack(surface, rates)
+        surface.retensioned(snows=line.named(surface, value + 1.0).get("snows"))  # refuses it at free edges
+        return line
+
+    def _common_value(self, surface: Surface) -> float:
+        """λ of the surface; everything that is named must agree on it."""
+        given = [
+            (f"{kind[:-1]} of {part.name!r}", getattr(part, KINDS[kind][1]) / weights[part.name])
+            for kind, weights in self.named.items()
+            for part in getattr(surface, KINDS[kind][0])
+            if part.name in weights
+        ]
+        (first, value), *others = given
+        for name, other in others:
+            if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
+                message = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}"
+                hint = "give weights in proportion to the surface's own values, or relative=True"
+                raise OptionError(
+                    f"{message}: {hint}",
+                    what="parameter",
+                    where=name,
+                    found=float(other),
+                    expected=float(value),
+                )
+        return float(value)
+
+
+def _refuse_slack(surface: Surface, rates: Rates) -> None:
+    """Refuse a tension of 0: from there on triangles, or a curve, would slide for nothing."""
+    for part in np.flatnonzero(rates.get("tensions", ())):
+        if surface.tensions[part] <= 0.0:
+            name = surface.patches[part].name
             message = f"the tension of {name!r} is 0, where its triangles stop pulling; start from one > 0"
             raise OptionError(message, what="parameter", where=name, found=0.0)
-        loads.check()
-        loads = loads.line(self.relative).with_walls(surface, value)
-        surface.retensioned(snows=loads.at(value + 1.0)["snows"])  # refuses snow beside free edges
-        return ParameterLine(value, a, b, w, u, c, v, loads)
+    for part in np.flatnonzero(rates.get("cables", ())):
+        if surface.cables[part].tension <= 0.0:
+            name, found = surface.cables[part].name, surface.cables[part].tension
+            message = f"the tension of the cable {name!r} is 0; start from one > 0"
+            raise OptionError(message, what="parameter", where=name, found=found)
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterLine:
-    """The tensions, pressures and volumes of a surface as functions of λ: a ``Direction`` with its start.
+    """The values of a surface as functions of λ: a ``Direction`` with its start.
 
-    Attributes
-    ----------
-    value : λ of that surface.
-    tensions, pressures : (k,) a and b, those at λ = 0.
-    tension_rates, pressure_rates : (k,) w and u.
-    volumes, volume_rates : (r,) c, the volumes of the rooms at λ = 0, and v.
-    loads : the weights, the snow and the tensions of cables that vary.
+    ``value`` is λ of that surface; ``start`` and ``rates`` are the values at λ = 0 and their rates, by the
+    kinds that vary.
     """
 
     value: float
-    tensions: Floats
-    pressures: Floats
-    tension_rates: Floats
-    pressure_rates: Floats
-    volumes: Floats = field(default_factory=lambda: np.zeros(0))
-    volume_rates: Floats = field(default_factory=lambda: np.zeros(0))
-    loads: Loads = field(default_factory=lambda: Loads(()))
+    start: Rates
+    rates: Rates
 
     @cached_property
     def scale(self) -> float:
-        """The size of λ in the metric of arclength: what varies over its weights."""
-        w, u, v = self.tension_rates, self.pressure_rates, self.volume_rates
-        tensions = (self.tensions + w * self.value)[w != 0.0]
-        pressures = (self.pressures + u * self.value)[u != 0.0]
-        volumes = (self.volumes + v * self.value)[v != 0.0]
-        loads, rates = self.loads.values(self.value), self.loads.rates
-        size = np.linalg.norm(np.concatenate([tensions, pressures, volumes, loads]))
-        return float(size / np.linalg.norm(np.concatenate([w, u, v, rates]))) or 1.0
+        """The size of λ in the metric of arclength: what varies over its rates."""
+        size = np.linalg.norm(np.concatenate(list(self._varied(self.value).values())))
+        rates = np.concatenate([rates[rates != 0.0] for rates in self.rates.values()])
+        return float(size / np.linalg.norm(rates)) or 1.0
+
+    def _varied(self, value: float) -> dict[str, Floats]:
+        """The values that vary, at λ."""
+        return {kind: (self.start[kind] + r * value)[r != 0.0] for kind, r in self.rates.items()}
+
+    def named(self, surface: Surface, value: float) -> dict[str, dict[str, float]]:
+        """The values that vary, at λ, by kind and name."""
+        return {
+            kind: {
+                getattr(surface, KINDS[kind][0])[part].name: x
+                for part, x in zip(np.flatnonzero(self.rates[kind]), values.tolist(), strict=True)
+            }
+            for kind, values in self._varied(value).items()
+        }
 
     def allows(self, value: float) -> bool:
         """Whether every varied tension is still positive at λ."""
-        w = self.tension_rates
-        pulling = bool(((self.tensions + w * value)[w != 0.0] > 0.0).all())
-        return pulling and self.loads.allow(value)
+        varied = self._varied(value)
+        return all((varied[kind] > 0.0).all() for kind in ("tensions", "cables") if kind in varied)
 
     def surface_at(self, surface: Surface, value: float) -> Surface:
-        """The surface with its tensions, pressures and prescribed volumes at λ."""
-        names = [p.name for p in surface.patches]
-        w, u = self.tension_rates, self.pressure_rates
-        return surface.retensioned(
-            {names[i]: self.tensions[i] + w[i] * value for i in np.flatnonzero(w)},
-            {names[i]: self.pressures[i] + u[i] * value for i in np.flatnonzero(u)},
-            walls=[names[i] for i in self._followed() if surface.walls[i]],
-            volumes=self._varied_volumes(surface, value),
-            **self.loads.at(value),
-        )
-
-    def _followed(self) -> list[int]:
-        """The patches whose pressure or snow varies."""
-        snowy = [load.index for load in self.loads.parts if load.kind == "snow"]
-        return [*np.flatnonzero(self.pressure_rates).tolist(), *snowy]
-
-    def _varied_volumes(self, surface: Surface, value: float) -> dict[str, float]:
-        """The volumes that vary, at λ, by the names of their rooms."""
-        volumes = self.volumes + self.volume_rates * value
-        return {surface.rooms[r].name: float(volumes[r]) for r in np.flatnonzero(self.volume_rates)}
+        """The surface with its values at λ."""
+        named = self.named(surface, value)
+        under = (name for kind in ("pressures", "snows") for name in named.get(kind, ()))
+        walls = [name for name in under if surface.walls[surface.patch_index(name)]]
+        return surface.retensioned(walls=walls, **named)
 
     def columns(self, surface: Surface, value: float) -> dict[str, float]:
-        """The varied tensions and pressures at λ, as columns of a table."""
-        columns = {}
-        for i, patch in enumerate(surface.patches):
-            if self.tension_rates[i]:
-                columns[f"tension {patch.name}"] = self.tensions[i] + self.tension_rates[i] * value
-            if self.pressure_rates[i]:
-                columns[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
-        for name, volume in self._varied_volumes(surface, value).items():
-            columns[f"volume {name}"] = volume
-        return columns | self.loads.columns(value)
+        """The values that vary, at λ, as columns of a table."""
+        named = self.named(surface, value)
+        return {f"{kind[:-1]} {name}": x for kind, by_name in named.items() for name, x in by_name.items()}
 
-    def boundary(self, value: float) -> None:
-        """No fixed vertex moves."""
+    @property
+    def volume_rates(self) -> Floats | float:
+        """(r,) dV̄/dλ, or 0."""
+        return self.rates.get("volumes", 0.0)
 
-    def velocity(self, value: float) -> None:
-        """No fixed vertex moves."""
+    def boundary(self, value: float) -> Floats | None:
+        """The positions (k,3) of the fixed vertices at λ; None as none of them moves."""
+        return None
+
+    def velocity(self, value: float) -> Floats | None:
+        """dP/dλ (k,3); None as no fixed vertex moves."""
+        return None
 
     def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
-        """∂E/∂λ = Σ w_i A_i - Σ u_i V_i at X (n,3)."""
-        areas, volumes, _ = weighted(surface, X=X)
-        own = float(self.tension_rates @ areas - self.pressure_rates @ volumes)
-        return own + self.loads.energy_derivative(surface, X)
+        """∂E/∂λ at X (n,3)."""
+        return energy_by(surface, self.rates, X)
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:
-        """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), with that of the loads, supports applied."""
-        own = weighted(surface, self.tension_rates, self.pressure_rates, X)[2]
-        return apply_supports(surface, self.loads.add_gradient(surface, X, own), X)
-
-
-def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
-    rates = np.zeros(len(surface.patches))
-    for name, weight in weights.items():
-        rates[surface.patch_index(name)] = weight
-    return rates
-
-
-def _volume_rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
-    names = [room.name for room in surface.rooms]
-    rates = np.zeros(len(names))
-    for name, weight in weights.items():
-        rates[names.index(validate.choice("room", name, names))] = weight
-    return rates
-
-
-def _common_value(surface: Surface, w: Floats, u: Floats, v: Floats, loads: Loads) -> float:
-    """λ of the surface; everything that is named must agree on it."""
-    sources = (
-        ("tension", surface.patches, surface.tensions, w),
-        ("pressure", surface.patches, surface.pressures, u),
-        ("volume", surface.rooms, prescribed_volumes(surface), v),
-    )
-    given = [
-        (f"{kind} of {parts[i].name!r}", values[i] / rates[i])
-        for kind, parts, values, rates in sources
-        for i in np.flatnonzero(rates)
-    ]
-    given += [(f"{load.kind} of {load.name!r}", load.start / load.rate) for load in loads.parts]
-    (first, value), *others = given
-    for name, other in others:
-        if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
-            message = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}"
-            hint = "give weights in proportion to the surface's own values, or relative=True"
-            raise OptionError(
-                f"{message}: {hint}", what="parameter", where=name, found=float(other), expected=float(value)
-            )
-    return float(value)
+        """∂∇E/∂λ (n,3), supports applied."""
+        return apply_supports(surface, gradient_by(surface, self.rates, X), X)

@@ -7,43 +7,28 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..contact.pull import excess_pull
-from ..forces.functional import (
-    apply_supports,
-    energy_and_gradient,
-    energy_at,
-    onto_circles,
-)
+from ..forces.functional import energy_and_gradient, energy_at
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.motion_space import MotionSpace, force_scale, motion_space
-from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.rooms import (
     prescribed_volumes,
     volume_gradients_at,
     volumes_at,
     with_room_pressures,
 )
-from ..forces.second_variation import assemble
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
-from ..stability.factorisation import Factor, Factoriser, factoriser
-from ..stability.modes import (
-    Stiffness,
-    excluded_columns,
-    full_matrix,
-    lumped_mass,
-    negatives_without,
-)
+from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
+from ..surface.supports import apply_supports, onto_circles
 from ..surface.topology import SHEET
-from .boundary_motion import BoundaryLine
 from .direction import ParameterLine
 
-Line = ParameterLine | BoundaryLine
 LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
 
@@ -60,7 +45,7 @@ class BranchMesh:
     roof : (patches,) 1 for the patches whose volumes over Π are that of the roof, 0 for walls.
     """
 
-    def __init__(self, surface: Surface, line: Line, backend: str | None = None) -> None:
+    def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
@@ -69,22 +54,12 @@ class BranchMesh:
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
-        self._dimension: Ints | None = None
+        self._last = Equilibrium(part, self.surface.vertices, backend)
 
-    def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
-        """Values of Bᵀ(∂²E)B in its sparsity pattern, and its factor, valid until the next call."""
-        if self._dimension is None or not np.array_equal(self._dimension, space.dimension):
-            self._dimension = space.dimension
-            self._pattern: Pattern = hessian_pattern(self.classes, space)
-            self._factoriser: Factoriser = factoriser(self._pattern, self._backend)
-        values = assemble(surface, self.classes, space, self._pattern, X)
-        return values, self._factoriser.factor(values)
-
-    def stiffness(self, space: MotionSpace, X: Floats, values: Floats, factor: Factor) -> Stiffness:
-        """The Hessian just factorised, with its mass and its inertia."""
-        matrix, mass = full_matrix(self._pattern, values), lumped_mass(space, self.classes, X)
-        excluded = excluded_columns(self.surface, space, np.zeros((space.size, 0)), X)
-        return Stiffness(space, matrix, mass, factor, excluded, negatives_without(factor, excluded))
+    def second_variation(self, surface: Surface, X: Floats) -> SecondVariation:
+        """Bᵀ(∂²E)B, factorised; valid until the next call."""
+        self._last = self._last.at(X, surface)
+        return self._last.factorised(soften=False)
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""

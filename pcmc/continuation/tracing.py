@@ -33,9 +33,10 @@ from .correction import (
     fixed_parameter,
     fixed_volume,
 )
+from .direction import ParameterLine
 from .options import Ending, FollowOptions
 from .segment import EVENT_ACCURACY, Segment, crosses_goal
-from .state import BranchMesh, Line, State
+from .state import BranchMesh, State
 
 START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
 QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
@@ -65,7 +66,7 @@ class Tracer:
     def __init__(
         self,
         surface: Surface,
-        line: Line,
+        line: ParameterLine,
         goals: Mapping[str, float],
         options: FollowOptions,
         callback: Callback | None,

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..certificate.curve_tables import sides_at
 from ..certificate.reactions import SupportForces, support_forces
+from ..certificate.tables import sides_at
 from ..forces.functional import weighted
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d
+from ..surface.values import part_index
 from . import cable_quantities
 from .lean import lean
 from .measurement import Branches, Measurement, largest
@@ -109,15 +109,9 @@ def _curvature(surface: Surface, of: str) -> Measurement:
 
 def _pressure(surface: Surface, of: str) -> Measurement:
     """The pressure of the air in a room of prescribed volume, force/length²."""
-    row = np.linalg.pinv(surface.room_signs.T)[room_index(surface, of)]
+    row = np.linalg.pinv(surface.room_signs.T)[part_index(surface, "volumes", of)]
     rest, snow = np.zeros_like(surface.vertices), {"snow": np.zeros_like(row)}
     return Measurement(float(row @ surface.pressures), rest, by_pressure=row, by_load=snow)
-
-
-def room_index(surface: Surface, name: str) -> int:
-    """Index of the room called ``name``."""
-    names = [room.name for room in surface.rooms]
-    return names.index(validate.choice("room", name, names))
 
 
 def _reaction(surface: Surface, of: str | None) -> Measurement:

@@ -29,17 +29,18 @@ from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, place_wall_rows, standing_part
 from ..contact.pull import excess_pull
-from ..forces.functional import energy_and_gradient, gradient_by
+from ..forces.functional import energy_and_gradient
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..forces.parameters import gradient_by
 from ..forces.pattern import hessian_pattern
 from ..forces.rooms import prescribed_volumes, volume_defects, volume_gradients_at
 from ..forces.second_variation import assemble
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface
-from ..surface.values import wall_changes
-from .quantities import Measurement, room_index
+from ..surface.values import rates_of
+from .quantities import Measurement
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 ACCURACY = 1e-9  # relative residual to which J s = b is solved
@@ -140,15 +141,10 @@ def _slopes(
 
 
 def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-    """(k,) d/dλ of each patch's or cable's own number; those of walls change with those of their rooms."""
-    of_cable = parameter.kind == "cable"
-    one = np.zeros(len(surface.cables) if of_cable else len(surface.patches))
-    for name in parameter.names:
-        one[surface.cable_index(name) if of_cable else surface.patch_index(name)] = 1.0
-    if parameter.kind not in ("pressure", "snow"):
-        return one
-    named = {surface.patch_index(name) for p in parameters if p.kind == parameter.kind for name in p.names}
-    return one + wall_changes(surface, one, named)
+    """(k,) d/dλ of each patch's, cable's or room's own number; walls follow unless they are parameters."""
+    alike = [one for one in parameters if one.kind == parameter.kind]
+    named = {name: float(name in parameter.names) for one in alike for name in one.names}
+    return rates_of(surface, f"{parameter.kind}s", named)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,10 +191,10 @@ class _LinearResponse:
     def motion(self, parameter: Parameter, parameters: Sequence[Parameter]) -> tuple[Floats, Floats]:
         """dX/dλ (n,3) and dδ/dλ (r,) for one of the parameters."""
         shown, rooms = self.part.surface, len(self.volume_units)
-        right = np.append(self._force_rates(parameter, parameters), np.zeros(rooms))
-        if parameter.kind == "volume":
-            room = room_index(shown, parameter.names[0])
-            right[self.space.size + room] = self.volume_units[room]
+        rates = _rates(shown, parameter, parameters)
+        force = gradient_by(shown, {f"{parameter.kind}s": rates})
+        volumes = self.volume_units * rates if parameter.kind == "volume" else np.zeros(rooms)
+        right = np.append(-self.space.to_coordinates(force), volumes)
         if not np.any(right):
             return np.zeros_like(shown.vertices), np.zeros(rooms)
         size = self.space.size + rooms
@@ -216,15 +212,6 @@ class _LinearResponse:
         if not residuals or residuals[-1] > NO_SOLUTION:
             raise SurfaceError(AT_FOLD, what="surface")
         return self._vertex_motion(z[: self.space.size]), self.volume_units * z[self.space.size :]
-
-    def _force_rates(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-        """(N,) -Bᵀ ∂(∇E)/∂λ."""
-        shown = self.part.surface
-        if parameter.kind == "volume":
-            return np.zeros(self.space.size)
-        rates = _rates(shown, parameter, parameters)
-        force = sum(rates[i] * gradient_by(shown, parameter.kind, int(i)) for i in np.flatnonzero(rates))
-        return -self.space.to_coordinates(np.asarray(force))
 
     def _times(self, z: Floats) -> Floats:
         """J, or the bordered matrix, times z (N+r,)."""

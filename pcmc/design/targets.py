@@ -12,7 +12,8 @@ from ..base.errors import OptionError
 from ..forces.rooms import refuse_varied_pressure
 from ..quantities import dimension_of
 from ..surface import Surface
-from .quantities import MEASURES, Measurement, room_index
+from ..surface.values import part_index, part_values
+from .quantities import MEASURES, Measurement
 
 KINDS = ("tension", "pressure", "volume", "weight", "snow", "cable")
 CABLE_QUANTITIES = ("sag", "length", "force")
@@ -167,19 +168,14 @@ class Parameter:
 
     def value(self, surface: Surface) -> float:
         """Its value on a surface; of several patches that of the first."""
-        name = self.names[0]
-        if self.kind == "volume":
-            return surface.rooms[room_index(surface, name)].volume
-        if self.kind == "cable":
-            return surface.cables[surface.cable_index(name)].tension
-        return float(getattr(surface.patches[surface.patch_index(name)], self.kind))
+        kind = f"{self.kind}s"
+        return float(part_values(surface, kind)[part_index(surface, kind, self.names[0])])
 
     def check(self, surface: Surface) -> None:
         """Refuse a patch or room that is not there, and a pressure that follows from a prescribed volume."""
-        for name in self.names:
-            Parameter(name, self.kind).value(surface)
+        parts = [part_index(surface, f"{self.kind}s", name) for name in self.names]
         if self.kind == "pressure":
-            refuse_varied_pressure(surface, [surface.patch_index(name) for name in self.names])
+            refuse_varied_pressure(surface, parts)
 
     def tension_under_pressure(self, surface: Surface) -> bool:
         """Whether it is the tension of a patch with a pressure, weight or snow; such a tension is never 0."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from ..base.arrays import Bools
@@ -24,14 +23,19 @@ from ..certificate.proof import Attempt, Proof
 from ..contact.pinching import standing_part
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
-from .apart import move_apart
-from .attempts import Attempts, LimitReached
-from .folding import Further
-from .loads import raise_loads
+from .homotopy import (
+    Homotopy,
+    HomotopyOutcome,
+    LimitReached,
+    Solves,
+    attempt,
+    continue_in_distance,
+    raise_loads,
+    relax_tensions,
+)
 from .starts import low_start
-from .tensions import relax_tensions
 
-RAN = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
+FAILED = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 
 
 def search(surface: Surface, first: Result, callback: Callback | None, options: Mapping[str, Any]) -> Result:
@@ -41,103 +45,95 @@ def search(surface: Surface, first: Result, callback: Callback | None, options: 
     reaches the limit of iterations in ``options``, the search ends.
     """
     limited = first.status is Status.ITERATION_LIMIT and "iterations" in options
-    if first.status not in RAN or limited or not first.rows:
+    if first.status not in FAILED or limited or not first.rows:
         return first
     level = first.rows[-1]["level"]
     start = first.surface if level else surface
     remaining = {**options, "levels": options.get("levels", 0) - level}
-    attempts = Attempts(callback, remaining, first.iterations + 1, first.evaluations)
+    solves = Solves(callback, remaining, first.iterations + 1, first.evaluations)
     try:
-        return _search(start, first, attempts)
+        found = _search(start, first, solves)
     except LimitReached as reached:
-        return _counted(reached.result, first, attempts)
+        found = reached.result
     except (StopIteration, KeyboardInterrupt) as error:
         stop_requested(error)
-        return replace(first, status=Status.STOPPED, evaluations=attempts.evaluations)
+        return replace(first, status=Status.STOPPED, evaluations=solves.evaluations)
+    if isinstance(found, Result):  # its steps come after those of the first
+        rows = [*first.rows, *found.rows]
+        return replace(found, rows=rows, iterations=solves.steps - 1, evaluations=solves.evaluations)
+    return _failed(first, *found, solves.evaluations)
 
 
-def _search(start: Surface, first: Result, attempts: Attempts) -> Result:
-    """The result of the first further way that leads to rest, or the first one with what was tried."""
-    minimum = attempts.options.get("target", "minimum") == "minimum"
+def _search(start: Surface, first: Result, solves: Solves) -> Result | tuple[list[Proof], list[Attempt]]:
+    """The result of the first homotopy that leads to rest, or what was proved and tried."""
+    minimum = solves.options.get("target", "minimum") == "minimum"
     pinchable = standing_part(start).walls.pinchable
     tried = [Attempt("given start", _name(first))]
     found = unbalanced(start, pinchable), unheld(start), weak_cable(start)
     proofs: list[Proof] = [proof for proof in found if proof is not None]
     growing = growing_part(start) if minimum and not proofs else None
     if growing is not None:
-        result = attempts.solve(start, target="stationary")
+        result = solves.solve(start, target="stationary")
         if result.converged:
-            note = describe_growing(growing)
-            return _counted(replace(result, status=Status.SADDLE, note=note), first, attempts)
+            return replace(result, status=Status.SADDLE, note=describe_growing(growing))
         tried.append(Attempt("stationary point", _name(result)))
-    for way in [] if proofs or growing is not None else _further_ways(start, attempts, pinchable):
-        further = way()
-        if further.surface is not None:
-            result = attempts.solve(further.surface)
-            if result.converged:
-                reason = _name(first).replace("_", " ")
-                note = f"found {further.how}, as the given start led to none ({reason})"
-                return _counted(
-                    replace(result, note="; ".join(filter(None, (note, result.note)))), first, attempts
-                )
-            tried.append(Attempt(further.way, _name(result)))
-        elif further.attempt is not None:
-            tried.append(further.attempt)
-            if further.attempt.folds:
+    elif not proofs:
+        for way in filter(None, _further_ways(start, pinchable)):
+            outcome: HomotopyOutcome = attempt(way, solves) if isinstance(way, Homotopy) else way
+            if outcome.surface is not None:
+                result = solves.solve(outcome.surface)
+                if result.converged:
+                    reason = _name(first).replace("_", " ")
+                    note = f"found {outcome.note}, as the given start led to none ({reason})"
+                    return replace(result, note="; ".join(filter(None, (note, result.note))))
+            tried.append(outcome.attempt or Attempt(outcome.way, _name(result)))
+            if tried[-1].folds:
                 break
     load = overload(start) if first.status in (Status.DIVERGED, Status.DEGENERATE) else None
-    if load is not None:
-        proofs.insert(0, load)
-    return _ended(first, tuple(proofs), tuple(tried), attempts)
+    return ([] if load is None else [load]) + proofs, tried
 
 
-def _further_ways(start: Surface, attempts: Attempts, pinchable: Bools) -> list[Callable[[], Further]]:
-    """Further ways to an equilibrium, in the order of their cost."""
+def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome | Homotopy | None]:
+    """The low start, and the homotopies in the order of their cost; None for one that does not apply."""
     low = low_start(start)
     if low is None:
-        return []
-    from_low = partial(Further, low, "from a lower start", "low start")
-    if low.rooms:  # their pressures are not given, and no way begins at others
-        return [from_low]
-    ways: list[Callable[[], Further]] = []
-    if low.net_pressures.any() or low.weights.any():
-        ways += [from_low, partial(raise_loads, low, attempts)]
-        if low.net_pressures.any() and not hardly_balanced(start, pinchable):
-            ways.append(partial(relax_tensions, low, attempts))
-    return [*ways, partial(move_apart, start, attempts)]
+        return
+    pressed = low.net_pressures.any()
+    loaded = pressed or low.weights.any()
+    if low.rooms or loaded:
+        yield HomotopyOutcome("low start", low, "from a lower start")
+    if low.rooms:  # their pressures are not given, and no homotopy begins at others
+        return
+    if loaded:
+        yield raise_loads(low)
+    if pressed and not hardly_balanced(start, pinchable):
+        yield relax_tensions(low)
+    yield continue_in_distance(start)
 
 
 def _name(result: Result) -> str:
-    """The status in lower case, as in Attempt."""
+    """The status as in Attempt."""
     return result.status.name.lower()
 
 
-def _counted(result: Result, first: Result, attempts: Attempts) -> Result:
-    """The result of a further start, with the steps of the first before its own."""
-    rows = [*first.rows, *result.rows]
-    return replace(result, rows=rows, iterations=attempts.steps - 1, evaluations=attempts.evaluations)
-
-
-def _ended(
-    first: Result, proofs: tuple[Proof, ...], tried: tuple[Attempt, ...], attempts: Attempts
-) -> Result:
+def _failed(first: Result, proofs: list[Proof], tried: list[Attempt], evaluations: int) -> Result:
     """The first result, with the proofs or what was tried."""
     neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
     if first.rows[-1]["residual"] <= TOLERANCE:  # a coarse mesh may rest where no smooth surface does
-        proofs = ()
+        proofs = []
     status, folds = first.status, [attempt for attempt in tried if attempt.folds]
     if proofs:
         status = Status.NO_EQUILIBRIUM
     elif folds or neck is not None or status in (Status.DIVERGED, Status.VANISHED):
         status = Status.NONE_FOUND
-    told = (*proofs, *(folds if proofs else tried), first.note, neck or "")
     growing = growing_part(first.surface) if status is Status.NONE_FOUND else None
-    notes = ["" if growing is None else describe_growing(growing), *map(str, told)]
+    reasons = (*proofs, *(folds if proofs else tried), first.note, neck or "")
+    notes = ["" if growing is None else describe_growing(growing), *map(str, reasons)]
     return replace(
         first,
         status=status,
-        evaluations=attempts.evaluations,
+        evaluations=evaluations,
         note="; ".join(filter(None, notes)),
-        proofs=proofs,
-        tried=tried,
+        proofs=tuple(proofs),
+        tried=tuple(tried),
     )

@@ -12,6 +12,7 @@ from ..certificate.balance import load
 from ..contact.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
+from ..surface.geometry import cross_2d
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
 WIDE = 1.5  # of that extent: a plan that is wider is not kept
@@ -33,7 +34,7 @@ def low_start(surface: Surface) -> Surface | None:
     >>> low_start(spire).vertices[4].round(3).tolist()
     [0.0, 0.0, 0.283]
     """
-    if not _spans(surface.vertices[surface.fixed]) or not _upright(surface):
+    if not _spans_a_surface(surface):
         return None
     walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
@@ -42,7 +43,7 @@ def low_start(surface: Surface) -> Surface | None:
     held = surface.pinned | surface.on_ground
     place = surface.plane.to_local(surface.vertices)
     corners = place[faces, :2] - place[faces[:, :1], :2]
-    turns = np.sign(corners[:, 1, 0] * corners[:, 2, 1] - corners[:, 1, 1] * corners[:, 2, 0])
+    turns = np.sign(cross_2d(corners[:, 1], corners[:, 2]))
     plan = triangle_quality(place * [1.0, 1.0, 0.0], faces)
     extent, span = _diagonal(place[roof]), _diagonal(place[held]) or _diagonal(place[roof])
     kept = np.abs(turns.sum()) == len(turns) and plan.min() > SOUND and extent < WIDE * span
@@ -51,27 +52,29 @@ def low_start(surface: Surface) -> Surface | None:
         return None  # spread anew, its boundary would leave the planes
     if not kept:
         low[:, :2] = _in_the_middle(faces, surface.fixed | ~roof, place[:, :2])
-    low[:, 2] = _in_the_middle(faces, held | ~roof, place[:, 2])
-    above = place[:, 2] - low[:, 2] if kept else _dome(faces, held | ~roof)
+    known = held | ~roof
+    low[:, 2] = _in_the_middle(faces, known, place[:, 2])
+    # a dome: 1 above the mean of the neighbours
+    above = place[:, 2] - low[:, 2] if kept else _in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
         above *= np.sign(load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
-    rise = RISE * span
-    most = float(np.abs(above[roof]).max())
+    rise, most = RISE * span, float(np.abs(above[roof]).max())
     if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
-    if not roof.all():
-        # walls below: between their feet and the roof; rows of walls that can pinch right below it
-        moved = _at(surface, _in_the_middle(surface.faces, roof | held, low))
-        if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
-            place = surface.plane.to_local(moved.vertices)
-            moved = _at(surface, _in_the_middle(surface.faces, roof | surface.held, place))
-        return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
-    return _at(surface, low)
+    if roof.all():
+        return _at(surface, low)
+    # walls below: between their feet and the roof; rows of walls that can pinch right below it
+    moved = _at(surface, _in_the_middle(surface.faces, roof | held, low))
+    if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
+        place = surface.plane.to_local(moved.vertices)
+        moved = _at(surface, _in_the_middle(surface.faces, roof | surface.held, place))
+    return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
 
 
-def _spans(points: Floats) -> bool:
-    """Whether points (k,3) do not all lie on one line."""
-    if len(points) < 3:
+def _spans_a_surface(surface: Surface) -> bool:
+    """Whether its fixed vertices do not lie on one line, and no plane besides Π holds heights."""
+    points, normal = surface.vertices[surface.fixed], np.array(surface.plane.normal)
+    if len(points) < 3 or any(abs(normal @ plane.normal) > 1e-9 for plane, _ in surface.on_planes):
         return False
     lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(lengths[1] > 1e-9 * lengths[0])
@@ -82,21 +85,10 @@ def _diagonal(place: Floats) -> float:
     return float(np.linalg.norm(np.ptp(place[:, :2], axis=0)))
 
 
-def _upright(surface: Surface) -> bool:
-    """Whether all planes besides Π are at right angles to it, so that heights are free there."""
-    normal = np.array(surface.plane.normal)
-    return all(abs(float(normal @ plane.normal)) <= 1e-9 for plane, _ in surface.on_planes)
-
-
 def _at(surface: Surface, place: Floats) -> Surface:
     """The surface with its vertices at coordinates (n,3) on and above Π, or where supports let them be."""
     X = place @ surface.plane.axes + np.array(surface.plane.point)
     return surface.moved(surface.onto_supports(X))
-
-
-def _dome(faces: Ints, known: Bools) -> Floats:
-    """(n,) heights of a dome: zero at known vertices, else 1 above the mean of the neighbours."""
-    return _in_the_middle(faces, known, np.zeros(len(known)), 1.0)
 
 
 def _in_the_middle(faces: Ints, known: Bools, values: Floats, excess: float = 0.0) -> Floats:

@@ -10,7 +10,7 @@ from typing import Any
 
 from .. import project as projects
 from ..base.errors import MissingExtra, PcmcError
-from ..project.accuracy import AccuracyWanted
+from ..project import AccuracyWanted
 from ..project.values import with_values
 from ..solvers.result import Result
 from ..surface import Surface

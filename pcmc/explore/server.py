@@ -24,11 +24,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
+from ..base.arrays import plain
 from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
-from ..base.plain import plain
 from ..io import FORMATS, write
-from ..project import load
-from ..project.output import fields as written_fields
+from ..project import load, vertex_fields
 from ..project.values import values_of
 from ..surface import Surface
 from . import requests, saving
@@ -399,7 +398,7 @@ class _Handler(BaseHTTPRequestHandler):
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
-            scalars = written_fields(state.surface, state.certificate)
+            scalars = vertex_fields(state.surface, state.certificate)
             numbers = plain(state.certificate.numbers())
             write(path, state.surface, scalars=scalars, certificate=numbers, units=roof.units)
             body = path.read_bytes()

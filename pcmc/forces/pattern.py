@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, triu
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
@@ -37,6 +37,11 @@ class Pattern(NamedTuple):
     def matrix(self, data: Floats) -> csr_array:
         """The upper triangle as a scipy array."""
         return csr_array((data, self.indices, self.indptr), shape=(self.size, self.size))
+
+    def symmetric(self, data: Floats) -> csr_array:
+        """The whole matrix as a scipy array."""
+        upper = self.matrix(data)
+        return csr_array(upper + triu(upper, k=1).T)
 
 
 def hessian_pattern(of: VertexClasses | Surface, space: MotionSpace) -> Pattern:

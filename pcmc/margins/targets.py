@@ -21,7 +21,7 @@ from ..certificate.certificate import TOLERANCE
 from ..design import Target, meet, sensitivities  # from here they know the margin
 from ..design.measurement import Measurement
 from ..design.quantities import MEASURES, Measure
-from ..forces.functional import gradient_by
+from ..forces.parameters import gradient_by
 from ..surface import Surface
 from .edge import Margin, margin
 from .ending import MarginEnd
@@ -64,7 +64,7 @@ def _margin(surface: Surface, of: str | None) -> Measurement:
     named = dict.fromkeys(("tension", "pressure", "weight", "snow"), patches)
     slopes = {}
     for kind, names in {**named, "cable": [cable.name for cable in end.cables]}.items():
-        across = np.array([(phi * gradient_by(end, kind, i)).sum() for i in range(len(names))])
+        across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
         multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
         slopes[kind] = -across * np.where(multiplied, found.factor, 1.0) / along
     return Measurement(found.factor, still, slopes.pop("tension"), slopes.pop("pressure"), slopes)

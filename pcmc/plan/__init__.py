@@ -10,15 +10,15 @@ May import ``io`` and the rooms below it.
 from ..curves.curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
 from ..meshing.labelled import surface_from_labels
 from ..meshing.walls import add_walls
-from .parts import Area, CableLine, Divider, Hole
+from .parts import CableLine, Divider, Hole, PatchSpec
 from .plan import Plan, patch_names, plan_from
 
 __all__ = [
-    "Area",
     "CableLine",
     "Curve",
     "Divider",
     "Hole",
+    "PatchSpec",
     "Plan",
     "add_walls",
     "arc",

@@ -38,20 +38,12 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """Points and chains of all lines.
+    """Points and chains of all lines."""
 
-    Attributes
-    ----------
-    points : (n,2) coordinates on Π.
-    heights : (n,) above Π; NaN at points that are on dividers only, whose height is free.
-    chains : of each line, in order along it.
-    spots : (p,) the vertex of each required point.
-    """
-
-    points: Floats
-    heights: Floats
-    chains: tuple[Chain, ...]
-    spots: Ints
+    points: Floats  # (n,2) coordinates on Π
+    heights: Floats  # (n,) above Π; NaN at points that are on dividers only, whose height is free
+    chains: tuple[Chain, ...]  # of each line, in order along it
+    required: Ints  # (p,) the vertex of each required point
 
     def along(self, line: int) -> Sequence[Chain]:
         """The chains of a line."""
@@ -65,15 +57,17 @@ class Arrangement:
         return chains
 
 
-def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Floats) -> Arrangement:
+def arrange(
+    lines: Sequence[Line], edge_length: float, required_points: Floats, cut_points: Floats
+) -> Arrangement:
     """Cut the lines at corners and where they meet, and divide them into edges.
 
     Parameters
     ----------
     lines : the outline first; then holes, dividers, supports, in any order.
     edge_length : of the edges, about; shorter if corners or meetings are close together.
-    spots : (p,3) required points: on a line if one passes there, otherwise single vertices.
-    stops : (q,2) points at which the lines through them are cut.
+    required_points : (p,3), on a line if one passes there, otherwise single vertices.
+    cut_points : (q,2) at which the lines through them are cut.
 
     Raises
     ------
@@ -90,24 +84,25 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
         ends = [] if line.curve.closed else [0.0, float(len(line.curve.pieces))]
         meetings += [[(k, t)] for t in (*ends, *line.curve.corners.tolist())]
     tree, contains = LineTree(lines), inside(lines)
-    meetings += [*tree.crossings(), *_ends(lines, tree, contains, snap)]
-    passing = tree.at(spots[:, :2], snap)
-    for xy, places, within in zip(spots[:, :2], passing, contains(spots[:, :2]), strict=True):
+    meetings += [*tree.crossings(), *_ends(tree, contains, snap)]
+    xy = required_points[:, :2]
+    passing = tree.at(xy, snap)
+    for point, places, within in zip(xy, passing, contains(xy), strict=True):
         if not places and not within:
-            problem = f"the support or point at {point_text(xy)} is outside the plan or in a hole"
-            raise PlanError(problem, what="supports", where=tuple(xy.tolist()))
-    meetings += [*tree.at(stops, snap), *passing]
+            problem = f"the support or point at {point_text(point)} is outside the plan or in a hole"
+            raise PlanError(problem, what="supports", where=tuple(point.tolist()))
+    meetings += [*tree.at(cut_points, snap), *passing]
     nodes = _nodes(lines, meetings, snap)
     chains, points = _chains(lines, nodes, edge_length)
     chains = _inside_plan(tree, chains, points[:, :2], contains, edge_length)
-    vertex = nodes.of_meeting[len(meetings) - len(spots) :]
+    vertex = nodes.of_meeting[len(meetings) - len(passing) :]
     alone = np.array([not places for places in passing], dtype=bool)
     vertex[alone] = len(points) + np.arange(alone.sum())
-    points = np.concatenate([points, spots[alone]])
+    points = np.concatenate([points, required_points[alone]])
     used = np.unique(np.concatenate([vertex, *(chain.vertices for chain in chains)]))
-    x, y, height = points[used].T
     chains = [replace(chain, vertices=np.searchsorted(used, chain.vertices)) for chain in chains]
-    return Arrangement(np.stack([x, y], axis=1), height, tuple(chains), np.searchsorted(used, vertex))
+    required = np.searchsorted(used, vertex)
+    return Arrangement(points[used, :2], points[used, 2], tuple(chains), required)
 
 
 def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
@@ -118,47 +113,31 @@ def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, 
     return [(point.x, point.y) for point in points]
 
 
-def _ends(
-    lines: Sequence[Line], tree: LineTree, contains: Callable[[Floats], Bools], snap: float
-) -> Iterator[Places]:
+def _ends(tree: LineTree, contains: Callable[[Floats], Bools], snap: float) -> Iterator[Places]:
     """Dividers end on other lines or outside the plan; supports may end anywhere."""
-    ends = [
-        (number, t)
-        for number, one in enumerate(lines)
-        for t in (0.0, float(len(one.curve.pieces)))
-        if not (one.curve.closed or one.bounds)
-    ]
-    at = np.array([lines[number].curve.at(t)[0, :2] for number, t in ends]).reshape(-1, 2)
-    found = zip(ends, at, tree.at(at, snap), contains(at), strict=True)
-    for (number, t), xy, places, within in found:
-        one, passing = lines[number], [place for place in places if place[0] != number]
+    inner = [k for k, line in enumerate(tree.lines) if not (line.curve.closed or line.bounds)]
+    ends = [(k, t) for k in inner for t in (0.0, float(len(tree.lines[k].curve.pieces)))]
+    at = np.array([tree.lines[k].curve.at(t)[0, :2] for k, t in ends]).reshape(-1, 2)
+    for end, xy, places, within in zip(ends, at, tree.at(at, snap), contains(at), strict=True):
+        one, passing = tree.lines[end[0]], [place for place in places if place[0] != end[0]]
         if one.kind is Kind.DIVIDER and not passing and within:
-            gaps = [(float(other.nearest(xy[None])[1][0]), other) for other in lines if other is not one]
-            gap, other = min(gaps, key=lambda pair: pair[0])
-            problem = (
-                f"ends at {point_text(xy)} without reaching another line; {other.name} is nearest,"
-                f" {gap:.3g} away: extend the divider to it"
-            )
-            raise one.error(problem, tuple(xy.tolist()), gap)
-        yield [(number, t), *passing]
+            others = [other for other in tree.lines if other is not one]
+            gaps = [float(other.nearest(xy[None])[1][0]) for other in others]
+            gap, nearest = min(gaps), others[int(np.argmin(gaps))]
+            problem = f"ends at {point_text(xy)} without reaching another line; {nearest.name} is nearest,"
+            raise one.error(f"{problem} {gap:.3g} away: extend the divider to it", tuple(xy.tolist()), gap)
+        yield [end, *passing]
 
 
 @dataclass(frozen=True, eq=False)
 class _Nodes:
-    """The vertices where lines meet.
-
-    Attributes
-    ----------
-    line, t, node : (p,) of each place: the line, the parameter there, the node.
-    of_meeting : the node of each meeting, -1 for a meeting without places.
-    points : (k,3) of the nodes, with their heights.
-    """
+    """The vertices where lines meet: of each place (p,) the line, the parameter there, and the node."""
 
     line: Ints
     t: Floats
     node: Ints
-    of_meeting: Ints
-    points: Floats
+    of_meeting: Ints  # the node of each meeting, -1 for a meeting without places
+    points: Floats  # (k,3) of the nodes, with their heights
 
     def along(self, number: int, curve: Curve) -> list[tuple[float, int]]:
         """Parameters and nodes along a line, no node twice in a row; a closed line returns to its first."""
@@ -237,9 +216,8 @@ def _inside_plan(
     lines = tree.lines
     kept = np.array([lines[chain.line].bounds for chain in chains])
     inner = np.flatnonzero(~kept)
-    halves = [(len(chains[k].vertices) // 2, chains[k].vertices) for k in inner]
-    middles = np.array([vertices[half - 1 : half + 1] for half, vertices in halves], dtype=np.int64)
-    middle = points[middles.reshape(-1, 2)].mean(axis=1)
+    middles = [chains[k].edges[len(chains[k].vertices) // 2 - 1] for k in inner]
+    middle = points[np.reshape(middles, (-1, 2)).astype(int)].mean(axis=1)
     kept[inner] = contains(middle)
     inner, middle = inner[kept[inner]], middle[kept[inner]]
     for number, xy, places in zip(inner, middle, tree.at(middle, SNAP * edge_length), strict=True):
@@ -258,9 +236,7 @@ def _inside_plan(
     i, j = shapely.STRtree(edges).query(edges, predicate="crosses")
     if len(i):
         first, second = lines[owner[i[0]]].name, lines[owner[j[0]]].name
-        problem = (
-            f"with edges of length {edge_length:g}, {first} and {second} cross near"
-            f" {point_text(ends[i[0]].mean(axis=0))}; use a smaller edge_length"
-        )
+        problem = f"with edges of length {edge_length:g}, {first} and {second} cross near"
+        problem += f" {point_text(ends[i[0]].mean(axis=0))}; use a smaller edge_length"
         raise PlanError(problem, what=first, found=second)
     return chains

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,9 +13,10 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError, SurfaceError
 from ..curves.curves import Curve
 from ..curves.pieces import point_text, to_local, two_digits
-from ..meshing.planar import PlanarMesh, signed_areas, triangulate
+from ..meshing.planar import SIDES, PlanarMesh, signed_areas, triangulate
+from ..surface.geometry import segment_lengths
 from ..surface.topology import components
-from .arrangement import Arrangement, arrange, hole_points
+from .arrangement import Arrangement, Chain, arrange, hole_points
 from .edges import Boundary, boundary, check_lines
 from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData, check_count
@@ -29,23 +31,30 @@ MAX_RISE = 10.0  # of the initial surface, over the size of the plan
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A plan with its lines and its plane mesh.
-
-    Attributes
-    ----------
-    lines : the outline, then the holes, the dividers, and the supports that are not on the boundary.
-    supports_on_edge : the supports along the outline or a hole.
-    drawn : the lines cut where they meet.
-    mesh : of the plan, in the coordinates of Π; its first points are those of ``drawn``.
-    edges : the boundary, edge by edge.
-    """
+    """A plan with its lines and its plane mesh."""
 
     plan: PlanData
-    lines: Sequence[Line]
+    lines: Sequence[Line]  # the outline, then the holes, the dividers, and the supports off the boundary
     supports_on_edge: Sequence[Curve]
     drawn: Arrangement
-    mesh: PlanarMesh
+    mesh: PlanarMesh  # in the coordinates of Π; its first points are those of ``drawn``
     edges: Boundary
+
+    def divider(self, number: int) -> tuple[Line, Sequence[Chain]]:
+        """The line of a divider, and its chains."""
+        line = 1 + len(self.plan.holes) + number
+        return self.lines[line], self.drawn.along(line)
+
+    @cached_property
+    def radii(self) -> Floats:
+        """2 A / L of each part of the plan, with its area A and the length L of its edge: R of a circle."""
+        mesh = self.mesh
+        sides = np.sort(mesh.triangles[:, SIDES].reshape(-1, 2), axis=1)
+        owned = np.column_stack([np.repeat(mesh.region, 3), sides])
+        own, times = np.unique(owned, axis=0, return_counts=True)
+        own = own[times == 1]
+        length = np.bincount(own[:, 0], segment_lengths(mesh.points, own[:, 1:]))
+        return 2.0 * np.bincount(mesh.region, signed_areas(mesh.points, mesh.triangles)) / length
 
 
 def drafted(plan: PlanData) -> Draft:
@@ -58,27 +67,35 @@ def drafted(plan: PlanData) -> Draft:
     """
     lines, on_edge, drawn = _arranged(plan)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
-    _check_count(plan, _area(lines[0].xy), len(edges))
+    _check_count(plan, lines[0].xy, len(edges))
     try:
         mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
     except SurfaceError as error:
         problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
         raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
-    _check_parts(plan, mesh)
+    areas = signed_areas(mesh.points, mesh.triangles)
+    part = np.bincount(mesh.region, areas)
+    least = int(np.argmin(part))
+    if part[least] < SMALLEST * plan.edge_length**2:  # lines that just miss each other
+        own, area = mesh.region == least, part[least]
+        middle = mesh.points[mesh.triangles[own]].mean(axis=1).T @ areas[own] / area
+        finer = two_digits(math.sqrt(area), math.floor)
+        problem = (
+            f"the part of the plan around {point_text(middle)} has the area {area:.3g}, less than a triangle"
+            f" with edges of {plan.edge_length:g}; if its lines should meet in one point, draw them so,"
+            f" otherwise use edge_length = {finer:g} or less"
+        )
+        raise PlanError(problem, what="edge_length", where=tuple(middle.tolist()), found=float(area))
     return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, on_edge, drawn))
 
 
 def part_count(plan: PlanData) -> int:
-    """The number of parts into which the lines cut the plan, without its mesh.
-
-    By Euler's formula e - v + c for e chains between v vertices in c connected pieces, less the holes.
-    Errors as in ``drafted``.
-    """
-    *_, drawn = _arranged(plan)
-    return _part_count(plan, drawn)
+    """The number of parts into which the lines cut the plan, without its mesh; errors as in ``drafted``."""
+    return _part_count(plan, _arranged(plan)[2])
 
 
 def _part_count(plan: PlanData, drawn: Arrangement) -> int:
+    """By Euler's formula e - v + c for e chains between v vertices in c connected pieces, less the holes."""
     ends = np.array([chain.vertices[[0, -1]] for chain in drawn.chains])
     used, renumbered = np.unique(ends, return_inverse=True)
     pieces = components(renumbered.reshape(-1, 2), len(used))
@@ -86,67 +103,70 @@ def _part_count(plan: PlanData, drawn: Arrangement) -> int:
 
 
 def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
-    """The lines, the supports on the boundary, and the lines cut where they meet."""
+    """The lines in the coordinates of Π, the supports on the boundary, and the lines cut where they meet."""
     _check_size(plan)
-    lines, on_edge = _lines(plan)
+    lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
+    lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
+    tree = LineTree(lines)
+    lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
+    on_edge = []
+    for number, support in enumerate(plan.supports, start=1):
+        if isinstance(support, Curve):
+            local = support.local(plan.plane)
+            if all(tree.at(local.samples(0.5 * plan.edge_length)[:, :2], SNAP * plan.edge_length)):
+                on_edge.append(local)
+            else:
+                lines.append(Line(f"support {number}", Kind.SUPPORT, local))
     check_lines(plan, lines)
-    spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
+    points = [to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)]
+    named = [np.array([*point, np.nan]) for point in plan.points.values()]  # vertices, but not held
     cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
-    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
-    named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
-    drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
-    # the named points are vertices, but not held
+    cut_points = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
+    required = np.reshape([*points, *named], (-1, 3)).astype(float)
+    drawn = arrange(lines, plan.edge_length, required, cut_points)
     check_count("patches", _part_count(plan, drawn))
-    return lines, on_edge, replace(drawn, spots=drawn.spots[: len(spots)])
+    return lines, on_edge, replace(drawn, required=drawn.required[: len(points)])
 
 
 def _check_size(plan: PlanData) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
-
-    def error(key: str, value: float, problem: str) -> PlanError:
-        return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
-
-    curves = [plan.outline, *(part.curve for part in (*plan.holes, *plan.dividers, *plan.cables))]
-    curves += [support for support in plan.supports if isinstance(support, Curve)]
-    points = sum(len(curve.dense) for curve in curves)
+    parts = (*plan.holes, *plan.dividers, *plan.cables)
+    held = {f"support {k}": s for k, s in enumerate(plan.supports, 1) if isinstance(s, Curve)}
+    points = sum(len(c.dense) for c in (plan.outline, *(part.curve for part in parts), *held.values()))
     if points > MAX_POINTS:
         problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
         raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
     xy = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2]
-    _check_count(plan, _area(xy), 0)
+    _check_count(plan, xy, 0)
     size = float(np.linalg.norm(np.ptp(xy, axis=0)))
     if plan.edge_length > size:
-        problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
-        raise error("edge_length", plan.edge_length, problem)
+        problem = (
+            f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to corner"
+        )
+        raise PlanError(f"{problem}; use a smaller one", what="edge_length", found=plan.edge_length)
     if plan.rise is not None and plan.rise > MAX_RISE * size:
-        problem = f"is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a smaller one"
-        raise error("rise", plan.rise, problem)
+        problem = f"rise={plan.rise:g} is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a"
+        raise PlanError(f"{problem} smaller one", what="rise", found=plan.rise)
     lines = {"the outline": plan.outline} | {hole.name: hole.curve for hole in plan.holes}
     lines |= {f"divider {divider.name!r}": divider.curve for divider in plan.dividers}
-    lines |= {f"support {k}": s for k, s in enumerate(plan.supports, 1) if isinstance(s, Curve)}
-    for name, curve in lines.items():
+    for name, curve in (lines | held).items():
         if curve.length > MAX_EDGES * plan.edge_length:
-            problem = (
-                f"{name} is {curve.length:.3g} long, more than {MAX_EDGES} edges of {plan.edge_length:g}"
-            )
-            raise PlanError(f"{problem}; draw it as long as the plan", what=name, found=curve.length)
+            problem = f"{name} is {curve.length:.3g} long, more than {MAX_EDGES} edges of"
+            problem += f" {plan.edge_length:g}; draw it as long as the plan"
+            raise PlanError(problem, what=name, found=curve.length)
     for hole in plan.holes:
         xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
         extent = float(np.ptp(xy, axis=0).max())
         if extent <= SNAP * plan.edge_length:
-            problem = f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g}"
-            problem += "; leave it out, or use a smaller edge_length"
-            raise PlanError(f"{hole.name} {problem}", what=hole.name, found=extent)
+            problem = f"{hole.name} is only {extent:g} wide, too little for edges of length"
+            problem += f" {plan.edge_length:g}; leave it out, or use a smaller edge_length"
+            raise PlanError(problem, what=hole.name, found=extent)
 
 
-def _area(xy: Floats) -> float:
-    """The area in an outline (k,2)."""
-    x, y = xy.T
-    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-
-
-def _check_count(plan: PlanData, area: float, edges: int) -> None:
-    """Refuse a mesh of more triangles than are allowed, before it is made."""
+def _check_count(plan: PlanData, outline: Floats, edges: int) -> None:
+    """Refuse a mesh of more triangles in an outline (k,2) than are allowed, before it is made."""
+    x, y = outline.T
+    area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     h, short = plan.edge_length, AT_EDGES * edges
     count = short + area / math.sqrt(0.1875) / h / h  # the square of h may be 0 or infinite
     if count > MAX_TRIANGLES:
@@ -154,41 +174,5 @@ def _check_count(plan: PlanData, area: float, edges: int) -> None:
         change = f"use {two_digits(least):g} or more, and refine the roof by [[remesh]]"
         if short > MAX_TRIANGLES / 2:
             change = f"draw the lines with fewer points, they have {edges} edges"
-        problem = (
-            f"edge_length={h:g} would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"
-        )
-        raise PlanError(f"{problem}: {change}", what="edge_length", found=h)
-
-
-def _check_parts(plan: PlanData, mesh: PlanarMesh) -> None:
-    """Refuse parts of the plan that are smaller than a triangle: lines that just miss each other."""
-    areas = signed_areas(mesh.points, mesh.triangles)
-    part = np.bincount(mesh.region, areas)
-    least = int(np.argmin(part))
-    if part[least] < SMALLEST * plan.edge_length**2:
-        own, area = mesh.region == least, part[least]
-        middle = mesh.points[mesh.triangles[own]].mean(axis=1).T @ areas[own] / area
-        finer = two_digits(math.sqrt(area), math.floor)
-        problem = f"the part of the plan around {point_text(middle)} has the area {area:.3g}, less than a"
-        problem += (
-            f" triangle with edges of {plan.edge_length:g}; if its lines should meet in one point, draw"
-        )
-        problem += f" them so, otherwise use edge_length = {finer:g} or less"
-        raise PlanError(problem, what="edge_length", where=tuple(middle.tolist()), found=float(area))
-
-
-def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
-    """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
-    lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
-    lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
-    edges = LineTree(lines)
-    lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
-    on_edge, snap = [], SNAP * plan.edge_length
-    for number, support in enumerate(plan.supports, start=1):
-        if isinstance(support, Curve):
-            local = support.local(plan.plane)
-            if all(edges.at(local.samples(0.5 * plan.edge_length)[:, :2], snap)):
-                on_edge.append(local)
-            else:
-                lines.append(Line(f"support {number}", Kind.SUPPORT, local))
-    return lines, on_edge
+        problem = f"edge_length={h:g} would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are"
+        raise PlanError(f"{problem} allowed: {change}", what="edge_length", found=h)

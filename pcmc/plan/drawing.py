@@ -2,66 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.units import conversion_note, length_factor, size_note
-from ..curves.curves import Curve
-from ..curves.pieces import Piece
-from .drawn_parts import FLAT, DrawnParts
-from .parts import hole_label
-from .strokes import Stroke, read_strokes
-from .texts import Label, heights_of, labels_of
+from ..curves.curves import Curve, polyline
+from ..curves.pieces import Piece, point_text, two_digits
+from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
+from .lines import Kind, Line, LineTree, check_line
+from .parts import check_count, hole_label
+from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
+from .strokes import Stroke, Strokes, read_strokes
+
+GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
+LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
+ALONG = 2e-3  # of that diagonal: lines on an edge are compared with it at points so far apart
+FLAT = 1e-9  # of that diagonal: heights nearer to each other than this are one
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A plan as it is drawn. Curves are plane, on Π, or in space.
-
-    Attributes
-    ----------
-    path : the file.
-    unit : the name of the drawing's unit, such as "mm"; "" if it has none.
-    units : the unit of the numbers here: that asked for, else the drawing's.
-    outline : closed.
-    dividers, holes : by name; ``upright`` are the names of those with an upright wall,
-        ``ridges`` of those with a cable and no wall.
-    cables : along free parts of the outline and of holes, by name.
-    mirrors : straight lines along the outline.
-    loose : whether supports on the outline hold it, and nothing between them.
-    supports : points (3,) and curves.
-    heights : (h,3) points through which the roof should pass.
-    labels : of patches.
-    level : the height of Π.
-    gap : gaps up to this length are closed.
-    layers : by line ("the outline", "divider 'north'"), its layer and entities.
-    notes : what was changed and left out, a sentence each.
-    """
+    """A plan as it is drawn. Curves are plane, on Π, or in space."""
 
     path: Path
-    unit: str
-    units: str
+    unit: str  # the name of the drawing's unit, such as "mm"; "" if it has none
+    units: str  # of the numbers here: that asked for, else the drawing's
     outline: Curve
     dividers: Mapping[str, Curve]
     holes: Mapping[str, Curve]
-    supports: Sequence[Any]
-    heights: Floats
-    labels: Sequence[Label]
-    level: float
-    gap: float
-    layers: Mapping[str, str]
-    upright: frozenset[str] = frozenset()
-    ridges: frozenset[str] = frozenset()
-    cables: Mapping[str, Curve] = field(default_factory=dict)
-    mirrors: Sequence[Curve] = ()
-    loose: bool = False
-    notes: Sequence[str] = field(default=())
+    supports: Sequence[Any]  # points (3,) and curves
+    heights: Floats  # (h,3) points through which the roof should pass
+    labels: Sequence[Label]  # of patches
+    level: float  # the height of Π
+    gap: float  # gaps up to this length are closed
+    layers: Mapping[str, str]  # by line ("the outline", "divider 'north'"), its layer and entities
+    upright: frozenset[str]  # the names of the dividers with an upright wall
+    ridges: frozenset[str]  # the names of the dividers with a cable and no wall
+    cables: Mapping[str, Curve]  # along free parts of the outline and of holes
+    mirrors: Sequence[Curve]  # straight lines along the outline
+    loose: bool  # whether supports on the outline hold it, and nothing between them
+    notes: Sequence[str]  # what was changed and left out, a sentence each
 
     @property
     def flat(self) -> bool:
@@ -74,7 +64,6 @@ def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawi
 
     Parameters
     ----------
-    path : the file.
     units : the unit of length wanted, such as "m"; "" for the drawing's own.
     gap : gaps between ends up to this length are closed, in the unit wanted; by default a thousandth of the
         outline's diagonal.
@@ -86,76 +75,320 @@ def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawi
     MissingExtra : without the library that reads it.
     """
     content = read_strokes(path)
-    factor = length_factor(content.unit, units)
-    strokes = [_scaled(stroke, factor) for stroke in content.strokes]
     try:
-        return _drawing(DrawnParts(path, content, strokes, units or content.unit, gap), factor)
+        return _Reader(content, units, gap).drawing(path)
     except PlanError as error:
         raise error.in_file(path) from None
 
 
-def _scaled(stroke: Stroke, factor: float) -> Stroke:
-    if stroke.curve is None:
-        return replace(stroke, point=factor * np.asarray(stroke.point))
-    pieces = (replace(piece, points=factor * piece.points) for piece in stroke.curve.pieces)
-    return replace(stroke, curve=Curve(tuple(pieces)))
+class _Reader:
+    """The strokes of a drawing by layer, and the parts of a plan that they make."""
+
+    def __init__(self, content: Strokes, units: str, gap: float | None) -> None:
+        self.content, self.units = content, units or content.unit
+        factor = length_factor(content.unit, units)
+        self.by_layer: dict[str, list[Stroke]] = {}
+        for stroke in content.strokes:
+            if stroke.curve is None:
+                scaled = replace(stroke, point=factor * np.asarray(stroke.point))
+            else:
+                pieces = (replace(piece, points=factor * piece.points) for piece in stroke.curve.pieces)
+                scaled = replace(stroke, curve=Curve(tuple(pieces)))
+            self.by_layer.setdefault(stroke.layer, []).append(scaled)
+        self.layers: dict[str, str] = {}
+        self.notes: list[str] = []
+        self.edge = [s for _, strokes in self.layers_of("outline") for s in strokes if s.curve is not None]
+        if not self.edge:
+            raise self._no_outline()
+        points = np.concatenate([s.curve.at(s.curve.dense) for s in self.edge if s.curve is not None])
+        self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
+        if gap is not None:
+            validate.number("gap", gap, least=LEAST_GAP * self.size, hint="or leave it out")
+        self.gap = GAP * self.size if gap is None else gap
+        self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= FLAT * self.size else 0.0
+
+    def layers_of(self, role: str) -> list[tuple[Layer, list[Stroke]]]:
+        """The layers of a role with their strokes."""
+        parsed = [(layer_of(name), strokes) for name, strokes in self.by_layer.items()]
+        return [(layer, strokes) for layer, strokes in parsed if layer is not None and layer.role == role]
+
+    def _no_outline(self) -> PlanError:
+        """The error of a drawing without an outline: what it has instead."""
+        counts = {name: len(strokes) for name, strokes in self.by_layer.items()}
+        solid = sum(kinds.get("3-D faces", 0) for kinds in self.content.others.values())
+        hidden = sum(self.content.hidden.values())
+        if not counts and solid:
+            text = f"has only 3-D faces ({solid}); draw the lines of the plan, the edge on a layer 'outline'"
+        elif not counts:
+            shown = f"shows nothing: its {hidden} entities are on layers turned off" if hidden else "is empty"
+            text = f"{shown}; draw the edge of the roof on a layer 'outline'"
+        else:
+            strange = {name: count for name, count in counts.items() if layer_of(name) is None}
+            why = left_out(strange) if strange else f"all are on {listed(list(map(repr, counts)))}"
+            text = f"has no curve on a layer 'outline'; {why}"
+        return PlanError(text, what="outline", found=counts, expected=UNDERSTOOD)
+
+    def drawing(self, path: Path) -> Drawing:
+        """All parts, each checked."""
+        outline = self._outline()
+        holes: dict[str, Curve] = {}
+        self._add("hole", hole_label, "hole", holes, self._loops)
+        check_count("holes", len(holes))
+        drawn: list[Any] = []
+        for _, strokes in self.layers_of("support"):
+            drawn += [*_points(strokes), *(path.curve for path in self._joined(strokes))]
+        masts = self._masts(holes)
+        edges = [outline, *holes.values()]
+        places, note = meet_edges([*drawn, *masts], edges, self.gap)
+        self.notes += [note] if note else []
+        dividers, cables = self._cables(edges)
+        ridges = frozenset(dividers)
+        self._add("divider", "divider {!r}".format, "wall", dividers)
+        upright = frozenset(self._add("upright", "divider {!r}".format, "wall", dividers))
+        check_count("dividers", len(dividers))
+        dividers = self._moved(dividers, edges, "dividers")
+        cables = self._moved(cables, edges, "cables")
+        mirrors = self._moved(self._mirrors(), edges, "mirrors")
+        lines = {"the outline": outline} | {hole_label(name): curve for name, curve in holes.items()}
+        for name, curve in (lines | {f"divider {n!r}": curve for n, curve in dividers.items()}).items():
+            try:  # a line that crosses itself, before what is inside it is looked for
+                check_line(Line(name, Kind.DIVIDER, curve))
+            except PlanError as error:
+                text = f"{error} ({self.layers[name]})"
+                raise PlanError(text, what=name, where=error.where, found=error.found) from None
+        loose = self._loose(outline, places[: len(drawn)], places[len(drawn) :], bool(cables))
+        texts = [stroke for _, strokes in self.layers_of("height") for stroke in strokes]
+        heights = heights_of(texts, self.content.unit, self.units)
+        labels = labels_of(self.layers_of("patch"))
+        self._note_rest(outline)
+        return Drawing(
+            path=path,
+            unit=self.content.unit,
+            units=self.units,
+            outline=self._on_plane(outline),
+            dividers={name: _projected(curve) for name, curve in dividers.items()},
+            holes={name: self._on_plane(curve) for name, curve in holes.items()},
+            supports=[s if isinstance(s, np.ndarray) else self._on_plane(s) for s in places],
+            heights=heights,
+            labels=labels,
+            level=self.level,
+            gap=self.gap,
+            layers=self.layers,
+            upright=upright,
+            ridges=ridges,
+            cables={name: _projected(curve) for name, curve in cables.items()},
+            mirrors=[_projected(curve) for curve in mirrors.values()],
+            loose=loose,
+            notes=tuple(self.notes),
+        )
+
+    def _joined(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
+        """The paths of a layer; what was changed is noted."""
+        drawn = [stroke for stroke in strokes if stroke.curve is not None]
+        if not drawn:
+            return []
+        joined = join_strokes(drawn, self.gap)
+        where = f"layer {drawn[0].layer!r}"
+        if joined.closed_gaps:
+            number = f"{joined.closed_gaps} gap{'s' if joined.closed_gaps > 1 else ''}"
+            largest = f"up to {joined.largest_gap:.3g} long (closed are gaps up to {self.gap:.3g})"
+            self.notes.append(f"{where}: {number} closed, {largest}")
+        if joined.doubles:
+            self.notes.append(f"{where}: drawn twice or without length, left out: {listed(joined.doubles)}")
+        return list(joined.paths)
+
+    def _loops(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
+        """The closed curves of a layer; PlanError if one is open or forks."""
+        paths = self._joined(strokes)
+        where = f"layer {strokes[0].layer!r}"
+        if not paths:
+            raise PlanError(f"{where} has no curve; draw a closed one", what=where)
+        open_paths = [path for path in paths if not path.curve.closed]
+        if open_paths and len(open_paths) < len(paths):
+            stray = open_paths[0]
+            text = (
+                f"{stray.source} from {point_text(stray.ends[0])} to {point_text(stray.ends[1])} is no part"
+            )
+            text += " of the closed curve there; delete it, or put it on the layer of what it is"
+            raise PlanError(text, what=where, where=_plain(stray.ends[0]))
+        for path in open_paths:
+            for end, count in zip(path.ends, path.strokes_at_ends, strict=True):
+                if count > 2:
+                    text = (
+                        f"{where}: {count} curves meet at {point_text(end)} ({listed(path.labels)}); a closed"
+                    )
+                    raise PlanError(f"{text} edge has two at each point", what=where, where=_plain(end))
+        if open_paths:  # the smallest gap between two of the ends
+            ends = [(path.labels[-k], point) for path in open_paths for k, point in enumerate(path.ends)]
+            points = np.array([point for _, point in ends])
+            apart, nearest = (np.ravel(found) for found in cKDTree(points).query(points, k=[2]))
+            place = int(np.argmin(apart))
+            one, two = (ends[k] for k in sorted((place, int(nearest[place]))))
+            gap = float(apart[place])
+            between = f"between {one[0]} at {point_text(one[1])} and {two[0]} at {point_text(two[1])}"
+            allow = f"draw what is missing, or close it with gap = {two_digits(gap):g}"
+            text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
+            raise PlanError(text, what=where, where=(_plain(one[1]), _plain(two[1])), found=gap)
+        return paths
+
+    def _outline(self) -> Curve:
+        paths = self._loops(self.edge)
+        if len(paths) > 1:
+            ends = ", ".join(f"{listed(path.labels)} at {point_text(path.ends[0])}" for path in paths[:3])
+            where = f"layer {paths[0].layer!r}"
+            text = f"{where} has {len(paths)} closed curves ({ends}); a roof has one outline"
+            text += ": put the edges of openings on a layer 'hole NAME'"
+            raise PlanError(text, what=where, found=len(paths), expected=1)
+        self.layers["the outline"] = paths[0].source
+        return paths[0].curve
+
+    def _add(
+        self,
+        role: str,
+        label: Callable[[str], str],
+        usual: str,
+        curves: dict[str, Curve],
+        paths_of: Callable[[Sequence[Stroke]], list[JoinedPath]] | None = None,
+    ) -> list[str]:
+        """Add the paths of a role's layers to ``curves`` by the layer's name, or numbered; the new names."""
+        new = []
+        for layer, strokes in self.layers_of(role):
+            paths = (paths_of or self._joined)(strokes)
+            names = [layer.name] if layer.name and len(paths) == 1 and layer.name not in curves else []
+            numbers = (f"{layer.name or usual} {k}" for k in itertools.count(1))
+            names += itertools.islice((n for n in numbers if n not in curves), len(paths) - len(names))
+            for name, path in zip(names, paths, strict=True):
+                curves[name] = path.curve
+                self.layers[label(name)] = path.source
+            new += names
+        return new
+
+    def _masts(self, holes: dict[str, Curve]) -> list[Floats]:
+        """The tops of masts; rings are added to the holes."""
+        tops: list[Floats] = []
+
+        def rings(strokes: Sequence[Stroke]) -> list[JoinedPath]:
+            tops.extend(_points(strokes))
+            paths = self._joined(strokes)
+            for path in paths:
+                if path.curve.closed:
+                    continue
+                foot, top = sorted(path.ends, key=lambda point: float(point[2]))
+                if np.linalg.norm((top - foot)[:2]) > self.gap:
+                    text = (
+                        f"{path.source} from {point_text(foot)} to {point_text(top)} is neither vertical nor"
+                    )
+                    text += " a closed ring; draw a mast as a vertical line, or its top as a point"
+                    raise PlanError(text, what=f"layer {path.layer!r}", where=_plain(foot))
+                tops.append(top)
+            return [path for path in paths if path.curve.closed]
+
+        self._add("mast", hole_label, "mast", holes, rings)
+        return tops
+
+    def _cables(self, edges: Sequence[Curve]) -> tuple[dict[str, Curve], dict[str, Curve]]:
+        """The cables across the roof and those along edges, by name; free edges have cables, too."""
+        cables: dict[str, Curve] = {}
+        self._add("cable", "cable {!r}".format, "cable", cables)
+        free = self._add("free", "cable {!r}".format, "free", cables)
+        check_count("cables", len(cables))
+        tree = LineTree([Line("an edge", Kind.OUTLINE, edge) for edge in edges])
+        along = {
+            name: all(tree.at(curve.samples(ALONG * self.size)[:, :2], self.gap))
+            for name, curve in cables.items()
+        }
+        for name in free:
+            if not along[name]:
+                where = self.layers[f"cable {name!r}"]
+                text = f"{where} is on no edge of the outline or of a hole; draw it along one, or across the"
+                raise PlanError(f"{text} roof on a layer 'cable NAME'", what=where)
+        across = {name: curve for name, curve in cables.items() if not along[name]}
+        self.layers |= {f"divider {name!r}": self.layers[f"cable {name!r}"] for name in across}
+        return across, {name: curve for name, curve in cables.items() if along[name]}
+
+    def _mirrors(self) -> dict[str, Curve]:
+        """The straight lines of mirrors, numbered; those that go on in one direction are one."""
+        mirrors: list[Floats] = []
+        for path in (path for _, strokes in self.layers_of("mirror") for path in self._joined(strokes)):
+            begin = len(mirrors)
+            for piece in path.curve.pieces:
+                start, end = piece.at(np.array([0.0, 1.0]))
+                if piece.sweep or len(piece.points) > 2:
+                    text = f"{path.source} is not straight; a mirror is a straight edge of the outline"
+                    raise PlanError(text, what=f"layer {path.layer!r}", where=_plain(start))
+                if len(mirrors) > begin and polyline([mirrors[-1][0], start, end]).corners.size == 0:
+                    mirrors[-1] = np.stack([mirrors[-1][0], end])
+                else:
+                    mirrors.append(np.stack([start, end]))
+                self.layers[f"mirror {len(mirrors)}"] = path.source
+        return {f"mirror {k}": polyline(ends) for k, ends in enumerate(mirrors, 1)}
+
+    def _moved(self, curves: Mapping[str, Curve], edges: Sequence[Curve], what: str) -> dict[str, Curve]:
+        """The curves with their ends moved over small gaps to the lines that they should reach."""
+        moved, note = meet_lines(curves, edges, self.gap, what)
+        self.notes += [note] if note else []
+        return moved
+
+    def _loose(self, outline: Curve, supports: Sequence[Any], masts: Sequence[Any], cables: bool) -> bool:
+        """Whether masts and raised supports hold the outline, and nothing between them."""
+        rim = Line("the outline", Kind.OUTLINE, outline)
+
+        def above(support: Any) -> float:
+            """How far a support is above the outline; NaN away from it."""
+            points = support.samples(ALONG * self.size) if isinstance(support, Curve) else support[None]
+            t, away = rim.nearest(points[:, :2])
+            steps = np.abs(points[:, 2] - outline.at(t)[:, 2]).max()
+            return float(steps) if (away <= self.gap).all() else math.nan
+
+        heights, tops = [above(support) for support in supports], [above(top) for top in masts]
+        if any(map(math.isnan, tops)):
+            self.notes.append(
+                "layer 'mast': a roof held at a point has a peak there as thin as the triangles, which comes"
+                " to rest on some meshes and not on others; draw a mast's top as a ring, and the roof is the"
+                " same on all"
+            )
+        if not all(map(math.isnan, tops)) or np.nanmax([0.0, *heights]) > FLAT * self.size:
+            return True
+        if not cables and not all(map(math.isnan, heights)):
+            self.notes.append(
+                "all of the outline is held, and supports on it change nothing; draw what is not held on a"
+                " layer 'free' or 'cable NAME', or the points that hold it on a layer 'mast'"
+            )
+        return False
+
+    def _note_rest(self, outline: Curve) -> None:
+        """Note layers that mean nothing here, entities of other kinds, hidden ones, and a doubtful unit."""
+        strange = {name: len(s) for name, s in self.by_layer.items() if layer_of(name) is None}
+        if strange:
+            self.notes.append(left_out(strange))
+        for layer, kinds in self.content.others.items():
+            if layer_of(layer) is not None:
+                kinds_text = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+                self.notes.append(f"layer {layer!r}: no lines, left out: {kinds_text}")
+        hidden = [f"{name!r} ({n})" for name, n in self.content.hidden.items() if layer_of(name) is not None]
+        if hidden:
+            self.notes.append(f"hidden, left out: entities of the layers {', '.join(hidden)}")
+        width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
+        note = size_note(width, self.units, self.content.unit)
+        self.notes += [note] if note else []
+        if note := self.content.note or conversion_note(self.content.unit, self.units):
+            self.notes.insert(0, note)
+
+    def _on_plane(self, curve: Curve) -> Curve:
+        """The curve as a plane one if all of it is at the level of Π."""
+        heights = curve.at(curve.dense)[:, 2]
+        return _projected(curve) if np.abs(heights - self.level).max() <= FLAT * self.size else curve
 
 
-def _drawing(parts: DrawnParts, factor: float) -> Drawing:
-    """All parts, each checked."""
-    outline = parts.outline()
-    holes = parts.loops()
-    supports = parts.supports()
-    masts = parts.masts(holes)
-    edges = [outline, *holes.values()]
-    places = parts.settled([*supports, *masts], edges)
-    supports, masts = places[: len(supports)], places[len(supports) :]
-    lines, loose_edges = parts.cables(edges)
-    dividers = parts.dividers(edges, lines)
-    cables = parts.moved(loose_edges, edges, "cables")
-    mirrors = parts.moved(parts.mirrors(), edges, "mirrors")
-    parts.check(
-        {"the outline": outline}
-        | {hole_label(name): curve for name, curve in holes.items()}
-        | {f"divider {name!r}": curve for name, curve in dividers.items()}
-    )
-    loose = parts.loose(outline, supports, masts, bool(cables))
-    heights = heights_of(parts.strokes_of("height"), parts.content.unit, parts.units)
-    labels = labels_of(parts.layers_of("patch"))
-    parts.note_rest()
-    width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
-    if note := size_note(width, parts.units, parts.content.unit):
-        parts.notes.append(note)
-    if note := parts.content.note or conversion_note(parts.content.unit, parts.units):
-        parts.notes.insert(0, note)
-    return Drawing(
-        parts.path,
-        parts.content.unit,
-        parts.units,
-        _on_plane(parts, outline),
-        {name: _projected(curve) for name, curve in dividers.items()},
-        {name: _on_plane(parts, curve) for name, curve in holes.items()},
-        [s if isinstance(s, np.ndarray) else _on_plane(parts, s) for s in (*supports, *masts)],
-        heights,
-        labels,
-        parts.level,
-        parts.gap,
-        parts.layers,
-        frozenset(parts.uprights),
-        frozenset(lines),
-        {name: _projected(curve) for name, curve in cables.items()},
-        [_projected(curve) for curve in mirrors.values()],
-        loose,
-        tuple(parts.notes),
-    )
-
-
-def _on_plane(parts: DrawnParts, curve: Curve) -> Curve:
-    """The curve as a plane one if all of it is at the level of Π."""
-    heights = curve.at(curve.dense)[:, 2]
-    return _projected(curve) if np.abs(heights - parts.level).max() <= FLAT * parts.size else curve
+def _points(strokes: Sequence[Stroke]) -> list[Floats]:
+    return [stroke.point for stroke in strokes if stroke.point is not None and not stroke.text]
 
 
 def _projected(curve: Curve) -> Curve:
     """The curve's course in plan."""
     return replace(curve, pieces=tuple(Piece(p.points[:, :2], p.sweep, p.weights) for p in curve.pieces))
+
+
+def _plain(point: Floats) -> tuple[float, ...]:
+    """A point as plain numbers."""
+    return tuple(point.tolist())

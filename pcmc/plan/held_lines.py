@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..curves.curves import Curve, polyline
 from ..curves.pieces import Piece
-from ..surface import HeldCurve, Plane
-from .arrangement import Chain
+from ..surface import HeldCurve
 from .draft import Draft
-from .edges import HELD, STATES
+from .edges import HELD
 from .lines import SNAP, Kind, Line
 
 REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
@@ -29,9 +28,14 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
     """
     curves = []
     supports = [Line("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
-    for chain, held in _held_chains(draft):
+    fixed = dict(zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", HELD), strict=True))
+    for chain in draft.drawn.chains:
         line = draft.lines[chain.line]
-        for first, last in _runs(held):
+        if line.kind is Kind.DIVIDER:
+            continue
+        held = [line.kind is Kind.SUPPORT or fixed[tuple(ends)] for ends in chain.edges.tolist()]
+        turns = np.flatnonzero(np.diff([False, *held, False]))
+        for first, last in turns.reshape(-1, 2):  # stretches of fixed edges
             V, at = chain.vertices[first : last + 1], chain.at[first : last + 1]
             found = _on_curve(draft, line.curve, V, at, X)
             for support in supports if found is None else ():
@@ -44,35 +48,10 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
     for chain in draft.drawn.chains:
         foot = feet.get((int(chain.vertices[0]), int(chain.vertices[1])))
         if foot is not None:
-            found = _on_curve(
-                draft, draft.lines[chain.line].curve.mapped(down, np.zeros(3)), foot, chain.at, X
-            )
+            curve = draft.lines[chain.line].curve.mapped(down, np.zeros(3))
+            found = _on_curve(draft, curve, foot, chain.at, X)
             curves += [found] if found else []
     return curves
-
-
-def _held_chains(draft: Draft) -> Iterator[tuple[Chain, Bools]]:
-    """The chains with fixed edges, and which of the edges of each are fixed."""
-    fixed = {
-        tuple(ends): state
-        for ends, state in zip(
-            draft.edges.ends.tolist(),
-            np.isin(draft.edges.state, [STATES.index("fixed"), STATES.index(HELD)]).tolist(),
-            strict=True,
-        )
-    }
-    for chain in draft.drawn.chains:
-        line = draft.lines[chain.line]
-        if line.kind is Kind.SUPPORT:
-            yield chain, np.ones(len(chain.vertices) - 1, dtype=bool)
-        elif line.bounds:
-            yield chain, np.array([fixed[ends] for ends in map(tuple, chain.edges.tolist())])
-
-
-def _runs(chosen: Bools) -> list[tuple[int, int]]:
-    """Where stretches of chosen entries begin, and end before."""
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
-    return [(int(first), int(last)) for first, last in turns.reshape(-1, 2)]
 
 
 def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> HeldCurve | None:
@@ -80,7 +59,7 @@ def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> Hel
 
     Where lines meet, their common vertex may be a little beside one of them: a straight piece leads there.
     """
-    plane: Plane = draft.plan.plane
+    plane = draft.plan.plane
     part, t = curve.part(at[0], at[-1], at)
     part = part.mapped(plane.axes.T, np.array(plane.point))
     there = part.at(t)

@@ -57,11 +57,6 @@ class Line:
         return xy
 
     @cached_property
-    def corners(self) -> Floats:
-        """(c,2) the points where the line turns."""
-        return self.curve.at(self.curve.corners)[:, :2]
-
-    @cached_property
     def shape(self) -> Any:
         """The polyline as a shapely LineString."""
         if not np.ptp(self.xy, axis=0).any():
@@ -78,15 +73,10 @@ class Line:
         """Of the chords."""
         return shapely.STRtree(self.chords)
 
-    @cached_property
+    @property
     def straight(self) -> bool:
         """Whether the chords are the line itself."""
         return len(self.xy) == len(self.curve.pieces) + 1
-
-    @cached_property
-    def sag(self) -> float:
-        """The line is nowhere farther from its chords than this, length."""
-        return 0.0 if self.straight else SAG * self.shape.length
 
     def error(self, problem: str, where: object = None, found: object = None) -> PlanError:
         """The error about this line: its name, and what is wrong with it."""
@@ -121,7 +111,7 @@ class LineTree:
         self.chord = np.arange(len(self.owner)) - np.repeat(np.cumsum(count) - count, count)
         self.chords = np.concatenate([line.chords for line in lines])
         self.tree = shapely.STRtree(self.chords)
-        self.sag = max(line.sag for line in lines)
+        self.sag = max(0.0 if line.straight else SAG * line.shape.length for line in lines)
 
     def at(self, xy: Floats, snap: float) -> list[Places]:
         """For each point (n,2) the lines that pass through it, to ``snap``, with their parameters there."""
@@ -144,32 +134,32 @@ class LineTree:
 
     def crossings(self) -> list[Places]:
         """The places where two lines cross that are not both of the boundary."""
-        inner = np.flatnonzero([not line.bounds for line in self.lines])
-        own = np.flatnonzero(np.isin(self.owner, inner))
+        bounds = np.array([line.bounds for line in self.lines])[self.owner]
+        own = np.flatnonzero(~bounds)
         one, two = self.tree.query(self.chords[own], predicate="intersects")
         one = own[one]
-        earlier = self.owner[two] < self.owner[one]
-        once = earlier | np.isin(self.owner[two], inner, invert=True)
+        once = (self.owner[two] < self.owner[one]) | bounds[two]
         pairs = np.stack([two, one], axis=1)[once & (self.owner[two] != self.owner[one])]
-        pairs = np.where((self.owner[pairs[:, 0]] > self.owner[pairs[:, 1]])[:, None], pairs[:, ::-1], pairs)
+        turned = self.owner[pairs[:, 0]] > self.owner[pairs[:, 1]]
+        pairs[turned] = pairs[turned, ::-1]
         if len(pairs) > MOST_CROSSINGS:
             problem = f"the lines of the plan cross at {len(pairs)} places; at most {MOST_CROSSINGS} are"
             raise PlanError(f"{problem} allowed: draw fewer dividers", what="dividers", found=len(pairs))
         pairs = pairs[np.lexsort(self.owner[pairs].T)]
         parts = shapely.intersection(self.chords[pairs[:, 0]], self.chords[pairs[:, 1]])
         places = []
-        for (first, second), part in zip(pairs.tolist(), parts, strict=True):
-            i, j = self.owner[[first, second]].tolist()
+        for pair, part in zip(pairs, parts, strict=True):
+            i, j = self.owner[pair].tolist()
+            one, two = self.lines[i], self.lines[j]
             start, end = np.array(part.coords)[[0, -1]]
             if part.geom_type != "Point":
-                where = f"from {point_text(start)} to {point_text(end)}"
-                raise overlap(self.lines[j], self.lines[i], where)
-            s, t = (
-                float(self.lines[k].nearest_to(start[None], self.chord[[chord]])[0][0])
-                for k, chord in ((i, first), (j, second))
+                raise overlap(two, one, f"from {point_text(start)} to {point_text(end)}")
+            nearest = (
+                line.nearest_to(start[None], self.chord[[k]])[0]
+                for line, k in zip((one, two), pair, strict=True)
             )
-            if not (self.lines[i].straight and self.lines[j].straight):
-                s, t = crossing(self.lines[i], s, self.lines[j], t)
+            s, t = (float(t[0]) for t in nearest)
+            s, t = (s, t) if one.straight and two.straight else crossing(one, s, two, t)
             places.append([(i, s), (j, t)])
         return places
 
@@ -185,15 +175,10 @@ def check_line(one: Line) -> None:
         gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
         ends = f"it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])}"
         raise one.error(f"is open: {ends}, {gap:.3g} apart; close it", found=gap)
-    if not one.shape.is_simple:
-        place = _self_crossing(one)
-        raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
-
-
-def _self_crossing(one: Line) -> Floats:
-    """A point at which a line crosses itself. Few chords at a time, as loops may cross without number."""
-    count = len(one.chords)
-    for begin in range(0, count, BLOCK):
+    if one.shape.is_simple:
+        return
+    place, count = one.xy[0], len(one.chords)
+    for begin in range(0, count, BLOCK):  # few chords at a time, as loops may cross without number
         i, j = one.tree.query(one.chords[begin : begin + BLOCK], predicate="intersects")
         i += begin
         i, j = i[i < j], j[i < j]
@@ -201,8 +186,9 @@ def _self_crossing(one: Line) -> Floats:
         joined = (j - i == 1) | (one.curve.closed & (j - i == count - 1))
         found = parts[~joined | (shapely.length(parts) > 0.0)]
         if len(found):
-            return np.array(found[0].coords)[0]
-    return one.xy[0]
+            place = np.array(found[0].coords)[0]
+            break
+    raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
 
 
 def check_holes(lines: Sequence[Line]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import OptionError, PcmcError, PlanError, unknown
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from ..curves.curves import CURVES, Curve, curve
 from ..meshing.walls import EDGES
 from ..surface import Plane
@@ -115,7 +115,7 @@ class RoomData:
 
 
 @dataclass(frozen=True)
-class Area:
+class PatchSpec:
     """A patch of the plan.
 
     Attributes
@@ -159,9 +159,8 @@ def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
     try:
         return curve(spec, closed=closed)
     except OptionError as error:
-        raise OptionError(
-            f"{what}: {error}", what=what, where=error.where, found=error.found, expected=error.expected
-        ) from None
+        details = {"where": error.where, "found": error.found, "expected": error.expected}
+        raise OptionError(f"{what}: {error}", what=what, **details) from None
 
 
 def divider_of(spec: Any, number: int) -> Divider:
@@ -173,9 +172,9 @@ def divider_of(spec: Any, number: int) -> Divider:
         validate.choice(f"wall of {what}", part.wall, (BALANCED,))
     if not isinstance(part.upright, bool):
         validate.refuse("upright", part.upright, "True or False", what)
+    line, cable = curve_of(part.curve, what), _tension(part.cable, what)
     wall, kind = (None, "divider") if part.wall is None or part.wall is False else (part.wall, "wall")
-    given = {"curve": curve_of(part.curve, what), "cable": cable_tension(part.cable, what)}
-    return replace(part, **given, wall=wall, name=part.name or f"{kind} {number}")
+    return replace(part, curve=line, cable=cable, wall=wall, name=part.name or f"{kind} {number}")
 
 
 def hole_of(spec: Any, number: int) -> Hole:
@@ -206,11 +205,10 @@ def edge_cable(edge: str, cable: Any, what: str) -> float | None:
     if edge != "cable" and cable is not None:
         message = f'{what}: cable = {cable!r} needs edge = "cable", found "{edge}"'
         raise OptionError(message, what="edge", where=what, found=edge, expected="cable")
-    return cable_tension(cable, what)
+    return _tension(cable, what)
 
 
-def cable_tension(cable: Any, what: str) -> float | None:
-    """A tension ≥ 0, or None."""
+def _tension(cable: Any, what: str) -> float | None:
     return None if cable is None else validate.number("cable", cable, least=0.0, where=what)
 
 
@@ -218,16 +216,17 @@ def cable_of(spec: Any, number: int) -> CableLine:
     """A CableLine from a mapping of its attributes; ``number`` counts from 1."""
     what = f"cable {number}"
     if isinstance(spec, Mapping):
-        check_keys(spec, CableLine, what)
-        for key in ("curve", "tension"):
-            if key not in spec:
-                raise OptionError(f"{what} needs a {key}", what=key, where=what)
+        check_keys(spec, CableLine, what, ("a curve", "a tension"), what)
         spec = CableLine(**spec)
     if not isinstance(spec, CableLine):
         raise OptionError(f"{what}: expected a curve with a tension, found {spec!r}", what=what, found=spec)
     tension = validate.number("tension", spec.tension, least=0.0, where=spec.name or what)
-    what = f"cable {spec.name!r}" if spec.name else what
-    return CableLine(curve_of(spec.curve, what), tension, spec.name)
+    return CableLine(curve_of(spec.curve, cable_label(spec, number)), tension, spec.name)
+
+
+def cable_label(cable: CableLine, number: int) -> str:
+    """The name of a cable line in messages; ``number`` counts from 1."""
+    return f"cable {cable.name!r}" if cable.name else f"cable {number}"
 
 
 def mirror_of(spec: Any, number: int) -> Curve:
@@ -240,30 +239,22 @@ def mirror_of(spec: Any, number: int) -> Curve:
     return line
 
 
-def rooms_of(spec: Any, areas: Sequence[Area]) -> dict[str, RoomData]:
+def rooms_of(spec: Any, patches: Sequence[PatchSpec]) -> dict[str, RoomData]:
     """The rooms with a volume: those of single patches, and those given by name."""
-    rooms = {a.name: RoomData((a.name,), a.volume) for a in areas if a.volume is not None}
-    for name, values in (spec or {}).items():
-        if isinstance(values, RoomData):
-            values = vars(values)
-        check_keys(values, RoomData, f"room {name!r}")
-        for key in ("patches", "volume"):
-            if key not in values:
-                raise OptionError(f"room {name!r} needs {key}", what=key, where=name)
+    rooms = {a.name: RoomData((a.name,), a.volume) for a in patches if a.volume is not None}
+    for name, given in (spec or {}).items():
+        values = vars(given) if isinstance(given, RoomData) else given
+        check_keys(values, RoomData, f"room {name!r}", ("patches", "volume"), name)
         volume = validate.number("volume", values["volume"], where=name)
-        known = [area.name for area in areas]
-        patches = tuple(validate.choice(f"room {name!r}: patch", p, known) for p in values["patches"])
-        if rooms.get(name, RoomData(patches, volume)) != RoomData(patches, volume):
+        known = [patch.name for patch in patches]
+        over = tuple(validate.choice(f"room {name!r}: patch", p, known) for p in values["patches"])
+        if rooms.setdefault(name, RoomData(over, volume)) != RoomData(over, volume):
             raise OptionError(f"room {name!r} has two volumes; give one", what="volume", where=name)
-        rooms[name] = RoomData(patches, volume)
     owner: dict[str, str] = {}
-    for name, room in rooms.items():
-        for patch in room.patches:
-            if owner.setdefault(patch, name) != name:
-                message = (
-                    f"patch {patch!r} is in the rooms {owner[patch]!r} and {name!r}; leave it out of one"
-                )
-                raise OptionError(message, what="rooms", where=patch)
+    for name, patch in ((name, patch) for name, room in rooms.items() for patch in room.patches):
+        if owner.setdefault(patch, name) != name:
+            message = f"patch {patch!r} is in the rooms {owner[patch]!r} and {name!r}; leave it out of one"
+            raise OptionError(message, what="rooms", where=patch)
     return rooms
 
 
@@ -279,22 +270,18 @@ def _part_of(kind: Any, spec: Any, what: str) -> Any:
     return spec if isinstance(spec, kind) else kind(spec)
 
 
-def areas_of(spec: Any) -> tuple[Area, ...]:
-    """Areas from a mapping from names to their attributes, or from a sequence of Areas."""
+def patches_of(spec: Any) -> tuple[PatchSpec, ...]:
+    """The patches of a mapping from names to their attributes, or of a sequence."""
     if not isinstance(spec, Mapping):
         return tuple(spec)
-    areas = []
+    patches = []
     for name, values in spec.items():
-        check_keys(values, Area, f"patch {name!r}")
-        if "tension" not in values:
-            raise OptionError(f"patch {name!r} needs a tension", what="tension", where=name)
+        check_keys(values, PatchSpec, f"patch {name!r}", ("a tension",), name)
         if "volume" in values and "pressure" in values:
-            message = (
-                f"patch {name!r} has a volume and a pressure; give one: the pressure follows from the volume"
-            )
-            raise OptionError(message, what="volume", where=name)
-        areas.append(Area(name, **values))
-    return tuple(areas)
+            message = f"patch {name!r} has a volume and a pressure; give one: the pressure follows from the"
+            raise OptionError(f"{message} volume", what="volume", where=name)
+        patches.append(PatchSpec(name, **values))
+    return tuple(patches)
 
 
 def support_of(spec: Any, number: int) -> Any:
@@ -315,21 +302,23 @@ def points_of(spec: Any) -> dict[str, tuple[float, float]]:
     for name, point in spec.items():
         if not isinstance(point, Sequence | np.ndarray) or isinstance(point, str) or len(point) != 2:
             validate.refuse("points", point, "a point [x, y]", name)
-        points[name] = (
-            validate.number("x", point[0], where=name),
-            validate.number("y", point[1], where=name),
-        )
+        x, y = (validate.number(axis, value, where=name) for axis, value in zip("xy", point, strict=True))
+        points[name] = (x, y)
     return points
 
 
-def check_keys(values: Any, kind: Any, what: str) -> None:
-    """Refuse a mapping with a key that is no attribute of the class ``kind``."""
+def check_keys(values: Any, kind: Any, what: str, needs: Sequence[str] = (), where: str = "") -> None:
+    """Refuse a mapping with a key that is no attribute of ``kind``, or without one that it needs."""
     if not isinstance(values, Mapping):
         raise OptionError(f"{what}: expected a table, found {values!r}", what=what, found=values)
     known = tuple(f.name for f in fields(kind))
     for key in values:
         if key not in known:
             raise OptionError(unknown(f"{what} key", key, known), what=what, where=key, expected=known)
+    for need in needs:
+        key = need.removeprefix("a ")
+        if key not in values:
+            raise OptionError(f"{what} needs {need}", what=key, where=where)
 
 
 @dataclass(frozen=True, eq=False)

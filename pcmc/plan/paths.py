@@ -1,9 +1,10 @@
-"""Strokes joined end to end: closed loops, and lines from fork to fork; small gaps are closed."""
+"""Strokes joined end to end, and ends moved onto the lines that they just miss: small gaps are closed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,23 +13,31 @@ from ..base.arrays import Floats, Ints
 from ..curves.curves import Curve, arc
 from ..curves.pieces import Piece
 from ..surface.topology import components
+from .layers import listed
+from .lines import Kind, Line, LineTree
 from .strokes import Stroke
 
-EXACT = 1e-9  # of the tolerance: ends nearer than this have no gap
+EXACT = 1e-9  # of the tolerance: ends nearer than this meet already
 
 
 @dataclass(frozen=True, eq=False)
 class JoinedPath:
-    """A curve of one or several strokes, their labels, and how many strokes end at each of its ends."""
+    """A curve of one or several strokes, their layer and labels; how many strokes end at each of its ends."""
 
     curve: Curve
+    layer: str
     labels: tuple[str, ...]
-    strokes_at_ends: tuple[int, int] = (2, 2)
+    strokes_at_ends: tuple[int, int]
+
+    @property
+    def source(self) -> str:
+        """Its layer and strokes, for messages."""
+        return f"layer {self.layer!r}: {listed(self.labels)}"
 
     @property
     def ends(self) -> Floats:
         """(2,3) its first and last point."""
-        return self.curve.at([0.0, float(len(self.curve.pieces))])
+        return _ends(self.curve)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,75 +63,199 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
     >>> joined.paths[0].curve.closed, joined.closed_gaps, joined.largest_gap
     (True, 1, 0.001)
     """
-    once, doubles = _once(strokes, tolerance)
-    curves = [stroke.curve for stroke in once if stroke.curve is not None]
+    curves, labels, doubles = _once(strokes, tolerance)
     if not curves:
         return Joined((), 0, 0.0, doubles)
-    ends = np.concatenate([curve.at([0.0, float(len(curve.pieces))]) for curve in curves])
+    ends = np.concatenate([_ends(curve) for curve in curves])
     node = components(cKDTree(ends).query_pairs(tolerance, output_type="ndarray"), len(ends))
-    places = _places(curves, ends, node)
-    low, high = np.full((2, len(places), 3), np.inf) * [[[1.0]], [[-1.0]]]
+    count = int(node.max()) + 1
+    # a node is where its only curved stroke ends, else in the middle of its ends
+    curved = np.repeat([bool(c.pieces[0].sweep) or len(c.pieces[0].points) > 2 for c in curves], 2)
+    weight = np.where(np.bincount(node, curved, count)[node] > 0.0, curved, 1.0)
+    total = np.bincount(node, weight, count)
+    places = np.stack([np.bincount(node, weight * x, count) / total for x in ends.T], axis=1)
+    alone = np.bincount(node, minlength=count)[node] == 1
+    places[node[alone]] = ends[alone]
+    low, high = np.full((2, count, 3), np.inf) * [[[1.0]], [[-1.0]]]
     np.minimum.at(low, node, ends)
     np.maximum.at(high, node, ends)
     gaps = np.linalg.norm(high - low, axis=1)
     gaps[gaps <= EXACT * tolerance] = 0.0
-    moved = [_moved(curve, places[node[2 * k : 2 * k + 2]]) for k, curve in enumerate(curves)]
-    paths = _walk(moved, [stroke.label for stroke in once], node.reshape(-1, 2))
+    moved = []
+    for curve, both, old in zip(curves, places[node].reshape(-1, 2, 3), ends.reshape(-1, 2, 3), strict=True):
+        steps = both - old
+        steps[np.linalg.norm(steps, axis=1) <= 1e-12 * curve.length] = 0.0
+        closed = bool(np.linalg.norm(both[1] - both[0]) <= 1e-9 * curve.length)
+        moved.append(replace(_with_ends(curve, steps), closed=closed))
+    paths = _walk(moved, strokes[0].layer, labels, node.reshape(-1, 2))
     return Joined(paths, int(np.count_nonzero(gaps)), float(gaps.max()), doubles)
 
 
-def _once(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Stroke], tuple[str, ...]]:
-    """The strokes without those that repeat another, and the labels of these; no stroke without length."""
-    drawn = [stroke for stroke in strokes if stroke.curve is not None]
-    short = np.array([stroke.curve.length <= tolerance for stroke in drawn if stroke.curve is not None])
-    marks = np.array([_marks(stroke) for stroke in drawn]).reshape(len(drawn), -1)
+def _ends(curve: Curve) -> Floats:
+    """(2,3) the first and the last point."""
+    return curve.at([0.0, float(len(curve.pieces))])
+
+
+def _once(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Curve], list[str], tuple[str, ...]]:
+    """The curves and labels of strokes, and the labels of those left out: doubles, or without length."""
+    drawn = [(stroke.curve, stroke.label) for stroke in strokes if stroke.curve is not None]
+    marks = np.array([c.at(c.parameter(c.length * np.linspace(0.0, 1.0, 5))) for c, _ in drawn])
     shared, first, which = np.unique(
-        np.round(marks / tolerance, 3), axis=0, return_index=True, return_inverse=True
+        np.round(marks.reshape(len(drawn), -1) / tolerance, 3), axis=0, return_index=True, return_inverse=True
     )
-    which = which.reshape(-1)
-    tree, turned = cKDTree(marks[first]), marks[first].reshape(-1, 5, 3)[:, ::-1].reshape(len(first), -1)
-    alike = [tree.query_ball_point(way, tolerance, p=np.inf) for way in (marks[first], turned)]
-    kept, taken, doubles = [], np.zeros(len(shared), dtype=bool), []
-    for k, stroke in enumerate(drawn):
-        if short[k] or taken[[*alike[0][which[k]], *alike[1][which[k]]]].any():
-            doubles.append(stroke.label)
+    ways = [way.reshape(len(first), -1) for way in (marks[first], marks[first][:, ::-1])]
+    tree = cKDTree(ways[0])
+    alike: list[Any] = [tree.query_ball_point(way, tolerance, p=np.inf) for way in ways]
+    curves, labels, doubles, taken = (
+        list[Curve](),
+        list[str](),
+        list[str](),
+        np.zeros(len(shared), dtype=bool),
+    )
+    for (curve, label), mark in zip(drawn, which.reshape(-1), strict=True):
+        if curve.length <= tolerance or taken[[*alike[0][mark], *alike[1][mark]]].any():
+            doubles.append(label)
         else:
-            kept.append(stroke)
-            taken[which[k]] = True
-    return kept, tuple(doubles)
+            curves.append(curve)
+            labels.append(label)
+            taken[mark] = True
+    return curves, labels, tuple(doubles)
 
 
-def _marks(stroke: Stroke) -> Floats:
-    """(5,3) points at the quarters of a stroke."""
-    curve = stroke.curve
-    assert curve is not None
-    return curve.at(curve.parameter(curve.length * np.linspace(0.0, 1.0, 5)))
+def _walk(curves: Sequence[Curve], layer: str, labels: Sequence[str], nodes: Ints) -> list[JoinedPath]:
+    """Follow strokes from node to node, first from ends and forks, then around the loops that are left."""
+    at_node: dict[int, list[int]] = {}
+    for k, pair in enumerate(nodes.tolist()):
+        for node in pair:
+            at_node.setdefault(node, []).append(k)
+    count = {node: len(there) for node, there in at_node.items()}
+    left, paths = set(range(len(curves))), []
+    for begin in (*(node for node in at_node if count[node] != 2), *at_node):
+        for start in at_node[begin]:
+            node, names, following = begin, [], [start] if start in left else []
+            pieces: list[Piece] = []
+            while following:
+                k = following[0]
+                left.discard(k)
+                forward = nodes[k, 0] == node
+                pieces += (curves[k] if forward else curves[k].reversed()).pieces
+                names.append(labels[k])
+                node = int(nodes[k, 1] if forward else nodes[k, 0])
+                goes_on = node != begin and count[node] == 2
+                following = [other for other in at_node[node] if other in left] if goes_on else []
+            if pieces:
+                path = Curve(tuple(pieces), closed=node == begin)
+                paths.append(
+                    JoinedPath(path, layer, tuple(dict.fromkeys(names)), (count[begin], count[node]))
+                )
+    return paths
 
 
-def _places(curves: Sequence[Curve], ends: Floats, node: Ints) -> Floats:
-    """(k,3) the place of each node: the end of its only curved stroke, else the middle of its ends."""
-    curved = np.repeat([bool(c.pieces[0].sweep) or len(c.pieces[0].points) > 2 for c in curves], 2)
-    count = int(node.max()) + 1
-    rank = np.where(curved, 1.0, 0.0)
-    weight = np.where(np.bincount(node, rank, count)[node] > 0.0, rank, 1.0)
-    total = np.bincount(node, weight, count)
-    middle = np.stack([np.bincount(node, weight * x, count) / total for x in ends.T], axis=1)
-    alone = np.bincount(node, minlength=count)[node] == 1
-    middle[node[alone]] = ends[alone]
-    return middle
+def meet_lines(
+    curves: Mapping[str, Curve], edges: Sequence[Curve], tolerance: float, what: str
+) -> tuple[dict[str, Curve], str]:
+    """The curves with ends moved that just miss each other or a line, and a note; ``what`` names them.
+
+    Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge that is as near.
+    This point, and each other end, is moved onto the nearest line that it just misses. Only the course in
+    plan counts.
+    """
+    names = [name for name, curve in curves.items() if not curve.closed]
+    if not names:
+        return dict(curves), ""
+    rims, corners = _rims(edges)
+    drawn = np.concatenate([_ends(curves[name]) for name in names])[:, :2]
+    points = np.concatenate([drawn, corners])
+    group = components(cKDTree(points).query_pairs(tolerance, output_type="ndarray"), len(points))
+    members: list[list[int]] = [[] for _ in range(int(group.max()) + 1)]
+    for k, number in enumerate(group.tolist()):
+        members[number].append(k)
+    in_corner = [own[-1] >= len(drawn) for own in members]
+    place = np.array(
+        [points[m[-1:] if at else m].mean(axis=0) for m, at in zip(members, in_corner, strict=True)]
+    )
+    result = dict(curves)
+    for others in ((), tuple(curves)):  # onto the edges first, then onto each other
+        named = [name for name in others if _extent(result[name])]
+        lines = [*rims, *(Line("a line", Kind.DIVIDER, result[name]) for name in named)]
+        owners = [None] * len(rims) + named
+        for number, passing in enumerate(LineTree(lines).at(place, tolerance) if lines else ()):
+            own = {names[k // 2] for k in members[number] if k < len(drawn)}
+            reached = [lines[i].curve.at([t])[0, :2] for i, t in passing if owners[i] not in own]
+            if reached and not in_corner[number]:
+                place[number] = min(reached, key=lambda xy: float(np.linalg.norm(xy - place[number])))
+        steps = _steps(place[group[: len(drawn)]] - drawn, tolerance)
+        for name, both in zip(names, steps.reshape(-1, 2, 3), strict=True):
+            result[name] = _with_ends(curves[name], both)
+    return result, _note(steps, f"end{{s}} of {what}", "the lines that they meet")
 
 
-def _moved(curve: Curve, ends: Floats) -> Curve:
-    """The curve with its ends moved to two points."""
-    apart = ends - curve.at([0.0, float(len(curve.pieces))])
-    apart[np.linalg.norm(apart, axis=1) <= 1e-12 * curve.length] = 0.0
-    pieces = [bent(curve.pieces[0], apart[0], np.zeros(3)), *curve.pieces[1:]]
-    pieces[-1] = bent(pieces[-1], np.zeros(3), apart[1])
-    closed = bool(np.linalg.norm(ends[1] - ends[0]) <= 1e-9 * curve.length)
-    return replace(curve, pieces=tuple(pieces), closed=closed)
+def meet_edges(
+    supports: Sequence[Floats | Curve], edges: Sequence[Curve], tolerance: float
+) -> tuple[list[Floats | Curve], str]:
+    """Points (3,), and curves by their ends and joints, moved in plan onto edges that they just miss; a note.
+
+    A point within ``tolerance`` of a corner of an edge goes there, otherwise onto the nearest edge as near.
+    """
+    rims, corners = _rims(edges)
+    joints = [
+        s.at(np.arange(len(s.pieces) + (not s.closed), dtype=float)) if isinstance(s, Curve) else s[None]
+        for s in supports
+    ]
+    xy = np.concatenate([np.zeros((0, 3)), *joints])[:, :2]
+    nearest, away = xy.copy(), np.full(len(xy), tolerance)
+    for rim in rims if len(xy) else ():
+        t, distance = rim.nearest(xy)
+        nearer = distance <= away
+        nearest[nearer], away[nearer] = rim.curve.at(t)[nearer, :2], distance[nearer]
+    if len(corners) and len(xy):
+        apart, corner = (np.asarray(found) for found in cKDTree(corners).query(xy))
+        nearest[apart <= tolerance] = corners[corner[apart <= tolerance]]
+    steps = _steps(nearest - xy, tolerance)
+    result: list[Floats | Curve] = []
+    for support, own in zip(
+        supports, np.split(steps, np.cumsum([len(j) for j in joints])[:-1]), strict=False
+    ):
+        if isinstance(support, Curve):
+            parts = zip(support.pieces, own, np.roll(own, -1, axis=0), strict=False)
+            result.append(replace(support, pieces=tuple(_bent(*part) for part in parts)))
+        else:
+            result.append(support + own[0])
+    return result, _note(steps, "point{s} of supports", "the edges that they just miss")
 
 
-def bent(piece: Piece, at_start: Floats, at_end: Floats) -> Piece:
+def _rims(edges: Sequence[Curve]) -> tuple[list[Line], Floats]:
+    """The edges that have a length in plan, and (c,2) their corners."""
+    rims = [Line("an edge", Kind.OUTLINE, edge) for edge in edges if _extent(edge)]
+    return rims, np.concatenate([np.zeros((0, 2)), *(rim.curve.at(rim.curve.corners)[:, :2] for rim in rims)])
+
+
+def _extent(curve: Curve) -> bool:
+    return bool(np.ptp(curve.at(curve.dense)[:, :2], axis=0).any())
+
+
+def _steps(steps: Floats, tolerance: float) -> Floats:
+    """(k,3) the steps (k,2) in plan, those to nearly the same place left out."""
+    steps[np.linalg.norm(steps, axis=1) <= EXACT * tolerance] = 0.0
+    return np.pad(steps, ((0, 0), (0, 1)))
+
+
+def _note(steps: Floats, what: str, where: str) -> str:
+    lengths = np.linalg.norm(steps, axis=1)
+    moved = np.count_nonzero(lengths)
+    what = what.format(s="s" if moved > 1 else "")
+    return f"{moved} {what} moved by up to {lengths.max():.3g} to {where}" if moved else ""
+
+
+def _with_ends(curve: Curve, steps: Floats) -> Curve:
+    """The curve with its two ends moved by the vectors (2,3)."""
+    pieces = list(curve.pieces)
+    pieces[0] = _bent(pieces[0], steps[0], np.zeros(3))
+    pieces[-1] = _bent(pieces[-1], np.zeros(3), steps[1])
+    return replace(curve, pieces=tuple(pieces)) if steps.any() else curve
+
+
+def _bent(piece: Piece, at_start: Floats, at_end: Floats) -> Piece:
     """The piece with its ends moved by these vectors; an arc of a circle stays one."""
     if not (at_start.any() or at_end.any()):
         return piece
@@ -138,36 +271,3 @@ def bent(piece: Piece, at_start: Floats, at_end: Floats) -> Piece:
     c, s = np.cos(piece.sweep), np.sin(piece.sweep)
     change = np.linalg.lstsq(np.array([[1.0, 1.0, 0.0], [1.0, c, s]]), np.stack([at_start, at_end]))[0]
     return replace(piece, points=piece.points + change)
-
-
-def _walk(curves: Sequence[Curve], labels: Sequence[str], nodes: Ints) -> list[JoinedPath]:
-    """Follow strokes from node to node, first from ends and forks, then around the loops that are left."""
-    at_node: dict[int, list[int]] = {}
-    for k, pair in enumerate(nodes.tolist()):
-        for node in pair:
-            at_node.setdefault(node, []).append(k)
-    count = {node: len(there) for node, there in at_node.items()}
-    left = set(range(len(curves)))
-    paths = []
-    stops = [node for node in at_node if count[node] != 2]
-    for begin in (*stops, *at_node):
-        for k in at_node[begin]:
-            if k not in left:
-                continue
-            node, names = begin, []
-            pieces: list[Piece] = []
-            while True:
-                left.discard(k)
-                forward = nodes[k, 0] == node
-                pieces += (curves[k] if forward else curves[k].reversed()).pieces
-                names.append(labels[k])
-                node = int(nodes[k, 1] if forward else nodes[k, 0])
-                if node == begin or count[node] != 2:
-                    break
-                following = [other for other in at_node[node] if other in left]
-                if not following:
-                    break
-                k = following[0]
-            path = Curve(tuple(pieces), closed=node == begin)
-            paths.append(JoinedPath(path, tuple(dict.fromkeys(names)), (count[begin], count[node])))
-    return paths

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,15 +13,17 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from ..curves.curves import Curve
 from ..curves.pieces import to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
+from ..surface.summary import listed
 from .parts import (
     MOST,
+    Divider,
+    PatchSpec,
     PlanData,
-    areas_of,
     cable_of,
     check_count,
     check_keys,
@@ -29,11 +32,11 @@ from .parts import (
     edge_cable,
     hole_of,
     mirror_of,
+    patches_of,
     points_of,
     rooms_of,
     support_of,
 )
-from .summary import summary
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +50,7 @@ class Plan(PlanData):
     outline : a closed curve; it may leave Π, but its course in plan must not cross itself.
     dividers : lines between patches: Dividers, or curves (with walls whose tension is chosen).
     holes : openings: Holes, or curves (with fixed edges).
-    patches : an Area for each part into which the dividers cut the plan, or a mapping from names to
+    patches : a PatchSpec for each part into which the dividers cut the plan, or a mapping from names to
         their attributes; without patches ``tension`` holds for every part.
     edge_length : of the triangles, length. Along lines edges are about as long, equal between corners,
         meetings, and the points at which a curve is farthest along x or y, which are vertices.
@@ -109,51 +112,57 @@ class Plan(PlanData):
     def __post_init__(self) -> None:
         for key in MOST:
             check_count(key, len(getattr(self, key)), OptionError)
-        parsed = {
-            "outline": curve_of(self.outline, "outline", closed=True),
-            "dividers": tuple(divider_of(d, k) for k, d in enumerate(self.dividers, 1)),
-            "holes": tuple(hole_of(h, k) for k, h in enumerate(self.holes, 1)),
-            "patches": areas_of(self.patches),
-            "supports": tuple(support_of(s, k) for k, s in enumerate(self.supports, 1)),
-            "points": points_of(self.points),
-            "cables": tuple(cable_of(c, k) for k, c in enumerate(self.cables, 1)),
-            "mirrors": tuple(mirror_of(m, k) for k, m in enumerate(self.mirrors, 1)),
-        }
+        parsed: dict[str, Any] = {"outline": curve_of(self.outline, "outline", closed=True)}
+        makers = {"dividers": divider_of, "holes": hole_of, "supports": support_of}
+        for key, maker in (makers | {"cables": cable_of, "mirrors": mirror_of}).items():
+            parsed[key] = tuple(maker(spec, number) for number, spec in enumerate(getattr(self, key), 1))
+        parsed |= {"patches": patches_of(self.patches), "points": points_of(self.points)}
+        parsed["rooms"] = rooms_of(self.rooms, parsed["patches"])
+        validate.choice("edge of the outline", self.edge, EDGES)
+        parsed["cable"] = edge_cable(self.edge, self.cable, "the outline")
         for key, value in parsed.items():
             object.__setattr__(self, key, value)
-        object.__setattr__(self, "rooms", rooms_of(self.rooms, self.patches))
-        validate.choice("edge of the outline", self.edge, EDGES)
-        object.__setattr__(self, "cable", edge_cable(self.edge, self.cable, "the outline"))
         for key in ("pressure", "weight", "snow"):
             validate.number(key, getattr(self, key))
         validate.positive("edge_length", self.edge_length)
         if self.rise is not None:
             validate.positive("rise", self.rise)
         if bool(self.patches) == (self.tension is not None):
-            raise OptionError(
-                "a plan needs either patches, each with its tension, or one tension= for all", what="tension"
-            )
-        if self.patches:
-            for key, usual in (("pressure", 1.0), ("weight", 0.0)):
-                if getattr(self, key) != usual:
-                    problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"
-                    raise OptionError(f"{problem} give it to each of the patches", what=key)
-        names = [d.name for d in self.dividers if d.wall is not None] + [a.name for a in self.patches]
+            problem = "a plan needs either patches, each with its tension, or one tension= for all"
+            raise OptionError(problem, what="tension")
+        for key, usual in (("pressure", 1.0), ("weight", 0.0)) if self.patches else ():
+            if getattr(self, key) != usual:
+                problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"
+                raise OptionError(f"{problem} give it to each of the patches", what=key)
+        names = [d.name for d in self.dividers if d.wall is not None] + [p.name for p in self.patches]
         names += [d.name for d in self.dividers if d.wall is None and d.cable is not None]
         names += dict.fromkeys(c.name for c in self.cables if c.name)
         for what, texts in (("name", names), ("points", self.points), ("rooms", self.rooms)):
             for text in texts:
                 checked_name(what, text)
-        taken: set[str] = set()
-        for name in names:
-            if name in taken:
+        for name, times in Counter(names).items():
+            if times > 1:
                 problem = f"the name {name!r} is used twice; each patch, wall and cable needs its own"
                 raise OptionError(problem, what="name", found=name)
-            taken.add(name)
 
     def __repr__(self) -> str:
         """Size, outline, patches, dividers and holes, a line each."""
-        return summary(self)
+        width, depth = np.ptp(self.outline.at(self.outline.dense), axis=0)[:2].tolist()
+        parts = {
+            "patches": [_patch_text(patch) for patch in self.patches] or [f"all (tension {self.tension:g})"],
+            "dividers": [_divider_text(divider) for divider in self.dividers],
+            "holes": [f"{hole.name.removeprefix('hole ')} ({hole.edge})" for hole in self.holes],
+            "cables": [f"{line.name or 'cable'} (tension {line.tension:g})" for line in self.cables],
+            "rooms": [f"{name} (volume {room.volume:g})" for name, room in self.rooms.items()],
+            "points": list(self.points),
+        }
+        edge = self.edge if self.cable is None else f"{self.edge} of tension {self.cable:g}"
+        if self.supports:
+            curves = sum(isinstance(support, Curve) for support in self.supports)
+            edge += f"; {len(self.supports) - curves} points and {curves} curves are held"
+        edge += f"; mirror images beyond {len(self.mirrors)} edges" if self.mirrors else ""
+        lines = [f"Plan of {width:.4g} × {depth:.4g}, edge length {self.edge_length:g}", f"  outline: {edge}"]
+        return "\n".join([*lines, *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts)])
 
     @property
     def corners(self) -> Floats:
@@ -186,7 +195,7 @@ def patch_names(plan: Plan) -> tuple[str, ...]:
     ('patch 1', 'patch 2')
     """
     if plan.patches:
-        return tuple(area.name for area in plan.patches)
+        return tuple(patch.name for patch in plan.patches)
     with _needs_shapely():
         from .draft import part_count
     return tuple(f"patch {k + 1}" for k in range(part_count(plan)))
@@ -216,3 +225,16 @@ def plan_from(data: Mapping[str, Any]) -> Plan:
         check_keys(values["plane"], Plane, "plane")
         values["plane"] = Plane(**values["plane"])
     return Plan(**values)
+
+
+def _patch_text(patch: PatchSpec) -> str:
+    load = f"pressure {patch.pressure:g}" if patch.volume is None else f"volume {patch.volume:g}"
+    snow = f", snow {patch.snow:g}" if patch.snow else ""
+    return f"{patch.name} (tension {patch.tension:g}, {load}{snow})"
+
+
+def _divider_text(divider: Divider) -> str:
+    wall = f"{divider.wall:g}" if isinstance(divider.wall, int | float) else divider.wall
+    loads = {"wall": wall, "cable": None if divider.cable is None else f"{divider.cable:g}"}
+    texts = [f"{name} {value}" for name, value in loads.items() if value is not None]
+    return f"{divider.name} ({', '.join(texts) or 'no wall'})"

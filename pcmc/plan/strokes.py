@@ -21,7 +21,7 @@ from ..base.files import check_regular, system_error
 from ..base.units import unit_in_file
 from ..curves.curves import Curve
 from ..curves.pieces import Piece
-from ..io.reading_process import read_arrays
+from ..io.libraries import read_arrays
 
 LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
 """The suffixes of drawings, and the libraries that read them."""
@@ -33,21 +33,12 @@ ROUNDING = 1e-9  # of a stroke's length: pieces nearer to each other than this a
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """An entity of a drawing.
+    """An entity of a drawing: a curve, a point or a text."""
 
-    Attributes
-    ----------
-    layer : its name in the drawing.
-    label : what to look for in the drawing: kind and handle, such as "LINE 2F".
-    curve : None for a point or a text.
-    point : (3,) of a point or a text.
-    text : None for a curve or a point.
-    """
-
-    layer: str
-    label: str
+    layer: str  # its name in the drawing
+    label: str  # what to look for in the drawing: kind and handle, such as "LINE 2F"
     curve: Curve | None = None
-    point: Floats | None = None
+    point: Floats | None = None  # (3,) of a point or a text
     text: str | None = None
 
 
@@ -92,14 +83,14 @@ def read_strokes(path: Path) -> Strokes:
 def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:
     """The strokes of an entity: one, or several where its pieces do not follow each other."""
     label, layer = f"{entity['kind']} {entity['handle']}", entity["layer"]
+    place = f"layer {layer!r}, {label}"
     if "point" in entity:
-        point = _coordinates([entity["point"]], layer, label)[0]
         text = entity.get("text")
-        return [Stroke(layer, label, point=point, text=None if text is None else _plain(text))]
-    pieces = [piece for raw in entity["pieces"] for piece in _pieces(raw, layer, label)]
+        text = None if text is None else re.sub(r"\s+", " ", text).strip()[:200]
+        return [Stroke(layer, label, point=_coordinates([entity["point"]], layer, place)[0], text=text)]
     runs: list[list[Piece]] = []
     before = np.zeros(3)
-    for piece in pieces:
+    for piece in (piece for raw in entity["pieces"] for piece in _pieces(raw, layer, place)):
         ends = piece.at(np.array([0.0, 1.0])) if piece.sweep else piece.points[[0, -1]]
         size = float(np.linalg.norm(piece.points, axis=1).max())
         if not piece.sweep and np.ptp(piece.points, axis=0).max() <= 1e-14 * size:
@@ -112,42 +103,32 @@ def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:
     return [Stroke(layer, label, Curve(tuple(run))) for run in runs]
 
 
-def _plain(text: str) -> str:
-    return re.sub(r"\s+", " ", text).strip()[:200]
-
-
-def _coordinates(points: Any, layer: str, label: str) -> Floats:
+def _coordinates(points: Any, layer: str, place: str) -> Floats:
     """(k,3) the points, all of them numbers of a size that a roof may have."""
     P = np.array(points, dtype=np.float64).reshape(-1, 3)
     bad = np.flatnonzero(~(np.abs(P) <= LARGEST).all(axis=1))
     if len(bad):
         found = P[bad[0]].tolist()
-        text = f"layer {layer!r}, {label}: its point {found} is not a number up to {LARGEST:g}; draw it again"
+        text = f"{place}: its point {found} is not a number up to {LARGEST:g}; draw it again"
         raise FileError(text, where=layer, found=found)
     return P
 
 
-def _pieces(raw: tuple[Any, ...], layer: str, label: str) -> list[Piece]:
+def _pieces(raw: tuple[Any, ...], layer: str, place: str) -> list[Piece]:
     """The pieces of a raw piece of ``reading_drawings``."""
     kind, *values = raw
-    if kind == "bezier":
-        return [Piece(_coordinates(values[0], layer, label))]
-    if kind == "arc":
-        return [Piece(_coordinates(values[0], layer, label), float(values[1]))]
+    if kind != "nurbs":
+        return [Piece(_coordinates(values[0], layer, place), float(values[1]) if kind == "arc" else 0.0)]
     degree, knots, points, weights = values
-    P = _coordinates(points, layer, label)
+    P = _coordinates(points, layer, place)
     t = np.array(knots, dtype=np.float64)
     w = np.ones(len(P)) if weights is None else np.array(weights, dtype=np.float64)
     sound = 1 <= degree <= HIGHEST_DEGREE and len(t) == len(P) + degree + 1 and len(w) == len(P) > degree
     if not sound or not np.isfinite(t).all() or (np.diff(t) < 0.0).any() or not (w > 0.0).all():
-        text = (
-            f"layer {layer!r}, {label}: its knots, weights and degree {degree} make no spline; draw it again"
-        )
+        text = f"{place}: its knots, weights and degree {degree} make no spline; draw it again"
         raise FileError(text, where=layer)
-    return [
-        Piece(points, weights=None if weights is None else weight)
-        for points, weight in bezier_spans(degree, t, P, w)
-    ]
+    spans = bezier_spans(degree, t, P, w)
+    return [Piece(points, weights=None if weights is None else weight) for points, weight in spans]
 
 
 def bezier_spans(degree: int, knots: Floats, points: Floats, weights: Floats) -> list[tuple[Floats, Floats]]:

@@ -35,33 +35,41 @@ rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), i
     report = "roof.pdf"
 """
 
-from ..structure.wanted import Structure
 from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder
-from .designed import designed, opened
-from .documents import Documents, check_model, schedule_paths, schedule_works
 from .drawn import files_of, is_drawing
-from .file import Project, is_project, load, project_of, raised, read_data
-from .keys import REQUIRED, Key, Section, reference, sections
+from .file import Project, is_project, load, project_of, read_data, with_rise
+from .keys import REQUIRED, Key, Section, sections
+from .manual import json_schema, reference
 from .outcome import MOST_CHECKED, Outcome
-from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
+from .output import FileJobs, OnStep, check_outputs, paint, schedule_jobs, write_all
 from .planning import drawing_reference, project_text, proposal_text
-from .remeshing import Remeshing
-from .running import run, run_project, surface_files
+from .running import designed, opened, run, run_project, surface_files, vertex_fields
+from .settings import (
+    AccuracyWanted,
+    Output,
+    Remeshing,
+    Structure,
+    check_model,
+    check_names,
+    check_picture,
+    schedule_paths,
+)
 from .solving import solve_project
 from .start import Start, build, start_of, surface_of
 from .varied import check_varied, digest, varied
 
 __all__ = [
-    "COLOURS",
-    "MOST_CHECKED",
-    "Documents",
-    "REQUIRED",
+    "AccuracyWanted",
+    "FileJobs",
     "Key",
+    "MOST_CHECKED",
     "OnStep",
     "Outcome",
+    "Output",
     "Project",
+    "REQUIRED",
     "Remeshing",
     "Section",
     "Start",
@@ -81,24 +89,26 @@ __all__ = [
     "files_of",
     "is_drawing",
     "is_project",
+    "json_schema",
     "load",
     "opened",
     "paint",
     "project_of",
     "project_text",
     "proposal_text",
-    "raised",
     "read_data",
     "reference",
     "run",
     "run_project",
+    "schedule_jobs",
     "schedule_paths",
-    "schedule_works",
     "sections",
     "solve_project",
     "start_of",
     "surface_files",
     "surface_of",
     "varied",
+    "vertex_fields",
+    "with_rise",
     "write_all",
 ]

@@ -34,7 +34,18 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = ("plan", "mesh", "method", "options", "wanted", "search", "remeshing", "targets", "vary", "misfit")
+PARTS = (
+    "plan",
+    "mesh",
+    "method",
+    "options",
+    "wanted",
+    "search",
+    "remeshing",
+    "targets",
+    "vary",
+    "target_tolerance",
+)
 
 
 def folder() -> Path | None:

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import FileError, unknown
+from ..base.errors import FileError, PcmcError, unknown
 from ..curves.curves import CURVES
-from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target_sections
+from .keys import KINDS, OR_CURVE, REQUIRED, Section, fits, main_sections, solve_section, target_sections
 
-OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand
 LONGEST = 1023  # bits of a float's exponent
 VALUE = re.compile(r"(?<![\w.])[-+]?\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")  # a number of TOML
 Place = tuple[str, ...]  # the keys that lead to a table or a value
+
+
+@contextmanager
+def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
+    """Put the file, and the line of what was found, in front of an error's message; raise it as ``kind``."""
+    try:
+        yield
+    except PcmcError as error:
+        line = 0 if str(error).startswith("line ") else line_with(path, error.found)
+        raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
 def check_keys(text: str, data: Mapping[str, Any]) -> None:
@@ -31,14 +41,19 @@ def check_keys(text: str, data: Mapping[str, Any]) -> None:
     targets = target_sections() if "targets" in data else ()
     drawn = isinstance(data.get("plan"), Mapping) and "drawing" in data["plan"]
     for section in (*below, solve_section(str(method)), *targets):
-        if drawn and section.name in (
-            *OR_CURVE,
-            "plan.cables",
-        ):  # the drawing may have the curve of that name
+        if drawn and section.name in (*OR_CURVE, "plan.cables"):  # the drawing may have that curve
             keys = (replace(key, default=None) if key.name == "curve" else key for key in section.keys)
             section = replace(section, keys=tuple(keys))
-        for place, table in _tables(data, section):
-            _check_table(text, section, place, table)
+        found: list[tuple[Place, Any]] = [((), data)]
+        for step in section.name.split("."):
+            if step == "NAME":
+                found = [((*p, str(name)), t) for p, table in found for name, t in table.items()]
+            else:
+                values = [((*p, step), table[step]) for p, table in found if step in table]
+                found = [(p, t) for p, v in values for t in (v if isinstance(v, list) else [v])]
+        for place, table in found:
+            if not section.is_curve(table) if isinstance(table, Mapping) else section.name.endswith("NAME"):
+                _check_table(text, section, place, table)
 
 
 def _check_range(text: str, value: Any, place: Place) -> None:
@@ -54,37 +69,18 @@ def _check_range(text: str, value: Any, place: Place) -> None:
         raise _error(text, place, message, expected="a number up to 1.8e308")
 
 
-def _tables(data: Any, section: Section) -> Iterator[tuple[Place, Any]]:
-    """The tables of the file that a section describes, each with its place."""
-    found: list[tuple[Place, Any]] = [((), data)]
-    for step in section.name.split("."):
-        if step == "NAME":
-            found = [((*p, str(name)), t) for p, table in found for name, t in table.items()]
-        else:
-            below = [((*p, step), table[step]) for p, table in found if step in table]
-            found = [(p, t) for p, value in below for t in (value if isinstance(value, list) else [value])]
-    for place, table in found:
-        if not is_curve(section, table) if isinstance(table, Mapping) else section.name.endswith("NAME"):
-            yield place, table
-
-
-def is_curve(section: Section, table: Mapping[str, Any]) -> bool:
-    """Whether the table of a divider or hole is a curve itself."""
-    return section.name in OR_CURVE and "curve" not in table and any(name in CURVES for name in table)
-
-
 def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
     if not isinstance(table, Mapping):
         raise _wrong_kind(text, place, table, "a table")
     known = {key.name: key for key in section.keys}
     title = f"[{'.'.join(place)}]" if place else "the project"
     for name, value in table.items():
-        key = known.get(name)
-        if key is not None and not KINDS[key.kind](value):
-            raise _wrong_kind(text, (*place, name), value, key.kind)
+        key, at = known.get(name), (*place, name)
+        if key is not None and not fits(value, KINDS[key.kind]):
+            raise _wrong_kind(text, at, value, key.kind)
         if key is not None and key.choices and value not in key.choices:
-            message = f"{'.'.join((*place, name))}: {unknown('value', value, key.choices)}"
-            raise _error(text, (*place, name), message, found=value, expected=key.choices)
+            message = f"{'.'.join(at)}: {unknown('value', value, key.choices)}"
+            raise _error(text, at, message, found=value, expected=key.choices)
     for name in table:
         if name not in known:
             curves = CURVES if section.name in OR_CURVE and "curve" not in table else ()

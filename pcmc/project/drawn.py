@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
@@ -12,8 +11,9 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
-from ..base.files import as_path, check_name, check_regular
+from ..base.files import PathLike, as_path, check_name, check_regular
 from ..base.units import LENGTHS
+from .checking import in_file
 
 if TYPE_CHECKING:
     from ..plan.drawing import Drawing
@@ -38,7 +38,7 @@ def is_drawing(path: Path) -> bool:
     return False
 
 
-def files_of(path: str | os.PathLike[str]) -> list[Path]:
+def files_of(path: PathLike) -> list[Path]:
     """The files that a project depends on: itself, and the drawing or the mesh that it refers to.
 
     A project that cannot be read depends on itself alone, so that a page which follows these files sees it
@@ -71,6 +71,30 @@ class Chosen:
     edge_length: float | None = None
     cables: Mapping[str, float] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing) -> Chosen:
+        """What the ``full`` plan of a drawing has beyond the ``given`` one and the drawing."""
+
+        def named(key: str, has: str) -> set[str]:
+            entries = (entry for entry in given.get(key, []) if isinstance(entry, Mapping))
+            return {entry["name"] for entry in entries if has in entry and "name" in entry}
+
+        labelled = {label.name for label in drawing.labels if label.tension is not None}
+        labelled |= {name for name, values in given.get("patches", {}).items() if "tension" in values}
+        patches = {} if "tension" in given else full["patches"]
+        dividers = [
+            e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers
+        ]
+        walls = {e["name"]: e["wall"] for e in dividers if e["wall"] is not False}
+        cables = {e["name"]: e["tension"] for e in full.get("cables", []) if e.get("name") in drawing.cables}
+        outline = {"": full["cable"]} if "cable" in full and "cable" not in given else {}
+        return cls(
+            {name: patch["tension"] for name, patch in patches.items() if name not in labelled},
+            {name: wall for name, wall in walls.items() if name not in named("dividers", "wall")},
+            None if "edge_length" in given else full["edge_length"],
+            outline | {name: t for name, t in cables.items() if name not in named("cables", "tension")},
+        )
+
     @property
     def text(self) -> str:
         """All of it in a line, with what to type to choose; empty if nothing was proposed.
@@ -78,48 +102,26 @@ class Chosen:
         >>> Chosen({"nave": 5.4}, {"chancel": 1.6}).text.split(" (")[0]
         "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
         """
-        values = {"tension": self.tensions, "wall": self.walls, "cable": self.cables}
-        parts = [_by_value(what, named) for what, named in values.items() if named]
-        keys = [f'"{name}" = {{tension = ...}} under [plan.patches]' for name in list(self.tensions)[:1]]
-        keys += [f'[[plan.dividers]] name = "{name}", wall = ...' for name in list(self.walls)[:1]]
-        for name in list(self.cables)[:1]:
-            keys.append(
-                f'[[plan.cables]] name = "{name}", tension = ...' if name else "cable = ... under [plan]"
-            )
+        named = next(iter(self.cables), "")  # the outline's cable has none
+        cable = '[[plan.cables]] name = "{}", tension = ...' if named else "cable = ... under [plan]"
+        kinds = {
+            "tension": (self.tensions, '"{}" = {{tension = ...}} under [plan.patches]'),
+            "wall": (self.walls, '[[plan.dividers]] name = "{}", wall = ...'),
+            "cable": (self.cables, cable),
+        }
+        parts, keys = [], []
+        for what, (values, key) in kinds.items():
+            groups: dict[float, list[str]] = {}  # the names of each value
+            for name, value in values.items():
+                groups.setdefault(value, []).append(repr(name) if name else "the outline")
+            parts += [f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items()]
+            keys += [key.format(name) for name in list(values)[:1]]
         if self.edge_length is not None:
             parts.append(f"edges of {self.edge_length:g}")
             keys.append("edge_length = ... under [plan]")
         if not parts:
             return ""
         return f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
-
-
-def _by_value(what: str, named: Mapping[str, float]) -> str:
-    """Names with their values, those of one value together."""
-    groups: dict[float, list[str]] = {}
-    for name, value in named.items():
-        groups.setdefault(value, []).append(repr(name) if name else "the outline")
-    return "; ".join(f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items())
-
-
-def _chosen(given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing) -> Chosen:
-    """What a plan has for a drawing beyond what is given."""
-    said = {label.name for label in drawing.labels if label.tension is not None}
-    said |= {name for name, values in given.get("patches", {}).items() if "tension" in values}
-    walled = {
-        e["name"] for e in given.get("dividers", []) if isinstance(e, Mapping) and "wall" in e and "name" in e
-    }
-    areas = {} if "tension" in given else full["patches"]
-    tensioned = {e["name"] for e in given.get("cables", []) if "tension" in e and "name" in e}
-    cables = {e["name"]: e["tension"] for e in full.get("cables", []) if e.get("name") in drawing.cables}
-    outline = {"": full["cable"]} if "cable" in full and "cable" not in given else {}
-    own = [e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers]
-    return Chosen(
-        {name: area["tension"] for name, area in areas.items() if name not in said},
-        {e["name"]: e["wall"] for e in own if e["name"] not in walled and e["wall"] is not False},
-        None if "edge_length" in given else full["edge_length"],
-        outline | {name: tension for name, tension in cables.items() if name not in tensioned},
-    )
 
 
 def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
@@ -135,16 +137,16 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     PlanError, OptionError : for a drawing that is no plan, and for values that do not fit it.
     """
     plan = dict(data["plan"])
-    name = plan.pop("drawing", None)
-    gap = plan.pop("gap", None)
-    if name is None:
-        if gap is not None:
-            raise FileError(f"{path}: plan.gap is for a drawing; add drawing = or remove it", what="plan.gap")
-        return data, None, Chosen()
-    if "outline" in plan:
-        text = f"{path}: a plan has an outline or a drawing, not both; remove one of them"
-        raise FileError(text, what="plan.outline")
-    check_beside(path, name, "drawing")
+    name, gap = plan.pop("drawing", None), plan.pop("gap", None)
+    with in_file(path):
+        if name is None and gap is not None:
+            raise FileError("plan.gap is for a drawing; add drawing = or remove it", what="plan.gap")
+        if name is None:
+            return data, None, Chosen()
+        if "outline" in plan:
+            text = "a plan has an outline or a drawing, not both; remove one of them"
+            raise FileError(text, what="plan.outline")
+        check_beside(name, "drawing")
     drawing = read(path.parent / name, str(data.get("units", "")), gap)
     from ..plan.proposal import proposed
 
@@ -156,25 +158,38 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     if drawing.units:
         full["units"] = drawing.units
     if len(drawing.heights) and "targets" not in data:
-        points = (drawing.heights - [0.0, 0.0, drawing.level]).tolist()
-        meet = [{"quantity": "height", "of": [x, y], "value": z} for x, y, z in points]
-        full["targets"] = {"meet": meet, "vary": list(lines["patches"])}
-    return full, drawing, _chosen(plan, lines, drawing)
+        full["targets"] = {"meet": height_targets(drawing), "vary": list(lines["patches"])}
+    return full, drawing, Chosen.of(plan, lines, drawing)
 
 
-def check_beside(path: Path, name: str, kind: str) -> None:
-    """Refuse a file outside the folder of the project that refers to it.
+def height_targets(drawing: Drawing) -> list[dict[str, Any]]:
+    """The points of the layer "height" as targets of a project."""
+    points = (drawing.heights - [0.0, 0.0, drawing.level]).tolist()
+    return [{"quantity": "height", "of": [x, y], "value": z} for x, y, z in points]
 
-    >>> check_beside(Path("hall.toml"), "../hall.dxf", "drawing")
-    Traceback (most recent call last):
-    ...
-    pcmc.base.errors.FileError: hall.toml: the drawing '../hall.dxf' is outside the project's folder; put it
-    beside the project
+
+def leads_outside(name: str) -> bool:
+    """Whether a name leads out of a folder; FileError for one that no file can have.
+
+    >>> leads_outside("plans/hall.dxf"), leads_outside("../hall.dxf"), leads_outside("C:hall.dxf")
+    (False, True, True)
     """
     check_name(Path(name))
     windows = PureWindowsPath(name)  # knows both kinds of slashes
-    if windows.drive or windows.root or ".." in windows.parts:
-        text = f"{path}: the {kind} {name!r} is outside the project's folder; put it beside the project"
+    return bool(windows.drive or windows.root or ".." in windows.parts)
+
+
+def check_beside(name: str, kind: str) -> None:
+    """Refuse a drawing or mesh outside the folder of the project that refers to it.
+
+    >>> check_beside("../hall.dxf", "drawing")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.FileError: the drawing '../hall.dxf' is outside the project's folder; put it beside
+    the project
+    """
+    if leads_outside(name):
+        text = f"the {kind} {name!r} is outside the project's folder; put it beside the project"
         raise FileError(text, what=f"plan.{kind}" if kind == "drawing" else kind, found=name)
 
 

@@ -1,9 +1,9 @@
-"""Every section and key of a project file: the table behind the checks and the manual."""
+"""Every section and key of a project file: the table behind its checks, the manual and the JSON Schema."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from inspect import cleandoc
@@ -13,26 +13,94 @@ from ..accuracy.adaptive import ACCURACY_OF
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
+from ..curves.curves import CURVES
 from ..drawings import FORMATS
 from ..meshing.walls import EDGES
-from ..plan import Area, CableLine, Divider, Hole, Plan
+from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from ..surface import Plane
-from .accuracy import AccuracyWanted
-from .documents import Documents
-from .mesh import PATCH_KEYS, MeshFile
-from .output import COLOURS
-from .remeshing import WHEN, Remeshing
+from .settings import COLOURS, PATCH_KEYS, WHEN, AccuracyWanted, MeshFile, Output, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME; see ``pcmc.margin``"
 PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
-WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
-FIRST = "First lines"  # the keys before any table
-WALL = 'a number, "balanced" or false'
+VARIED = "what may change; a name is a patch whose tension may, a list of names several with one tension"
 REQUIRED = MISSING  # the default of a key that must be given
+OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand
+
+Schema = dict[str, Any]  # in the terms of JSON Schema
+WALL = 'a number, "balanced" or false'
+TABLE: Schema = {"type": "object"}
+_NUMBER: Schema = {"type": "number"}
+_NAME: Schema = {"type": "string"}
+_LIST: Schema = {"type": "array"}
+
+
+def _any_of(*schemas: Schema) -> Schema:
+    return {"anyOf": list(schemas)}
+
+
+def _list_of(*schemas: Schema) -> Schema:
+    return {"type": "array", "items": _any_of(*schemas)}
+
+
+KINDS: dict[str, Schema] = {
+    "a value": {},
+    "a number": _NUMBER,
+    WALL: _any_of(_NUMBER, {"enum": [BALANCED, False]}),
+    "a whole number": {"type": "integer"},
+    "true or false": {"type": "boolean"},
+    "a text": _NAME,
+    "a table": TABLE,
+    "a table or a list of tables": _any_of(TABLE, _list_of(TABLE)),
+    "a list of tables": _list_of(TABLE),
+    "a list of curves or tables": _list_of(_LIST, TABLE),
+    "a list of points and curves": _list_of(_LIST, TABLE),
+    "a list of names": _list_of(_NAME),
+    "a list of names, lists of names, or tables": _list_of(_NAME, _LIST, TABLE),
+    "a name or a table": _any_of(_NAME, TABLE),
+    "a name or a list": _any_of(_NAME, _LIST),
+    "a name or a list of names": _any_of(_NAME, _list_of(_NAME)),
+    "a list of points": _list_of(_LIST),
+    "a curve": _any_of(_LIST, TABLE),
+    "a point [x, y, z]": _list_of(_NUMBER) | {"minItems": 3, "maxItems": 3},
+    "a point [x, y] or a list of points": _LIST,
+    "a name or a point [x, y]": _any_of(_NAME, _LIST),
+    "a list of views": _list_of(_NAME, _LIST),
+    "a name or two angles": _any_of(_NAME, _LIST),
+}
+"""What the value of a key may be, in words and as a JSON Schema."""
+
+_TYPES: dict[str, Any] = {
+    "number": int | float,
+    "integer": int,
+    "boolean": bool,
+    "string": str,
+    "array": list,
+    "object": Mapping,
+}
+_KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}
+
+
+def fits(value: Any, schema: Schema) -> bool:
+    """Whether a value is of a kind.
+
+    >>> fits([0, 0, 1], KINDS["a point [x, y, z]"]), fits(True, KINDS["a number"])
+    (True, False)
+    """
+    if "anyOf" in schema:
+        return any(fits(value, one) for one in schema["anyOf"])
+    if "enum" in schema:
+        return value in schema["enum"]
+    kind = schema.get("type")
+    if kind and (not isinstance(value, _TYPES[kind]) or isinstance(value, bool) != (kind == "boolean")):
+        return False
+    if not isinstance(value, list) or "items" not in schema:
+        return True
+    enough = schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value))
+    return enough and all(fits(item, schema["items"]) for item in value)
 
 
 @dataclass(frozen=True)
@@ -74,92 +142,31 @@ class Section:
     keys: tuple[Key, ...] = field(repr=False)
     condition: str = ""
 
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _list_of(*kinds: type) -> Callable[[Any], bool]:
-    return lambda value: isinstance(value, list) and all(isinstance(v, kinds) for v in value)
+    def is_curve(self, table: Mapping[str, Any]) -> bool:
+        """Whether the table of a divider or hole is a curve itself."""
+        return self.name in OR_CURVE and "curve" not in table and any(name in CURVES for name in table)
 
 
-KINDS: dict[str, Callable[[Any], bool]] = {
-    "a value": lambda value: True,
-    "a number": _number,
-    WALL: lambda value: value is False or _number(value) or value == BALANCED,
-    "a whole number": lambda value: _number(value) and isinstance(value, int),
-    "true or false": lambda value: isinstance(value, bool),
-    "a text": lambda value: isinstance(value, str),
-    "a table": lambda value: isinstance(value, Mapping),
-    "a table or a list of tables": lambda value: isinstance(value, Mapping) or _list_of(Mapping)(value),
-    "a list of tables": _list_of(Mapping),
-    "a list of curves or tables": _list_of(list, Mapping),
-    "a list of points and curves": _list_of(list, Mapping),
-    "a list of names": _list_of(str),
-    "a list of names or tables": _list_of(str, Mapping),
-    "a list of names, lists of names, or tables": _list_of(str, list, Mapping),
-    "a name or a table": lambda value: isinstance(value, str | Mapping),
-    "a name or a list": lambda value: isinstance(value, str | list),
-    "a name or a list of names": lambda value: isinstance(value, str) or _list_of(str)(value),
-    "a list of points": _list_of(list),
-    "a curve": lambda value: isinstance(value, list | Mapping),
-    "a point [x, y, z]": lambda value: _list_of(int, float)(value) and len(value) == 3,
-    "a point [x, y] or a list of points": lambda value: isinstance(value, list),
-    "a name or a point [x, y]": lambda value: isinstance(value, str | list),
-    "a list of views": _list_of(str, list),
-    "a name or two angles": lambda value: isinstance(value, str | list),
-}
+def _of_class(cls: Any, **about: str | Sequence[str]) -> tuple[Key, ...]:
+    """A key for each field of a dataclass: its default, and its sentence from the docstring.
 
-_KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}
-
-
-def _of_class(
-    cls: Any, kinds: Mapping[str, str] | None = None, choices: Mapping[str, tuple[str, ...]] | None = None
-) -> tuple[Key, ...]:
-    """A key for each field of a dataclass: its default, and its sentence from the docstring."""
-    help_of = {}
+    ``about`` has the kinds that types do not tell, and the choices of texts.
+    """
+    help_of: dict[str, str] = {}
     for entry in re.finditer(r"^([\w, ]+) : (.*(?:\n    .*)*)", cleandoc(cls.__doc__ or ""), re.M):
         help_of.update(dict.fromkeys(entry[1].split(", "), " ".join(entry[2].split())))
-    return tuple(
-        Key(
-            f.name,
-            (kinds or {}).get(f.name) or _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"), "a value"),
-            None if f.default_factory is not MISSING else f.default,
-            help_of.get(f.name, ""),
-            (choices or {}).get(f.name, ()),
+    keys = []
+    for f in fields(cls):
+        given = about.get(f.name, ())
+        kind = (
+            given
+            if isinstance(given, str) and given
+            else _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"))
         )
-        for f in fields(cls)
-    )
-
-
-def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
-    """The keys of [plan]: those of a Plan, and the drawing that may stand for its lines."""
-    outline, *others = _of_class(Plan, kinds, {"edge": EDGES})
-    drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
-    gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
-    return (
-        replace(outline, unless=("drawing",)),
-        Key("drawing", "a text", None, drawing),
-        Key("gap", "a number", None, gap),
-        *others,
-        *_rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:]),
-    )
-
-
-def _mesh_keys() -> tuple[Key, ...]:
-    """The keys of [mesh]."""
-    kinds = {"file": "a text", "tension": "a number", "patches": "a table", "supports": "a name or a list"}
-    keys = _of_class(MeshFile, kinds, {"units": LENGTHS})
-    own = (
-        replace(key, default=REQUIRED) if key.name == "file" else key for key in keys if key.name != "rises"
-    )
-    return (*own, *_rise_keys("found by one tension of all patches under pressure", RISES))
-
-
-def _mesh_patch_keys() -> tuple[Key, ...]:
-    """The keys of a patch of a mesh, with the sentences of a plan's."""
-    wall = Key("wall", "true or false", None, "whether it is a wall between rooms")
-    return (*(Key(k.name, k.kind, None, k.help) for k in _of_class(Area) if k.name in PATCH_KEYS), wall)
+        default = None if f.default_factory is not MISSING else f.default
+        choices = () if isinstance(given, str) else tuple(given)
+        keys.append(Key(f.name, kind or "a value", default, help_of.get(f.name, ""), choices))
+    return tuple(keys)
 
 
 def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
@@ -172,16 +179,60 @@ def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
     return tuple(Key(name, "a number", None, f"{meanings[name]}, {how}") for name in names)
 
 
+def _plan_keys() -> tuple[Key, ...]:
+    """The keys of [plan]: those of a Plan, and the drawing that may stand for its lines."""
+    curves, tables = "a list of curves or tables", "a list of tables"
+    outline, *others = _of_class(
+        Plan,
+        outline="a curve",
+        dividers=curves,
+        holes=curves,
+        patches="a table",
+        edge=EDGES,
+        supports="a list of points and curves",
+        plane="a table",
+        cables=tables,
+        mirrors=curves,
+        rooms="a table",
+        points="a table",
+    )
+    drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
+    gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
+    return (
+        replace(outline, unless=("drawing",)),
+        Key("drawing", "a text", None, drawing),
+        Key("gap", "a number", None, gap),
+        *others,
+        *_rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:]),
+    )
+
+
 @cache
 def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
-    curve, curves = {"curve": "a curve"}, "a list of curves or tables"
-    plan = {"outline": "a curve", "dividers": curves, "holes": curves, "patches": "a table"}
-    plan |= {"supports": "a list of points and curves", "plane": "a table", "cables": "a list of tables"}
-    plan |= {"mirrors": "a list of curves or tables", "rooms": "a table", "points": "a table"}
-    area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
-    directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
-    documents = {"drawings": "a list of names", "panels": "a text", "structure": "a text", "report": "a text"}
+    area = _of_class(PatchSpec, at="a point [x, y] or a list of points")
+    mesh = _of_class(
+        MeshFile,
+        file="a text",
+        units=LENGTHS,
+        tension="a number",
+        patches="a table",
+        supports="a name or a list",
+    )
+    wall = Key("wall", "true or false", None, "whether it is a wall between rooms")
+    output = _of_class(
+        Output,
+        files="a list of names",
+        picture="a text",
+        view="a name or two angles",
+        views="a list of views",
+        colour=COLOURS,
+        drawings="a list of names",
+        sheet=tuple(FORMATS),
+        panels="a text",
+        structure="a text",
+        report="a text",
+    )
     return (
         Section(
             "",
@@ -190,12 +241,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("units", "a text", None, "of lengths: plan, heights, files and pictures", LENGTHS),
                 Key("force", "a text", None, "of forces; tensions are in ``force`` / ``units``", FORCES),
                 Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan", unless=("mesh",)),
-                Key(
-                    "mesh",
-                    "a name or a table",
-                    None,
-                    "the roof, by the triangles in a file beside it",
-                ),
+                Key("mesh", "a name or a table", None, "the roof, by the triangles in a file beside it"),
                 Key("solve", "a table", None, "the solver and its options"),
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
                 Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
@@ -203,7 +249,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("output", "a table", None, "the files, the picture and the documents to write"),
             ),
         ),
-        Section("plan", "The roof, by the lines of its plan.", _plan_keys(plan)),
+        Section("plan", "The roof, by the lines of its plan.", _plan_keys()),
         Section(
             "plan.patches.NAME",
             "A patch; NAME is its name.",
@@ -215,20 +261,22 @@ def main_sections() -> tuple[Section, ...]:
         Section(
             "plan.dividers",
             "A line between patches, with a wall below it. A curve alone is a divider, too.",
-            _of_class(Divider, curve | {"wall": WALL}, {"bottom": BOTTOMS}),
+            _of_class(Divider, curve="a curve", wall=WALL, bottom=BOTTOMS),
         ),
         Section(
-            "plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole, curve, {"edge": EDGES})
+            "plan.holes",
+            "An opening. A curve alone is a hole, too.",
+            _of_class(Hole, curve="a curve", edge=EDGES),
         ),
         Section(
             "plan.cables",
             "A part of the outline or of a hole that is free and carries a cable.",
-            _of_class(CableLine, curve | {"tension": "a number"}),
+            _of_class(CableLine, curve="a curve", tension="a number"),
         ),
         Section(
             "plan.rooms.NAME",
             "A room under several patches; NAME is its name.",
-            _of_class(RoomData, {"patches": "a list of names"}),
+            _of_class(RoomData, patches="a list of names"),
         ),
         Section(
             "plan.plane",
@@ -238,51 +286,50 @@ def main_sections() -> tuple[Section, ...]:
                 Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
             ),
         ),
-        Section("mesh", "The roof, by the triangles in a file.", _mesh_keys()),
-        Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", _mesh_patch_keys()),
+        Section(
+            "mesh",
+            "The roof, by the triangles in a file.",
+            (
+                *(key for key in mesh if key.name != "rises"),
+                *_rise_keys("found by one tension of all patches under pressure", RISES),
+            ),
+        ),
+        Section(
+            "mesh.patches.NAME",
+            "A patch of the mesh; NAME is its name.",
+            (*(replace(key, default=None) for key in area if key.name in PATCH_KEYS), wall),
+        ),
         Section(
             "remesh",
             "Other triangles, before or after solving; [[remesh]] if there are several.",
-            _of_class(Remeshing, choices={"when": WHEN}),
+            _of_class(Remeshing, when=WHEN),
         ),
         Section(
             "structure",
             "The structural model that `pcmc structure` writes, in the units of the surface.",
-            _of_class(Structure, {"young": "a number", "wind": "a table"}),
+            _of_class(Structure, young="a number", wind="a table"),
         ),
-        Section(
-            "output",
-            "What to write: all of it, or nothing. Without it nothing is written.",
-            (
-                Key("files", "a list of names", [], "files of the surface; the suffix names the format"),
-                Key("picture", "a text", None, "name of a picture, .png, .svg or .pdf"),
-                Key("view", "a name or two angles", "diagonal", directions),
-                Key("views", "a list of views", None, "of the picture, side by side, instead of ``view``"),
-                Key("colour", "a text", "patches", "of the picture", COLOURS),
-                Key("whole", "true or false", False, WHOLE),
-                *_of_class(Documents, documents, {"sheet": tuple(FORMATS)}),
-            ),
-        ),
+        Section("output", "What to write: all of it, or nothing. Without it nothing is written.", output),
     )
 
 
 @cache
 def solve_section(method: str) -> Section:
     """The keys of [solve] for a method; for one that does not exist ``method`` alone."""
-    known = (
+    keys: tuple[Key, ...] = (
         Key("method", "a text", "newton", "the solver", tuple(METHODS)),
         Key("mesh_check", "true or false", None, CHECKED),
-        Key("margin", "a list of names", [], MARGIN),
+        Key("margin", "a list of names", (), MARGIN),
         Key("verify", "true or false", False, PROVED),
     )
+    help = "The solver and its options."
     if method not in METHODS:
-        return Section("solve", "The solver and its options.", known)
-    choices = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}
-    options = _of_class(find_method(method).options, choices=choices)
-    keys = (*known, *options)
+        return Section("solve", help, keys)
+    target, armijo = ("minimum", "stationary"), ("printed", "sufficient")
+    keys += _of_class(find_method(method).options, target=target, armijo=armijo)
     if method == "newton":
-        keys += _of_class(AccuracyWanted, {"accuracy": "a table"}, {"accuracy_of": ACCURACY_OF})
-    return Section("solve", "The solver and its options.", keys, f'method = "{method}"')
+        keys += _of_class(AccuracyWanted, accuracy="a table", accuracy_of=ACCURACY_OF)
+    return Section("solve", help, keys, f'method = "{method}"')
 
 
 @cache
@@ -294,18 +341,15 @@ def target_sections() -> tuple[Section, ...]:
     from ..design.targets import SHORT
     from ..margins.targets import Target
 
-    changing = _of_class(
-        Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}
-    )
-    varied = "what may change; a name is a patch whose tension may, a list of names several with one tension"
-    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": (*MEASURES, *SHORT)})
+    wanted = _of_class(Target, of="a name or a point [x, y]", quantity=(*MEASURES, *SHORT))
+    changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)
     return (
         Section(
             "targets",
             "Quantities to be met by changing tensions, pressures, cables, weights or volumes.",
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
-                Key("vary", "a list of names, lists of names, or tables", REQUIRED, varied),
+                Key("vary", "a list of names, lists of names, or tables", REQUIRED, VARIED),
                 Key("tolerance", "a number", 1e-7, "largest relative misfit of a target that counts as met"),
             ),
         ),
@@ -315,7 +359,7 @@ def target_sections() -> tuple[Section, ...]:
 
 
 ELLIPSE = "{centre = [x, y], axes = [[a, b], [c, d]], sweep = degrees}; without sweep the whole ellipse"
-_CURVE = Section(
+CURVE = Section(
     "CURVE",
     "Any curve is a list of points, or a table with one of these keys, or a list of such tables, each"
     " starting where the one before ends. Points [x, y] are on Π, points [x, y, z] in space.",
@@ -338,29 +382,4 @@ def sections() -> tuple[Section, ...]:
     ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
-    return (*main_sections(), *solve, *target_sections(), _CURVE)
-
-
-def reference() -> str:
-    """All sections and keys as Markdown, a table for each section."""
-    lines = []
-    for section in sections():
-        condition = f" with `{section.condition}`" if section.condition else ""
-        title = f"`{section.name}`" if section is _CURVE else f"`[{section.name}]`" if section.name else FIRST
-        lines += [f"## {title}{condition}", "", section.help, ""]
-        lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
-        for key in section.keys:
-            value = ", ".join(f'`"{c}"`' for c in key.choices) or key.kind
-            none = key.default is None or key.default == ()
-            default = "required" if key.default is REQUIRED else "" if none else _toml(key.default)
-            meaning = key.help.replace("``", "`").replace("|", "\\|")
-            lines.append(f"| `{key.name}` | {value} | {default} | {meaning} |")
-        lines.append("")
-    return "\n".join(lines)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return f"`{str(value).lower()}`"
-    shown = list(value) if isinstance(value, tuple) else value
-    return f"`{shown!r}`".replace("'", '"')
+    return (*main_sections(), *solve, *target_sections(), CURVE)

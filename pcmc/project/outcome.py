@@ -1,12 +1,12 @@
-"""A roof that was opened or designed, with all that other rooms ask about it, each computed once."""
+"""A roof that was opened or designed, with all that other parts of pcmc ask about it, each computed once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate, certify
 from ..solvers.result import Progress, Result
 from ..surface import Surface, mirrored, unfolded
-from .documents import Documents
+from .settings import Output
 
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 EXTENSIVE = ("area", "volume")  # targets of a part that are not those of the whole
+KEPT = ("certificate", "whole", "figures", "theorem")  # what the files written do not change
+Finding = TypeVar("Finding")
 
 
 class Whole(NamedTuple):
@@ -125,7 +127,7 @@ class Outcome:
     @property
     def shown(self) -> Whole:
         """What is written, drawn and listed: the whole roof if it is asked for, with its certificate."""
-        return Whole(self.surface, self.certificate) if self.whole is None else self.whole
+        return self.whole or Whole(self.surface, self.certificate)
 
     @cached_property
     def figures(self) -> list[Figure]:
@@ -158,24 +160,30 @@ class Outcome:
         return "" if self.project is None else self.project.path.stem
 
     @property
-    def documents(self) -> Documents:
-        """What the project says about its documents."""
-        return Documents() if self.project is None else self.project.documents
+    def output(self) -> Output:
+        """What the project writes, and how its documents are made."""
+        return Output() if self.project is None else self.project.output
 
     def written(self, files: Sequence[Path]) -> Outcome:
         """The same outcome, with these files written; what is known of it stays known."""
-        return self._same(files=files)
+        return self._with(KEPT, files=files)
 
     def unfolded(self) -> Outcome:
         """The same outcome, with the whole roof shown."""
-        return self if self.unfold else self._same(unfold=True)
+        return self if self.unfold else self._with(KEPT[:1], unfold=True)
 
-    def _same(self, **changes: Any) -> Outcome:
+    def _with(self, kept: Sequence[str], **changes: Any) -> Outcome:
         other = replace(self, **changes)
         other._known.update(self._known)
-        kept = ("certificate",) if "unfold" in changes else ("certificate", "whole", "figures", "theorem")
         vars(other).update({name: vars(self)[name] for name in kept if name in vars(self)})
         return other
+
+    def _once(self, key: tuple[Any, ...], compute: Callable[[], Finding]) -> Finding:
+        """A finding about what is shown, computed the first time."""
+        key = (self.unfold, *key)
+        if key not in self._known:
+            self._known[key] = compute()
+        return cast(Finding, self._known[key])
 
     def panels(
         self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
@@ -183,60 +191,53 @@ class Outcome:
         """The schedule of the panels of what is shown; see ``pcmc.panels``."""
         from ..panelling import panels
 
-        key = "panels", self.unfold, tolerance, mirror_images, walls
-        if key not in self._known:
-            surface, certificate = self.shown
-            self._known[key] = panels(
-                surface,
-                tolerance,
-                mirror_images=mirror_images,
-                walls=walls,
-                anyway=anyway,
-                certificate=certificate,
-            )
-        return cast("Panels", self._known[key])
+        surface, certificate = self.shown
+        options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
 
-    def drawing_set(self, documents: Documents, *, anyway: bool = False, **options: Any) -> DrawingSet:
-        """The drawings of what is shown, as ``documents`` says; ``options`` as of ``pcmc.drawing_set``."""
+        def sort() -> Panels:
+            return panels(surface, tolerance, **options, anyway=anyway, certificate=certificate)
+
+        return self._once(("panels", tolerance, *options.values()), sort)
+
+    def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
+        """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
         from ..drawings import drawing_set
 
         surface, certificate = self.shown
-        tolerance = documents.tolerance
         return drawing_set(
             surface,
             self.units,
-            sheet=documents.sheet,
-            tolerance=tolerance,
-            panel_sheets=documents.panel_sheets,
+            sheet=output.sheet,
+            tolerance=output.tolerance,
+            panel_sheets=output.panel_sheets,
             name=self.name,
             anyway=anyway,
             certificate=certificate,
-            schedule=None if tolerance is None else self.panels(tolerance, anyway=anyway),
+            schedule=None if output.tolerance is None else self.panels(output.tolerance, anyway=anyway),
             **options,
         )
 
-    def report(self, documents: Documents, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
+    def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
         from ..report import roof_report
 
         surface, certificate = self.shown
-        tolerance = documents.tolerance
         return roof_report(
             surface,
             self.units,
             name=self.name,
-            tolerance=tolerance,
+            tolerance=output.tolerance,
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
             margins=self.margins,
             theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
-            date=documents.date,
+            date=output.date,
             anyway=anyway,
             certificate=certificate,
             figures=self.figures,
-            schedule=None if tolerance is None else self.panels(tolerance, anyway=anyway),
+            schedule=None if output.tolerance is None else self.panels(output.tolerance, anyway=anyway),
         )
 
     def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
@@ -248,12 +249,12 @@ class Outcome:
     @property
     def mesh_check(self) -> MeshCheck | None:
         """The mesh check, if it was made; see ``check_mesh``."""
-        return cast("MeshCheck | None", self._known.get(("mesh check", self.unfold)))
+        return cast("MeshCheck | None", self._known.get((self.unfold, "mesh check")))
 
     @property
     def mesh_failure(self) -> str:
         """Why a mesh check that was asked for failed; empty if it did not."""
-        return str(self._known.get(("mesh failure", self.unfold), ""))
+        return str(self._known.get((self.unfold, "mesh failure"), ""))
 
     def mesh_check_wanted(self, wanted: bool | None = None) -> bool | None:
         """Whether the mesh is to be checked, as ``wanted`` or the project says; None where neither does."""
@@ -272,46 +273,35 @@ class Outcome:
         """
         from ..accuracy import check_mesh  # takes long to import
 
-        key, accurate = ("mesh check", self.unfold), self.accurate
-        if key in self._known:
-            return self.mesh_check
-        same = accurate is not None and accurate.surface is self.surface and not self.unfold
-        if accurate is not None and accurate.check is not None and same:
-            self._known[key] = accurate.check
-            return self.mesh_check
+        def check() -> MeshCheck | None:
+            found = None if self.unfold else self.accurate
+            if found is not None and found.check is not None and found.surface is self.surface:
+                return found.check
+            given = self.result if self.result is not None and not self.unfold else self.shown.surface
+            try:
+                callback = _reporter("mesh check", progress)
+                return check_mesh(given, corners=self.corners, callback=callback)
+            except PcmcError as error:  # the roof is good without it
+                self._known[self.unfold, "mesh failure"] = str(error)
+                return None
 
-        def callback(state: Progress) -> None:
-            if progress is not None:
-                progress(f"mesh check: {state.surface().m} triangles, step {state.iteration}")
-
-        shown = self.surface if self.whole is None else self.whole.surface
-        checked = self.result if self.whole is None and self.result is not None else shown
-        try:
-            self._known[key] = check_mesh(checked, corners=self.corners, callback=callback)
-        except PcmcError as error:  # the roof is good without it
-            self._known["mesh failure", self.unfold] = str(error)
-        return self.mesh_check
+        return self._once(("mesh check",), check)
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
         from ..margins import margin  # takes long to import
 
-        def callback(state: Progress) -> None:
-            if progress is not None:
-                progress(f"margin of {what}: {state.surface().m} triangles, step {state.iteration}")
-
-        key = "margin", self.unfold, what
-        if key not in self._known:
+        def find() -> Margin:
             surface, certificate = self.shown
-            self._known[key] = margin(
-                surface, what, corners=self.corners, callback=callback, certificate=certificate
-            )
-        return cast("Margin", self._known[key])
+            callback = _reporter(f"margin of {what}", progress)
+            return margin(surface, what, corners=self.corners, callback=callback, certificate=certificate)
+
+        return self._once(("margin", what), find)
 
     @property
     def margins(self) -> list[Margin]:
         """The margins that were found, in the order in which they were asked for."""
-        return [known for key, known in self._known.items() if key[:2] == ("margin", self.unfold)]
+        return [known for key, known in self._known.items() if key[:2] == (self.unfold, "margin")]
 
     @property
     def corners(self) -> Ints:
@@ -326,3 +316,13 @@ class Outcome:
         if not self.unfold:
             return corners
         return np.flatnonzero(np.isin(unfolded(self.surface).vertex, corners))
+
+
+def _reporter(what: str, progress: OnStep | None) -> Callable[[Progress], None]:
+    """A solver's callback that reports its mesh and step."""
+
+    def callback(state: Progress) -> None:
+        if progress is not None:
+            progress(f"{what}: {state.surface().m} triangles, step {state.iteration}")
+
+    return callback

@@ -1,78 +1,60 @@
-"""The output of a project: files and a picture, all of them or none."""
+"""Writing the output of a project: files, a picture and tables, all of them or none."""
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from .. import io
-from ..base import validate
-from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, PcmcError, unknown
-from ..base.files import atomic_writes, check_name, system_error, writing
+from ..base.errors import FileError, FileWarning, PcmcError
+from ..base.files import PathLike, atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
-from ..certificate.certificate import Certificate
 from ..forces.curvature import curvature_error, mean_curvature
-from ..plot.figure import SUFFIXES, check_suffix
+from ..panelling import Panels
 from ..surface import Surface
+from .settings import check_picture, schedule_paths
 
-PathLike = str | os.PathLike[str]
-Works = list[tuple[Path, Callable[[Path], Any]]]  # each file with the function that writes it
+FileJobs = list[tuple[Path, Callable[[Path], Any]]]  # each file with the function that writes it
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
-COLOURS = ("patches", "curvature", "error", "reactions")
 
 
 def ignore(step: str) -> None:
     """An ``OnStep`` that shows nothing."""
 
 
-def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
-    """Values (n,) by vertex: mean curvature (1/length), its relative error, and the size of the
-    reaction at supports (force)."""
-    return {
-        "mean curvature": mean_curvature(surface),
-        "error": curvature_error(surface),
-        "reaction": np.linalg.norm(certificate.reactions, axis=1),
-    }
-
-
-def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
+def write_all(jobs: FileJobs, progress: OnStep = ignore) -> list[Path]:
     """Write files, each by its own function of a path; all of them appear together, or none.
 
     The functions write to temporary files; errors and warnings name the final ones.
     """
-    report = progress or ignore
-    paths = [path for path, _ in works]
+    paths = [path for path, _ in jobs]
     check_outputs(paths)
     with atomic_writes(paths) as temporaries:
-        for (path, write), temporary in zip(works, temporaries, strict=True):
-            report(f"writing {path.name}")
-            try:
-                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path):
-                    write(temporary)
-            except PcmcError as error:
-                text = str(error).replace(f"{temporary}: ", "")
-                raise FileError(f"{path}: {text}", what=str(path)) from None
+        for (path, write), temporary in zip(jobs, temporaries, strict=True):
+            progress(f"writing {path.name}")
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always", FileWarning)
+                try:
+                    with writing(temporary), defer_interrupts():
+                        write(temporary)
+                except PcmcError as error:
+                    text = str(error).replace(f"{temporary}: ", "")
+                    raise FileError(f"{path}: {text}", what=str(path)) from None
+            for warning in caught:
+                text = str(warning.message).replace(str(temporary), str(path))
+                warnings.warn(text, warning.category, stacklevel=2)
     return paths
 
 
-@contextmanager
-def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
-    """Warnings name the final file."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FileWarning)
-        yield
-    for warning in caught:
-        text = str(warning.message).replace(str(temporary), str(path))
-        warnings.warn(text, warning.category, stacklevel=4)
+def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
+    """The files of a schedule, each with the function that writes it."""
+    tables = (schedule.panels, schedule.families, schedule.edges)
+    paths = schedule_paths(path)
+    return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
 
 
 def paint(
@@ -101,44 +83,6 @@ def paint(
         count = len(views)
         each = None if scalars is None else [scalars] * count
         panel([surface] * count, path, views=views, scalars=each, **look)
-
-
-def check_picture(views: Sequence[Any], colour: str) -> None:
-    """Refuse views or a colour that ``paint`` does not know."""
-    validate.choice("colour", colour, COLOURS)
-    if not views:
-        validate.refuse("views", views, "at least one view")
-    if colour == "reactions" and len(views) > 1:
-        validate.refuse("views", len(views), "one view for a picture of reactions")
-    for view in views:
-        _check_view(view)
-
-
-def _check_view(view: Any) -> None:
-    from ..plot.scene import VIEWS
-
-    if isinstance(view, str):
-        validate.choice("view", view, tuple(VIEWS))
-    else:
-        angles = view if isinstance(view, Sequence) and len(view) == 2 else [math.nan]
-        if not all(isinstance(angle, int | float) and math.isfinite(angle) for angle in angles):
-            validate.refuse("view", view, "a name or two angles in degrees")
-
-
-def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
-    """Refuse empty file names, and those whose suffix is no format of surfaces, or of pictures."""
-    for file in files:
-        if not str(file).strip():
-            raise FileError(
-                "the name of an output file is empty; give one, such as 'roof.obj'", what="output"
-            )
-        suffix = Path(file).suffix.lower()
-        if suffix not in io.FORMATS:
-            hint = "; a picture has its own option" if suffix in SUFFIXES else ""
-            text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
-            raise FileError(text, what=str(file), found=suffix)
-    if picture is not None:
-        check_suffix(picture)
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:

@@ -1,22 +1,30 @@
-"""Running a project: solve it, then write all that it asks for."""
+"""The roof in a file: opened or designed for commands, pages and notebooks; or run, with all its files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import io
-from ..base.files import folder as made
+from ..base.arrays import Floats
+from ..base.files import PathLike
+from ..base.files import folder as output_folder
+from ..certificate.certificate import Certificate
+from ..forces.curvature import curvature_error, mean_curvature
 from ..structure import write_structure
 from ..surface import Surface, unfolded
 from . import cache
-from .documents import schedule_works
-from .file import PathLike, Project, in_file, load
+from .checking import in_file
+from .file import Project, load
 from .outcome import Outcome
-from .output import OnStep, Works, check_names, check_outputs, fields, ignore, paint, write_all
-from .solving import solve_from_start
+from .output import FileJobs, OnStep, check_outputs, ignore, paint, schedule_jobs, write_all
+from .solving import Changed, solve_from_start
+from .start import start_of
 
 CONTENTS = {
     ".csv": "panels",
@@ -25,6 +33,100 @@ CONTENTS = {
     ".pdf": "drawings",
     ".svg": "drawing",
 }
+
+
+def opened(
+    path: Project | PathLike,
+    progress: OnStep | None = None,
+    *,
+    units: str = "",
+    start: bool = False,
+    changed: Changed | None = None,
+    use_cache: bool = True,
+) -> Outcome:
+    """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
+
+    Parameters
+    ----------
+    path : of the file, or a Project.
+    progress : called with a few words at each step.
+    units : the unit of length that the roof is to be in; see ``load``.
+    start : of a project, its start shape, which is not solved.
+    changed : applied to the surface of the file, or to the start shape.
+    use_cache : as of ``designed``.
+
+    Raises
+    ------
+    FileError, PlanError, OptionError, SurfaceError : as ``load`` and ``pcmc.read``.
+
+    >>> roof = opened("notebooks/roof.toml", start=True)
+    >>> roof.result is None, roof.certificate.certified
+    (True, False)
+    """
+    project = path if isinstance(path, Project) else load(path, units=units)
+    if (project.has_file or project.plan is not None) and not start:
+        return designed(project, progress, changed=changed, use_cache=use_cache)
+    first = start_of(project)
+    surface, data = first.surface, first.data
+    if changed is not None:
+        surface, data = changed(surface), None
+    unfold = project.output.whole
+    return Outcome(None, units=first.units, project=first.project, start=surface, unfold=unfold, data=data)
+
+
+def designed(
+    project: Project | PathLike,
+    progress: OnStep | None = None,
+    *,
+    changed: Changed | None = None,
+    use_cache: bool = True,
+) -> Outcome:
+    """The roof that a project describes: solved, its targets met, remeshed, as accurate as asked for.
+
+    Nothing is written but the cache: a good roof is kept there, and comes from there the next time. A roof
+    that is not certified, or misses a target, is solved again each time.
+
+    Parameters
+    ----------
+    project : a Project, or the path of its file.
+    progress : called with a few words at each step.
+    changed : applied to the initial surface; such a roof is neither kept nor taken from the cache.
+    use_cache : False solves in any case, and keeps nothing.
+
+    Returns
+    -------
+    Outcome
+        ``outcome.surface`` is the roof, ``outcome.good`` whether it is what the project asks for. With
+        ``whole = true`` ``outcome.shown`` is the whole roof.
+
+    Raises
+    ------
+    FileError, PlanError, OptionError
+        As ``run``.
+    KeyboardInterrupt
+        For Ctrl-C; nothing is kept.
+
+    Warns
+    -----
+    BalanceWarning
+        Before solving, if the tensions at a junction cannot balance.
+
+    Examples
+    --------
+    >>> roof = designed("notebooks/roof.toml")
+    >>> roof.good, [f"{area:.0f}" for area in roof.certificate.patches["area"][:3]]
+    (True, ['78', '174', '150'])
+    """
+    if not isinstance(project, Project):
+        project = load(project)
+    use_cache = use_cache and changed is None
+    known = cache.cached(project) if use_cache else None
+    if known is not None:
+        return replace(known, unfold=project.output.whole, project=project)
+    outcome = solve_from_start(project, progress or ignore, changed)
+    if use_cache:
+        cache.keep(project, outcome)
+    return outcome
 
 
 def run(
@@ -63,7 +165,7 @@ def run_project(
     project: Project,
     progress: OnStep | None = None,
     *,
-    changed: Callable[[Surface], Surface] | None = None,
+    changed: Changed | None = None,
     anyway: bool = False,
     use_cache: bool = True,
     check_after: bool = True,
@@ -72,68 +174,77 @@ def run_project(
 
     The mesh check comes after the files are written, so that Ctrl-C during it leaves them. Where a report is
     among them, it comes before, unless ``mesh_check`` is false or the mesh is large. Without ``check_after``
-    the caller makes it. A good roof is kept in
-    the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
+    the caller makes it. A good roof is kept in the cache, unless it was changed or ``use_cache`` is false; it
+    is solved in any case.
     """
-    report = progress or ignore
+    progress = progress or ignore
     project = project if project.folder is not None else project.in_folder(project.path.parent)
-    outputs = project.outputs
-    check_names(project.files, project.picture)
+    outputs = project.output.paths
     check_outputs(outputs, project.folder, inputs=project.inputs)
-    outcome = solve_from_start(project, report, changed)
-    if project.whole:
-        report("certifying the whole")
+    outcome = solve_from_start(project, progress, changed)
+    if project.output.whole:
+        progress("certifying the whole")
         outcome.whole  # noqa: B018 — computed here, while the progress is shown
     for what in project.margin if outcome.certified else ():
-        outcome.margin(what, report)
+        outcome.margin(what, progress)
     if outputs and (outcome.good or anyway):
-        works = surface_files(outcome, project.files)
-        if project.picture is not None:
-            painting = partial(paint, views=project.views, colour=project.colour, units=outcome.units)
-            works.append((Path(project.picture), partial(painting, outcome.shown.surface)))
-        works += _documents(project, outcome, anyway, report)
-        with made(project.folder or Path()):
-            outcome = outcome.written(write_all(works, report))
+        jobs = _output_jobs(project, outcome, anyway, progress)
+        with output_folder(project.folder or Path()):
+            outcome = outcome.written(write_all(jobs, progress))
     if use_cache and changed is None:
         cache.keep(project, outcome)
     if check_after and project.mesh_check and outcome.wants_mesh_check():
-        outcome.check_mesh(report)
+        outcome.check_mesh(progress)
     return outcome
 
 
-def _documents(project: Project, outcome: Outcome, anyway: bool, report: OnStep) -> Works:
-    """The project's documents, each with the function that writes it.
+def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnStep) -> FileJobs:
+    """The project's files, each with the function that writes it.
 
     A document of a roof that is not certified is marked.
     """
-    documents, works = project.documents, Works()
-    if not documents.names:
-        return works
-    if documents.report is not None and outcome.wants_mesh_check():
-        outcome.check_mesh(report)
-    report("drawing, sorting panels, modelling")
+    output, jobs = project.output, surface_files(outcome, project.output.files)
+    kept = [] if output.picture is None else [Path(output.picture)]
+    for picture in kept:
+        painting = partial(paint, views=output.all_views, colour=output.colour, units=outcome.units)
+        jobs.append((picture, partial(painting, outcome.shown.surface)))
+    if not output.documents:
+        return jobs
+    if output.report is not None and outcome.wants_mesh_check():
+        outcome.check_mesh(progress)
+    progress("drawing, sorting panels, modelling")
     with in_file(project.path):
-        if documents.drawings:
-            works += outcome.drawing_set(documents, anyway=anyway).files(*documents.drawings)
-        if documents.panels is not None and documents.tolerance is not None:
-            schedule = outcome.panels(documents.tolerance, anyway=anyway)
-            works += schedule_works(Path(documents.panels), schedule)
-        if documents.structure is not None and project.structure is not None:
+        documents = FileJobs()
+        if output.drawings:
+            documents += outcome.drawing_set(output, anyway=anyway).files(*output.drawings)
+        if output.panels is not None and output.tolerance is not None:
+            schedule = outcome.panels(output.tolerance, anyway=anyway)
+            documents += schedule_jobs(Path(output.panels), schedule)
+        if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
-            works.append((Path(documents.structure), partial(write_structure, model=model)))
-        if documents.report is not None:
+            documents.append((Path(output.structure), partial(write_structure, model=model)))
+        if output.report is not None:
             listed = {path.name: "project" for path in project.inputs[:1]}
             listed |= {path.name: "drawing or mesh of the roof" for path in project.inputs[1:]}
-            listed |= {Path(file).name: "surface" for file in project.files}
-            listed |= {} if project.picture is None else {Path(project.picture).name: "picture"}
-            listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in works}
-            works.append(
-                (Path(documents.report), outcome.report(documents, files=listed, anyway=anyway).write)
-            )
-    return works
+            listed |= {Path(file).name: "surface" for file in output.files}
+            listed |= {picture.name: "picture" for picture in kept}
+            listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
+            report = outcome.report(output, files=listed, anyway=anyway)
+            documents.append((Path(output.report), report.write))
+    return jobs + documents
 
 
-def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> Works:
+def vertex_fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
+    """Values (n,) by vertex: mean curvature (1/length), its relative error, and the size of the
+    reaction at supports (force)."""
+    return {
+        "mean curvature": mean_curvature(surface),
+        "error": curvature_error(surface),
+        "reaction": np.linalg.norm(certificate.reactions, axis=1),
+    }
+
+
+def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
     """The files of a roof with all that their formats hold, for ``write_all``.
 
     ``colour`` names the scalar that colours vertices. The fields of a surface that was not solved are those
@@ -149,12 +260,12 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
             carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
             about |= {"scalars": carried, "certificate": None}
         return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
-    works: Works = []
-    scalars = fields(surface, certificate)
+    jobs: FileJobs = []
+    scalars = vertex_fields(surface, certificate)
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]
         coloured = {name: values for name, values in scalars.items() if name == colour}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
-        works.append((file, partial(io.write, surface=surface, **about)))
-    return works
+        jobs.append((file, partial(io.write, surface=surface, **about)))
+    return jobs

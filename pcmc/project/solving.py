@@ -9,8 +9,7 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from .. import solvers
-from ..advice.advice import Task, advice, chosen_values
-from ..advice.aims import aims_below_supports
+from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..certificate.balance import unbalanced
 from ..contact.pinching import standing_part
@@ -20,10 +19,11 @@ from ..meshing.remeshing import remesh, size_note
 from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
-from .accuracy import AccuracyWanted
-from .file import Project, in_file
+from .checking import in_file
+from .file import Project
 from .outcome import EXTENSIVE, Outcome
 from .output import OnStep, ignore
+from .settings import AccuracyWanted
 from .start import start_of
 
 if TYPE_CHECKING:
@@ -36,91 +36,92 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     """Make the start shape of a project, and solve it; ``changed`` is applied to the start shape."""
     report("reading" if project.plan is None else "meshing the plan")
     start = start_of(project)
-    given, start = start, start if changed is None else start.with_surface(changed(start.surface))
-    project, surface = start.project, start.surface
-    if project.documents.structure is not None and project.structure is not None:
-        with in_file(project.path):
-            project.structure.check(surface)
-    if project.margin:
-        from ..margins.varied import Varied  # takes long to import
-
-        with in_file(project.path):  # refuses unknown names before the work
-            for what in project.margin:
-                Varied.of(surface, what)
-    if project.whole and not any(plane.mirror for plane, _ in surface.on_planes):
-        text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
-        raise OptionError(f"{text}, or give the plan mirrors", what="whole")
-    _check_balance(surface)
+    project, surface, data = start.project, start.surface, start.data
+    if changed is not None:
+        surface, data = changed(surface), None
+    _check_wishes(project, surface)
     solved = solve_project(project, surface, report)
     notes = [*solved.notes]
     if project.has_file:  # a drawing alone is proposed as a whole
         notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
-    if project.drawing is not None or start.data is not None:
-        notes += metres_note(project.files, start.units.length)
-    if project.whole and any(target.quantity in EXTENSIVE for target in project.targets):
+    if project.drawing is not None or data is not None:
+        notes += metres_note(project.output.files, start.units.length)
+    if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas and volumes are those of the part between the mirror planes")
-    outcome = replace(
-        solved, units=start.units, unfold=project.whole, project=project, data=start.data, notes=notes
-    )
+    about: dict[str, Any] = {
+        "units": start.units,
+        "unfold": project.output.whole,
+        "project": project,
+        "data": data,
+    }
+    outcome = replace(solved, notes=notes, **about)
     if outcome.good:
         return outcome
-    notes += aims_below_supports(project.plan, surface, project.targets, start.units)
+    notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")
     drawing = "" if project.drawing is None else project.drawing.path.name
     names = ("rises", "targets", "vary", "method", "options", "units")
     task = Task(project.plan, project.path.name, drawing, *(getattr(project, name) for name in names))
 
     def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
-        wanted = AccuracyWanted()
-        return solve_project(
-            replace(project, plan=plan, targets=targets, remeshing=(), wanted=wanted), surface
-        )
+        plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())
+        return solve_project(plain, surface)
 
-    return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
+    return replace(outcome, advice=advice(task, start.surface, surface, outcome, try_plan))
 
 
-def _check_balance(surface: Surface) -> None:
-    """Warn before a long computation if the tensions alone show that a junction cannot balance.
+def _check_wishes(project: Project, surface: Surface) -> None:
+    """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work.
 
     The advice after it names a remedy that was tried.
     """
+    with in_file(project.path):
+        if project.output.structure is not None and project.structure is not None:
+            project.structure.check(surface)
+        if project.margin:
+            from ..margins.varied import Varied  # takes long to import
+
+            for what in project.margin:
+                Varied.of(surface, what)
+        if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
+            text = "the roof has no mirror planes, so it is the whole already; leave out whole"
+            raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     pinchable = standing_part(surface).walls.pinchable
-    imbalance = unbalanced(surface, pinchable)
-    if imbalance:
+    if imbalance := unbalanced(surface, pinchable):
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
         warnings.warn(f"{imbalance.imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
 
 
-def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:
+def solve_project(project: Project, surface: Surface, progress: OnStep = ignore) -> Outcome:
     """Solve a surface with the project's options, remesh it, meet its targets; write nothing.
 
     A surface that is not certified, or misses a target, is not remeshed. The accuracy comes last; targets
     are met once more on its mesh.
     """
-    report, notes = progress or ignore, list[str]()
+    notes = list[str]()
     with in_file(project.path):
         for stage in project.remeshing:
             if stage.when == "before":
-                report("remeshing")
+                progress("remeshing")
                 surface = remesh(surface, **stage.options)
                 notes.append(size_note(surface, stage.edge_length))
         after = [stage for stage in project.remeshing if stage.when == "after"]
         if project.wanted.accuracy and not after and not project.targets:
-            outcome = _solve_to_accuracy(project, surface, report)
+            outcome = _solve_to_accuracy(project, surface, progress)
             return replace(outcome, notes=[*filter(None, notes), *outcome.notes], project=project)
-        outcome = _solve_or_meet(project, surface, report)
+        outcome = _solve_or_meet(project, surface, progress)
         notes += outcome.notes
         for stage in after:
             if outcome.good:
-                report("remeshing")
+                progress("remeshing")
                 before, surface = outcome, remesh(outcome.surface, **stage.options)
-                outcome = _again(project, surface, report)
+                outcome = _again(project, surface, progress)
                 notes += [size_note(surface, stage.edge_length), *outcome.notes]
                 notes += _met_before(project.targets, before, outcome)
         if project.wanted.accuracy and outcome.good:
-            accurate = _solve_to_accuracy(project, outcome.surface, report)
+            accurate = _solve_to_accuracy(project, outcome.surface, progress)
             if project.targets and accurate.good:
-                outcome = replace(_again(project, accurate.surface, report), accurate=accurate.accurate)
+                outcome = replace(_again(project, accurate.surface, progress), accurate=accurate.accurate)
                 notes += outcome.notes
             else:
                 outcome = replace(accurate, design=outcome.design)
@@ -136,7 +137,7 @@ def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:
 
 
 def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> list[str]:
-    """That the targets were met on the mesh before, with which parameters, and what the finer one reaches."""
+    """Note that the targets were met on the mesh before, with which values, and what the finer reaches."""
     if before.design is None:
         return []
     values = ", ".join(f"{label} {value:.6g}" for label, value in before.design.parameters["value"].items())
@@ -150,6 +151,54 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
     return [f"{met}; {where}, the surface does not come to rest with them; it has {reached}"]
 
 
+def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve the surface, or meet its targets, and certify it.
+
+    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
+    from a roof that is certified the search starts again, any other says why there is none.
+    """
+    if not project.targets:
+        return _solve(project, surface, report)
+    from ..design import NoStart  # needed by projects with targets only
+
+    try:
+        return _meet(project, surface, report)
+    except NoStart:
+        outcome = _solve(project, surface, report)
+        if not outcome.good:
+            return replace(outcome, notes=["targets not tried: without them there is no stable roof, either"])
+        return _meet(project, outcome.surface, report)
+
+
+def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    solver = solve if project.search else solvers.solve
+    return _certified(solver(surface, project.method, reporter(report), **project.options), report)
+
+
+def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    from ..design import DesignStatus, meet  # needed by projects with targets only
+
+    _newton_alone(project, "meet targets")
+    solves, tolerance = count(1), project.target_tolerance
+
+    def callback(row: object) -> None:
+        report(f"meeting the targets: solve {next(solves)}")
+
+    options = dict(project.options) | ({} if tolerance is None else {"tolerance": tolerance})
+    design = meet(surface, project.targets, project.vary, callback=callback, **options)
+    if design.status is DesignStatus.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    return _certified(design.result, report, design)
+
+
+def _certified(result: Result, report: OnStep, design: Design | None = None) -> Outcome:
+    if design is None and result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    report("certifying")
+    result.certificate  # noqa: B018 — computed here, while the progress is shown
+    return Outcome(result, design=design)
+
+
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
     """Solve on finer and finer meshes, and certify."""
     from ..accuracy import AccuracyStatus, solve_to_accuracy
@@ -160,13 +209,8 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
     _newton_alone(project, "reach an accuracy")
     report("solving to the accuracy")
     corners = Outcome(None, start=surface, project=project).corners
-    accurate = solve_to_accuracy(
-        surface,
-        corners=corners,
-        callback=callback,
-        **vars(project.wanted),
-        **project.options,
-    )
+    wanted = vars(project.wanted) | dict(project.options)
+    accurate = solve_to_accuracy(surface, corners=corners, callback=callback, **wanted)
     if accurate.status is AccuracyStatus.STOPPED:  # by Ctrl-C, which ends the command
         raise KeyboardInterrupt
     accurate.result.certificate  # noqa: B018 — computed here, while the progress is shown
@@ -179,41 +223,6 @@ def _newton_alone(project: Project, act: str) -> None:
         raise OptionError(message, what="solve.method", found=project.method, expected="newton")
 
 
-def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    """Solve the surface, or meet its targets, and certify it.
-
-    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
-    from a roof that is certified the search starts again, any other says why there is none.
-    """
-    if not project.targets:
-        return _certified(_solve(project, surface, report), None, report)
-    from ..design import NoStart  # needed by projects with targets only
-
-    try:
-        design = _meet(project, surface, report)
-    except NoStart:
-        outcome = _certified(_solve(project, surface, report), None, report)
-        if not outcome.good:
-            note = "targets not tried: without them there is no stable roof, either"
-            return replace(outcome, notes=[note])
-        design = _meet(project, outcome.surface, report)
-    return _certified(design.result, design, report)
-
-
-def _solve(project: Project, surface: Surface, report: OnStep) -> Result:
-    solver = solve if project.search else solvers.solve
-    result = solver(surface, project.method, reporter(report), **project.options)
-    if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
-        raise KeyboardInterrupt
-    return result
-
-
-def _certified(result: Result, design: Design | None, report: OnStep) -> Outcome:
-    report("certifying")
-    result.certificate  # noqa: B018 — computed here, while the progress is shown
-    return Outcome(result, design=design)
-
-
 def reporter(report: OnStep) -> Callable[[Progress], None]:
     """A solver's callback that reports its step and the forces left."""
 
@@ -222,19 +231,3 @@ def reporter(report: OnStep) -> Callable[[Progress], None]:
         report(f"solving: step {state.iteration}, forces left {force:.1e}")
 
     return callback
-
-
-def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
-    from ..design import DesignStatus, meet  # needed by projects with targets only
-
-    _newton_alone(project, "meet targets")
-    solves = count(1)
-
-    def callback(row: object) -> None:
-        report(f"meeting the targets: solve {next(solves)}")
-
-    options = dict(project.options) | ({} if project.misfit is None else {"tolerance": project.misfit})
-    design = meet(surface, project.targets, project.vary, callback=callback, **options)
-    if design.status is DesignStatus.STOPPED:  # by Ctrl-C
-        raise KeyboardInterrupt
-    return design

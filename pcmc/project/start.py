@@ -1,37 +1,43 @@
-"""The start shape of a project: the mesh of its plan, or the mesh in its file."""
+"""The start shape of a project: the mesh of its plan, or the mesh in its file with tensions and supports."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from ..base.errors import PlanError
-from ..base.units import Units
+import numpy as np
+
+from ..advice.rises import first_tension
+from ..base import validate
+from ..base.arrays import Bools
+from ..base.errors import OptionError, PlanError
+from ..base.files import PathLike
+from ..base.units import NO_UNITS, Units
+from ..io import read_bare
 from ..io.mesh_data import MeshData
 from ..surface import Surface
-from .file import PathLike, Project, in_file, load
-from .mesh import first_tensions, read_mesh
+from ..surface.geometry import area_vectors, segment_lengths
+from .checking import in_file
+from .file import Project, load
+from .settings import BOUNDARY, GROUND, MeshFile
+
+if TYPE_CHECKING:
+    from ..design import Parameter, Target
+
+NEAR = 1e-6  # of the size: vertices this near to a line or to the lowest level are on it
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The start shape of a project.
-
-    Attributes
-    ----------
-    surface : before it is solved.
-    units : of its numbers.
-    project : the project, with the targets for the rise of a mesh, which its file does not name.
-    data : all that the file of a mesh holds; None for a plan.
-    """
+    """The start shape of a project, before it is solved."""
 
     surface: Surface
-    units: Units
-    project: Project
-    data: MeshData | None = None
-
-    def with_surface(self, surface: Surface) -> Start:
-        """The same with another surface."""
-        return replace(self, surface=surface, data=None)
+    units: Units  # of its numbers
+    project: Project  # with the targets for the rise of a mesh, which its file does not name
+    data: MeshData | None = None  # all that the file of a mesh holds; None for a plan
 
 
 def start_of(project: Project) -> Start:
@@ -63,3 +69,92 @@ def surface_of(project: Project) -> Surface:
 def build(path: PathLike) -> Surface:
     """The start shape of the project in a file. Errors as in ``load``."""
     return surface_of(load(path))
+
+
+def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surface, MeshData]:
+    """The surface of a project's mesh in the project's units, and all that its file holds.
+
+    A file without a unit is taken to be in ``mesh.units``, or else in the project's.
+    """
+    surface, data = read_bare(path.parent / mesh.file, units.length, mesh.units)
+    changes: dict[str, Any] = {}
+    if mesh.patches or mesh.tension is not None:
+        for name in mesh.patches:
+            surface.patch_index(name)  # refuses one that is not there
+        common = {} if mesh.tension is None else {"tension": mesh.tension}
+        changes["patches"] = [
+            replace(p, **({} if p.auxiliary else common) | dict(mesh.patches.get(p.name, {})))
+            for p in surface.patches
+        ]
+    if len(mesh.supports):
+        changes |= {"fixed": _supported(surface, mesh.supports)}
+        changes |= dict.fromkeys(("on_plane", "on_planes", "on_line"), ())
+    return (surface.rebuilt(**changes).with_held_snow() if changes else surface), data
+
+
+def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
+    """(n,) the vertices that the supports of a project fix."""
+    X, edges = surface.vertices, surface.topology.edges
+    boundary = np.zeros(surface.n, dtype=bool)
+    boundary[edges[surface.topology.boundary_edge]] = True
+    if supports == BOUNDARY:
+        return boundary
+    height = surface.plane.height(X)
+    if supports == GROUND:
+        return np.asarray(boundary & (height <= height[boundary].min() + NEAR * surface.size))
+    reach = 0.5 * float(segment_lengths(X, edges).mean())
+    fixed = np.zeros(surface.n, dtype=bool)
+    for number, one in enumerate(supports, start=1):
+        try:
+            points = np.array(one, dtype=float)
+        except (TypeError, ValueError):
+            points = np.empty(0)
+        if points.ndim not in (1, 2) or points.shape[-1:] != (3,) or not np.isfinite(points).all():
+            validate.refuse("mesh.supports", one, "a point [x, y, z], or a list of points", str(number))
+        line = np.atleast_2d(points)
+        if len(line) == 1:
+            away = np.linalg.norm(X - line[0], axis=1)
+            found = (away == away.min()) & (away.min() <= reach)
+        else:
+            away = np.full(surface.n, np.inf)
+            for a, b in pairwise(line):
+                side = b - a
+                part = np.clip((X - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
+                away = np.minimum(away, np.linalg.norm(X - a - part[:, None] * side, axis=1))
+            found = away <= NEAR * surface.size
+        if not found.any():
+            text = f"mesh.supports: number {number}, {line.tolist()}, has no vertex of the mesh on it"
+            raise OptionError(f"{text}; give points in the units of the project", what="mesh.supports")
+        fixed |= found
+    return fixed
+
+
+def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Target], list[Parameter]]:
+    """The mesh with first tensions for its rises, the targets, and what is to be found.
+
+    They are those of a cap; see ``rises.first_tension``. The least tension is p times area over length of the
+    boundary's projection.
+    """
+    from ..design import Parameter, Target
+
+    if not mesh.rises:
+        return surface, [], []
+    held = surface.topology.edges[surface.topology.boundary_edge]
+    heights = surface.plane.height(surface.vertices[held[surface.held[held].all(axis=1)]])
+    level = float(heights.mean()) if heights.size else 0.0
+    normal = np.array(surface.plane.normal)
+    roof = surface.roof[surface.patch_of_face]
+    plan = abs(float((area_vectors(surface.vertices[surface.faces[roof]]) @ normal).sum()))
+    least = plan / float(segment_lengths(surface.vertices, held).sum())
+    pressed = [p for p, loaded in zip(surface.patches, surface.roof, strict=True) if loaded]
+    names, targets, vary = [p.name for p in pressed], [], []
+    for rise in mesh.rises:
+        if rise.kind == "rise" and heights.size and np.ptp(heights) > NEAR * surface.size:
+            text = f"{rise.kind}: the supports are not level, so a rise over them is not defined; give apex"
+            raise OptionError(f"{text} instead, the greatest height over the plane", what=rise.kind)
+        height = rise.value if rise.kind == "apex" else level + rise.value
+        highest = max(first_tension(least, p.net_pressure, height - level) for p in pressed)
+        surface = surface.retensioned(dict.fromkeys(names, highest))
+        targets.append(Target("apex", None, height))
+        vary.append(Parameter(names))
+    return surface, targets, vary

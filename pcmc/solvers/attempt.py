@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,9 @@ NOISE = 10.0  # times what rounding of the coordinates leaves, which counts as z
 COLLAPSED = 1e-3  # triangle quality below which the attempt ends
 POOR = 0.15  # triangle quality that explains why no step helps
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
-CRAWLS = (3, 30)  # steps down from a saddle that hardly lower E: when one that slips is accepted, when any
-NEAR = 1e-3  # relative residual near a saddle
-CREEP = 1e-6  # of Σ α A: by less E is hardly lowered in these steps
+SLOW_DESCENT_STEPS = (3, 30)  # that hardly lower E: when a saddle that slips is accepted, when any
+NEAR_SADDLE = 1e-3  # residual near a saddle
+MIN_ENERGY_DROP = 1e-6  # of Σ α A: by less E is hardly lowered in these steps
 SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
 
 
@@ -63,41 +64,12 @@ class NewtonOptions:
         validate.number("inflation", self.inflation, above=1.0)
 
 
-@dataclass
-class History:
-    """The rows of all levels and attempts, and the counts of the finished ones.
+class Log:
+    """What all attempts of a solve share: the callback, and the counts of their work."""
 
-    Attributes
-    ----------
-    callback : called with each new row.
-    rows : the history of the result.
-    evaluations, factorisations : made by finished attempts.
-    note : a further finding, for the result's message.
-    """
-
-    callback: Callback | None
-    rows: list[dict[str, Any]] = field(default_factory=list)
-    evaluations: int = 0
-    factorisations: int = 0
-    note: str = ""
-
-    def add(self, state: State, stepper: Stepper, level: int) -> None:
-        """A row for the state reached."""
-        row = {
-            "iteration": len(self.rows),
-            "level": level,
-            "step": stepper.kind,
-            "evaluation": self.evaluations + state.evaluations,
-            "factorisation": self.factorisations + stepper.factorisations,
-            "energy": state.energy,
-            "gradient_squared": float((state.gradient**2).sum()),
-            "residual": state.relative,
-            "quality": worst_quality(state.X, state.surface.faces),
-            "resting": int(state.resting.sum()),
-        }
-        self.rows.append(row)
-        if self.callback is not None:
-            self.callback(Progress(len(self.rows) - 1, state.result_surface, row))
+    def __init__(self, callback: Callback | None) -> None:
+        self.callback = callback
+        self.evaluations = self.factorisations = 0
 
 
 class NewtonRun:
@@ -106,50 +78,51 @@ class NewtonRun:
     Attributes
     ----------
     state : the surface reached. stepper : what moves it.
-    status : why the run ended.
+    status : why the run ended. note : a further finding, for the result's message.
+    rows : the history up to here, with those of the runs ``before``.
     smooth_steps : descent steps to take before the next Newton step.
     stuck : whether the last step failed: none lowers the residual or the energy.
     best, steps_since_best : the least residual, and steps taken since it was last halved.
-    crawl : how many steps down from a saddle may hardly lower E, if a minimum is sought.
-    uphill : the positions where the present way down from a saddle began, and the state's version there.
+    patience : how many steps down from a saddle may hardly lower E, if a minimum is sought.
+    before_descent : the positions where the present way down from a saddle began, and the version there.
     """
 
     def __init__(
         self,
         surface: Surface,
         options: NewtonOptions,
-        history: History,
+        log: Log,
         level: int,
+        before: Sequence[dict[str, Any]] = (),
         smooth_steps: int = 0,
         held: bool = False,
     ) -> None:
-        self.options, self.history, self.level = options, history, level
-        self.state = State(surface, options.min_quality, held)
-        self.stepper = Stepper(self.state, options.target == "minimum", options.backend)
-        self.status = Status.ITERATION_LIMIT
+        self.options, self.log, self.level, self.rows = options, log, level, list(before)
+        self.held = held
+        self.state = State(surface, options.min_quality, held, options.backend)
+        self.stepper = Stepper(self.state, options.target == "minimum")
+        self.status, self.note = Status.ITERATION_LIMIT, ""
         self.first_quality = self.state.quality
-        self._shown = self.state.X, self.state.version  # as in the last row
-        self.crawl = float(CRAWLS[0]) if options.target == "minimum" else np.inf
+        self._shown = self.state.at.X, self.state.version  # as in the last row
+        self.patience = float(SLOW_DESCENT_STEPS[0]) if options.target == "minimum" else np.inf
         self._steps = 0
         self._descent: list[float] = []  # E after each step of the present way down from a saddle
-        self.uphill = self.state.X, self.state.version
-        self.restart(smooth_steps)
+        self.before_descent = self._shown
+        self._restart(smooth_steps)
 
-    def restart(self, smooth_steps: int = 0) -> None:
+    def _restart(self, smooth_steps: int = 0) -> None:
         """Measure progress from here."""
         self.smooth_steps, self.stuck = smooth_steps, False
-        self.best, self.steps_since_best = self.state.relative, 0
+        self.best, self.steps_since_best = self.state.at.residual, 0
 
     def run(self) -> NewtonRun:
         """Step until the end, or on from there; ``status`` then gives the reason."""
         self.status = until_stopped(self._iterate)
         if self.status is Status.STOPPED:  # perhaps in the middle of a step
             X, version = self._shown
-            if version == self.state.version:
-                self.state.X = X
-            self.state.measure()
-        self.history.evaluations += self.state.evaluations
-        self.history.factorisations += self.stepper.factorisations
+            self.state.go_to(X if version == self.state.version else self.state.at.X)
+        self.log.evaluations += self.state.evaluations
+        self.log.factorisations += self.stepper.factorisations
         self.state.evaluations = self.stepper.factorisations = 0
         if self.status is not Status.SADDLE:  # from which a run may go on
             self.stepper.free()
@@ -159,25 +132,43 @@ class NewtonRun:
         state = self.state
         for step in range(self._steps, self.options.iterations + 1):
             self._steps = step + 1
-            self._shown = state.X, state.version
-            self.history.add(state, self.stepper, self.level)
+            self._shown = state.at.X, state.version
+            self._add_row()
             if self._at_rest():
                 if not self._leave_rest():
-                    return Status.STALLED if state.excess_pull().any() else Status.CONVERGED
-                self.restart()
-            elif self.stuck:
-                return self._given_up(Status.STALLED)
-            elif step == self.options.iterations:
-                return self._given_up(Status.ITERATION_LIMIT)
+                    return Status.STALLED if state.at.excess_pull.any() else Status.CONVERGED
+                self._restart()
+            elif self.stuck or step == self.options.iterations:
+                if state.quality < min(POOR, 0.5 * self.first_quality):  # which explains it
+                    return Status.DEGENERATE
+                return Status.STALLED if self.stuck else Status.ITERATION_LIMIT
             else:
                 if state.maintain_mesh():
-                    self.stepper.drop_factor()
+                    self.stepper.second = None
                 self._step()
-            status = self._ended() or (Status.SADDLE if self._crawls() else None)
+            status = self._ended() or (Status.SADDLE if self._descends_slowly() else None)
             if status is not None:
-                self.history.add(state, self.stepper, self.level)
+                self._add_row()
                 return status
         return Status.ITERATION_LIMIT
+
+    def _add_row(self) -> None:
+        state = self.state
+        row = {
+            "iteration": len(self.rows),
+            "level": self.level,
+            "step": self.stepper.kind,
+            "evaluation": self.log.evaluations + state.evaluations,
+            "factorisation": self.log.factorisations + self.stepper.factorisations,
+            "energy": state.energy,
+            "gradient_squared": float((state.at.gradient**2).sum()),
+            "residual": state.at.residual,
+            "quality": worst_quality(state.at.X, state.at.surface.faces),
+            "resting": int(state.resting.sum()),
+        }
+        self.rows.append(row)
+        if self.log.callback is not None:
+            self.log.callback(Progress(len(self.rows) - 1, state.result_surface, row))
 
     def _step(self) -> None:
         """One step: along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
@@ -193,19 +184,19 @@ class NewtonRun:
         else:
             self.stuck = True
         self.steps_since_best += 1
-        if self.state.relative < 0.5 * self.best:
-            self.best, self.steps_since_best = self.state.relative, 0
+        if self.state.at.residual < 0.5 * self.best:
+            self.best, self.steps_since_best = self.state.at.residual, 0
 
     def _at_rest(self) -> bool:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
-        residual = self.state.relative
+        residual = self.state.at.residual
         no_progress = self.stuck or self.steps_since_best > PATIENCE
         rounded = max(ROUNDED, NOISE * self.state.rounding)
         return residual <= self.options.tolerance or (residual <= rounded and no_progress)
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
-        if self.options.target == "minimum" and self.stepper.leave_saddle():
+        if self.options.target == "minimum" and self.stepper.leave_saddle(self.state.at):
             return True
         if not self.state.resting.any():
             return False
@@ -215,25 +206,26 @@ class NewtonRun:
             return True
         return False
 
-    def _crawls(self) -> bool:
+    def _descends_slowly(self) -> bool:
         """Whether the way down from a saddle hardly lowers E: often it only spoils triangles.
 
-        True once for each number of steps in ``CRAWLS``.
+        True once for each number of steps in ``SLOW_DESCENT_STEPS``.
         """
         state = self.state
-        if self.crawl == np.inf or self.stepper.kind not in DOWN or state.relative > NEAR:
-            self._descent, self.uphill = [], (state.X, state.version)
+        down = self.stepper.kind in DOWN and state.at.residual <= NEAR_SADDLE
+        if self.patience == np.inf or not down:
+            self._descent, self.before_descent = [], (state.at.X, state.version)
             return False
         self._descent.append(state.energy)
-        if len(self._descent) <= self.crawl:
+        if len(self._descent) <= self.patience:
             return False
-        scale = float(state.surface.tensions @ patch_areas(state.surface.moved(state.X)))
-        return self._descent[-int(self.crawl) - 1] - state.energy < CREEP * scale
+        scale = float(state.at.surface.tensions @ patch_areas(state.at.shape))
+        return self._descent[-int(self.patience) - 1] - state.energy < MIN_ENERGY_DROP * scale
 
-    def surface_uphill(self) -> Surface:
+    def surface_before_descent(self) -> Surface:
         """The whole surface where the present way down from a saddle began."""
-        state, (X, version) = self.state, self.uphill
-        return state.result_surface(X if version == state.version else state.X)
+        X, version = self.before_descent
+        return self.state.result_surface(X if version == self.state.version else None)
 
     def _ended(self) -> Status | None:
         """Why no further step makes sense, or None."""
@@ -241,15 +233,10 @@ class NewtonRun:
         if not np.isfinite(state.energy):
             return Status.NON_FINITE
         collapsed = state.quality < COLLAPSED
-        extent = np.linalg.norm(np.ptp(state.X, axis=0)) / state.size
+        extent = np.linalg.norm(np.ptp(state.at.X, axis=0)) / state.size
         # triangles of a surface that inflates may collapse on the way
         if extent > inflation or (collapsed and extent > np.sqrt(inflation)):
             return Status.DIVERGED
         if extent < SHRUNK:
             return Status.VANISHED
         return Status.DEGENERATE if collapsed else None
-
-    def _given_up(self, status: Status) -> Status:
-        """The status, or DEGENERATE where the quality of triangles explains it."""
-        poor = min(POOR, 0.5 * self.first_quality)
-        return Status.DEGENERATE if self.state.quality < poor else status

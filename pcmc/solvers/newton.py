@@ -14,20 +14,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import SurfaceError
-from ..certificate.collapse import held_wall_down
-from ..certificate.slipping import describe_saddle, slipping_ends
+from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..contact.pinching import find_walls
 from ..forces.functional import energy
 from ..forces.rooms import check_rooms, room_pressures
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import ways_down
+from ..stability.modes import descent_mode
 from ..surface import Surface
-from .attempt import CRAWLS, DESCENTS, POOR, History, NewtonOptions, NewtonRun
+from .attempt import DESCENTS, POOR, SLOW_DESCENT_STEPS, Log, NewtonOptions, NewtonRun
 from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]
@@ -43,109 +43,95 @@ def newton(
     _refuse_loose_parts(surface)
     check_rooms(surface)
     refinable("levels", options.levels, surface.m)
-    history, first = History(callback), surface
+    log, first, rows = Log(callback), surface, list[dict[str, Any]]()
     for level in range(options.levels + 1):
-        end = _solve_level(surface, options, history, level)
+        end = _solve_level(surface, options, log, level, rows)
         if end.status is not Status.CONVERGED or level == options.levels:
             break
-        surface = refine(end.state.result_surface())
+        surface, rows = refine(end.state.result_surface()), end.rows
     reached = end.state.result_surface()
     return Result(
         surface=reached,
         status=end.status,
         method="newton",
         energy=energy(reached) if reached.rooms else end.state.energy,
-        iterations=len(history.rows) - 1,
-        evaluations=history.evaluations,
-        rows=history.rows,
-        note=history.note,
+        iterations=len(end.rows) - 1,
+        evaluations=log.evaluations,
+        rows=end.rows,
+        note=end.note,
         room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
     )
 
 
-def _solve_level(surface: Surface, options: NewtonOptions, history: History, level: int) -> NewtonRun:
+def _solve_level(
+    surface: Surface, options: NewtonOptions, log: Log, level: int, rows: list[dict[str, Any]]
+) -> NewtonRun:
     """Solve on one mesh; where a junction comes down on a held bottom, once more so that it can rest."""
-    end = _attempts(surface, options, history, level)
+    end = _attempts(NewtonRun(surface, options, log, level, rows))
     if end.status not in LOST:
         return end
     if not held_wall_down(end.state.result_surface(), end.state.walls.pinchable):
         return end
     if not find_walls(surface, held=True).held.any():
         return end
-    rows, note = len(history.rows), history.note
-    again = _attempts(surface, options, history, level, held=True)
-    if again.status in (Status.CONVERGED, Status.SADDLE, Status.STOPPED):
-        return again
-    del history.rows[rows:]
-    history.note = note
-    return end
+    again = _attempts(NewtonRun(surface, options, log, level, end.rows, held=True))
+    return again if again.status in (Status.CONVERGED, Status.SADDLE, Status.STOPPED) else end
 
 
-def _attempts(
-    surface: Surface, options: NewtonOptions, history: History, level: int, held: bool = False
-) -> NewtonRun:
-    """Solve on one mesh; where that fails, once more from the same start in another way."""
-    first = NewtonRun(surface, options, history, level, held=held).run()
-    for more in (*CRAWLS[1:], inf):
+def _attempts(first: NewtonRun) -> NewtonRun:
+    """Run it; where that fails, once more from the same start in another way."""
+    start, options = first.state.full, first.options
+    first.run()
+    for more in (*SLOW_DESCENT_STEPS[1:], inf):
         if first.status is not Status.SADDLE:
             break
-        end = _saddle_near(first, must_slip=first.crawl == CRAWLS[0])
-        if end is not None:
-            return end
-        first.crawl = more
+        # the saddle from which it only crawls, or a minimum there
+        near = _to_any(first, first.surface_before_descent(), first.state.held)
+        if near.status is Status.STOPPED or _rests(near, first.patience == SLOW_DESCENT_STEPS[0]):
+            return near
+        first.patience = more
         first.run()
     if first.status not in LOST:
         return first
-    rows, minimum = len(history.rows), options.target == "minimum"
-    other_way = replace(options, target="stationary")
-    second = NewtonRun(surface, other_way, history, level, 0 if minimum else DESCENTS, held).run()
+    minimum = options.target == "minimum"
+    second = _to_any(first, start, first.held, 0 if minimum else DESCENTS)
     if second.status is Status.STOPPED:
-        if second.state.relative < first.state.relative:
+        if second.state.at.residual < first.state.at.residual:
             return second
         first.status = Status.STOPPED
     if not minimum and second.status is Status.CONVERGED and second.state.quality >= POOR:
         return second
     if minimum and _rests(second, must_slip=True):
         return second
-    del history.rows[rows:]
+    first.note = second.note
     return first
 
 
-def _saddle_near(crawling: NewtonRun, must_slip: bool) -> NewtonRun | None:
-    """The saddle from which an attempt only crawls, or a minimum there; None if there is neither.
-
-    ``must_slip``: only a saddle in whose lowest mode an end of a junction slips.
-    """
-    history, rows = crawling.history, len(crawling.history.rows)
-    other_way = replace(crawling.options, target="stationary")
-    held = crawling.state.held
-    end = NewtonRun(crawling.surface_uphill(), other_way, history, crawling.level, held=held).run()
-    if end.status is Status.STOPPED or _rests(end, must_slip):
-        return end
-    del history.rows[rows:]
-    history.note = ""
-    return None
+def _to_any(first: NewtonRun, surface: Surface, held: bool, smooth_steps: int = 0) -> NewtonRun:
+    """An attempt to find any stationary point, from a surface."""
+    options = replace(first.options, target="stationary")
+    return NewtonRun(surface, options, first.log, first.level, first.rows, smooth_steps, held).run()
 
 
 def _rests(end: NewtonRun, must_slip: bool) -> bool:
     """Whether an attempt to find any stationary point ends what was asked for: a minimum, or the saddle.
 
     The saddle ends it, with status SADDLE, if an end of a junction slips in its lowest mode, as the way
-    down then leads to collapsed triangles, or if that does not matter. The history's note names it.
+    down then leads to collapsed triangles, or if that does not matter. Its note names it.
     """
     if end.status is not Status.CONVERGED or end.state.quality < POOR:
         return False
     surface = end.state.result_surface()
     try:
-        index, mode = ways_down(surface)
+        index, mode = descent_mode(surface)
     except SingularMatrix:
         return False
     if index == 0:
         return True
     if slipping_ends(surface, mode) or not must_slip:
-        end.status, end.history.note = Status.SADDLE, describe_saddle(surface, index, mode)
+        end.status, end.note = Status.SADDLE, describe_saddle(surface, index, mode)
         return True
-    end.history.note = f"a saddle of index {index} is near: target='stationary' returns it"
+    end.note = f"a saddle of index {index} is near: target='stationary' returns it"
     return False
 
 

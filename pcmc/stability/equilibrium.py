@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..contact.pinching import StandingPart, standing_part
 from ..contact.pull import excess_pull
-from ..forces.functional import apply_supports, energy_and_gradient
+from ..forces.functional import energy_and_gradient
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.loose_parts import relative_forces
 from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
@@ -30,6 +30,7 @@ from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
 from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
+from ..surface.supports import apply_supports
 from .bordered import BorderedFactor
 from .factorisation import Factor, Factoriser, SingularMatrix, factoriser
 
@@ -40,12 +41,10 @@ SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
 class _Unknowns(NamedTuple):
-    """What all positions share that have as many unknowns at each vertex (n,)."""
+    """The pattern of A, and what factorises matrices of this pattern."""
 
-    dimension: Ints
     pattern: Pattern
     factoriser: Factoriser
-    rigid_motions: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +63,6 @@ class Equilibrium:
     X: Floats
     backend: str | None = None
     least_volume: float = 0.0
-    _last: _Unknowns | None = None
 
     @classmethod
     def of(cls, surface: Surface, backend: str | None = None) -> Equilibrium:
@@ -75,11 +73,19 @@ class Equilibrium:
     def at(self, X: Floats, surface: Surface | None = None) -> Equilibrium:
         """The same part at other positions, or with the tensions and pressures of another surface.
 
-        The pattern and what was found out about it go along, as long as they fit.
+        The pattern and its order of elimination go along where each vertex has as many unknowns.
         """
         part = self.part if surface is None else replace(self.part, surface=surface)
-        known = self.unknowns if "unknowns" in self.__dict__ else self._last
-        return replace(self, part=part, X=X, _last=known)
+        new, known = replace(self, part=part, X=X), self.__dict__
+        if "rigid_motions" in known:
+            new.__dict__["rigid_motions"] = self.rigid_motions
+        if "unknowns" in known and np.array_equal(new.space.dimension, self.space.dimension):
+            new.__dict__["unknowns"] = self.unknowns
+        return new
+
+    def release(self) -> None:
+        """Give back the memory of the factoriser; another is made when it is asked for."""
+        self.__dict__.pop("unknowns", None)
 
     @property
     def surface(self) -> Surface:
@@ -178,38 +184,37 @@ class Equilibrium:
         return np.stack(columns, axis=1) if columns else np.zeros((self.space.size, 0))
 
     @cached_property
-    def residual(self) -> float:
-        """‖r‖ over the scale, with the volumes' relative defects; of loose parts the worst counts."""
+    def norm(self) -> float:
+        """‖r‖, with the volumes' defects in units of force; of loose parts the worst counts as if all."""
         if self.surface.topology.components.any():
-            forces = relative_forces(self.surface, self.classes, self.X, self.unbalanced)
-        else:
-            forces = float(np.linalg.norm(self.forces)) / self.scale
-        return float(np.hypot(forces, self._volume_residual))
+            left = relative_forces(self.surface, self.classes, self.X, self.unbalanced)
+            return self._with_volumes(self.scale * left)
+        return self._with_volumes(float(np.linalg.norm(self.forces)))
+
+    @property
+    def residual(self) -> float:
+        """``norm`` over the scale."""
+        return self.norm / self.scale
 
     @cached_property
     def residual_with_pull(self) -> float:
         """The same with ``excess_pull``."""
         forces = np.column_stack([self.unbalanced, self.excess_pull])
-        relative = relative_forces(self.surface, self.classes, self.X, forces)
-        return float(np.hypot(relative, self._volume_residual))
+        left = relative_forces(self.surface, self.classes, self.X, forces)
+        return self._with_volumes(self.scale * left) / self.scale
 
-    @property
-    def _volume_residual(self) -> float:
+    def _with_volumes(self, norm: float) -> float:
         if not self.surface.rooms:
-            return 0.0
-        return float(np.linalg.norm(self.volume_defects * self.volume_units)) / self.scale
+            return norm
+        return float(np.hypot(norm, np.linalg.norm(self.volume_units * self.volume_defects)))
 
     # The second variation
 
     @cached_property
     def unknowns(self) -> _Unknowns:
-        """The sparsity pattern of A, and what factorises matrices of this pattern."""
-        dimension, last = self.space.dimension, self._last
-        if last is not None and np.array_equal(last.dimension, dimension):
-            return last
+        """The pattern of A and its factoriser; they stay while each vertex has as many unknowns."""
         pattern = hessian_pattern(self.classes, self.space)
-        solver = factoriser(pattern, self.backend, self._strength_units())
-        return _Unknowns(dimension, pattern, solver, rigid_motions(self.surface))
+        return _Unknowns(pattern, factoriser(pattern, self.backend, self._strength_units()))
 
     def _strength_units(self) -> Floats | None:
         """(N,) 1/√α of the tension around each unknown, as powers of two; None if all are of one order.
@@ -238,9 +243,14 @@ class Equilibrium:
         return np.repeat(np.bincount(F.ravel(), np.repeat(pull, 3), len(self.X)), self.space.dimension)
 
     @cached_property
+    def rigid_motions(self) -> Floats:
+        """(k,2,3) the rigid motions that no support resists; see the function of this name."""
+        return rigid_motions(self.surface)
+
+    @cached_property
     def rigid(self) -> Floats:
-        """(N,k) orthonormal: the rigid motions that no support resists, as the motion space has them."""
-        return rigid_modes(self.space, self.unknowns.rigid_motions, self.X)
+        """(N,k) the same in the motion space, orthonormal."""
+        return rigid_modes(self.space, self.rigid_motions, self.X)
 
     @cached_property
     def excluded(self) -> Floats:

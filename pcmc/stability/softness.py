@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..base.arrays import Floats
+from .equilibrium import Equilibrium, SecondVariation
 from .factorisation import SingularMatrix
-from .modes import SecondVariation, Stiffness
 
 
 @dataclass(frozen=True)
@@ -39,37 +39,37 @@ class Spectrum:
         return self.below is None or bool(self.hidden)
 
 
-def count_soft(variation: SecondVariation, band: float, near: float) -> tuple[Spectrum, Stiffness | None]:
+def count_soft(at: Equilibrium, band: float, near: float) -> tuple[Spectrum, SecondVariation | None]:
     """The counts for two bands in units of α, 1/length², and a factor for the modes; None if there is none.
 
     One factorisation where nothing is near or negative, two where nothing is near, else up to seven.
     """
-    wide = near * variation.surface.tensions.max(initial=0.0) * variation.mass
-    above = _at(variation, wide)
+    wide = near * at.surface.tensions.max(initial=0.0) * at.mass
+    above = _factorised(at, wide)
     if above is not None and above.negative == 0:
         return Spectrum(0, 0), above
-    below = _at(variation, -wide)
+    below = _factorised(at, -wide)
     if above is not None and below is not None and above.negative == below.negative:
         return Spectrum(below.negative, below.negative), below
-    least, most = _between(variation, near)
+    least, most = _between(at, near)
     near_count = 0 if least is None or most is None else most - least
-    down, up = _between(variation, band)
-    here = _at(variation, 0.0)  # the last: it has the modes
+    down, up = _between(at, band)
+    here = _factorised(at, 0.0)  # the last: it has the modes
     index = None if here is None else here.negative
     if down is None or up is None:
         return Spectrum(index), here
     index = down if down == up else index
-    return Spectrum(index, down, up - down, near_count), here or _at(variation, wide)
+    return Spectrum(index, down, up - down, near_count), here or _factorised(at, wide)
 
 
-def _between(variation: SecondVariation, band: float) -> tuple[int, int] | tuple[None, None]:
+def _between(at: Equilibrium, band: float) -> tuple[int, int] | tuple[None, None]:
     """The negative eigenvalues of A + band·N, and those of A - band·N; None where rounding hides one."""
-    ends = [_at(variation, shift * variation.tension_mass) for shift in (-band, band)]
+    ends = [_factorised(at, shift * at.tension_mass) for shift in (-band, band)]
     return (None, None) if ends[0] is None or ends[1] is None else (ends[0].negative, ends[1].negative)
 
 
-def _at(variation: SecondVariation, shift: Floats | float) -> Stiffness | None:
+def _factorised(at: Equilibrium, shift: Floats | float) -> SecondVariation | None:
     try:
-        return variation.at(shift)
+        return at.factorised(shift)
     except SingularMatrix:
         return None

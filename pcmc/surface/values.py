@@ -67,6 +67,14 @@ def with_values(
     return tuple(replace(part, **changes[part.name]) if changes[part.name] else part for part in parts)
 
 
+def rates_of(surface: Surface, kind: str, by_name: Mapping[str, float]) -> Floats:
+    """The rates of change of the values of one kind, given by name; walls that are not named follow."""
+    named = {part_index(surface, kind, name): rate for name, rate in by_name.items()}
+    rates = np.zeros(len(getattr(surface, KINDS[kind][0])))
+    rates[list(named)] = list(named.values())
+    return rates + wall_changes(surface, rates, named) if kind in ("pressures", "snows") else rates
+
+
 def wall_changes(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:
     """(k,) changes of the walls' pressures, or snow, that follow from those ``change`` (k,) of the patches'.
 

@@ -11,10 +11,9 @@ each case in a process of its own (case_process.py, case_script.py). May import 
 
 from .grid import Sweep, checked
 from .running import Progress, run
-from .short_table import draw_sweep, short_table
 from .solving import solve_case
 from .store import Record, read_store
-from .table import provenance, table, write_table
+from .tables import draw_sweep, provenance, short_table, table, write_table
 
 __all__ = [
     "Progress",

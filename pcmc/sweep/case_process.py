@@ -13,8 +13,8 @@ from __future__ import annotations
 import platform
 import signal
 import threading
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -31,28 +31,10 @@ ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "
 SCRIPT = Path(case_script.__file__)
 
 
-def _outcome(
-    process: ChildProcess, case: str, parameters: Mapping[str, Any], time_limit: float | None
-) -> dict[str, Any]:
-    """Run one case; the fields of its record from ``status`` on."""
-    started = datetime.now(UTC)
-    limit = None if time_limit is None else time_limit + GRACE  # for a process that cannot end itself
-    try:
-        outcome: dict[str, Any] = process.call(SCRIPT, "run", case, parameters, time_limit, limit=limit)
-        return outcome
-    except ChildError as death:
-        status, message = "killed", f"ended its worker process ({_cause(death.code or 0)})"
-        if time_limit is not None and death.seconds >= time_limit:
-            status, message = "timed out", f"stopped at its time limit of {time_limit:g} s"
-        about = {"output": death.output, "host": platform.node(), "pid": process.process.pid}
-        return {
-            "status": status,
-            "verdict": "",
-            "message": message,
-            "numbers": {},
-            "wall_time": death.seconds,
-            "provenance": {"started": started.isoformat(timespec="milliseconds"), **about},
-        }
+def failed_outcome(status: str, message: str, seconds: float, about: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a Record, from ``status`` on, of a case that gave no answer."""
+    words = {"status": status, "verdict": "", "message": message}
+    return {**words, "numbers": {}, "wall_time": seconds, "provenance": about}
 
 
 def _cause(code: int) -> str:
@@ -75,37 +57,38 @@ class Team:
         self.idle: list[ChildProcess] = []
         self.closed = False
 
-    def borrow(self, case: str) -> ChildProcess:
-        """An idle process, or a new one."""
+    @contextmanager
+    def process(self, case: str) -> Iterator[ChildProcess]:
+        """An idle process, or a new one; it is kept for the next case while it is alive."""
         with self.lock:
-            while self.idle:
-                process = self.idle.pop()
-                if process.alive:
-                    return process
-                self._drop(process)
-            if self.closed:
-                raise SweepError("the sweep has ended")
-            process = ChildProcess(ONE_THREAD)
-            self.all.append(process)
+            while self.idle and not self.idle[-1].alive:
+                self._drop(self.idle.pop())
+            if new := not self.idle:
+                if self.closed:
+                    raise SweepError("the sweep has ended")
+                self.all.append(ChildProcess(ONE_THREAD))
+            process = self.all[-1] if new else self.idle.pop()
+        try:
+            if new:
+                self._load(process, case)
+            yield process
+        except BaseException:  # Ctrl-C in a process pool: the next case must not get this one's answer
+            process.close()
+            raise
+        finally:
+            with self.lock:
+                if process.alive and not self.closed:
+                    self.idle.append(process)
+                else:
+                    self._drop(process)
+
+    def _load(self, process: ChildProcess, case: str) -> None:
         try:
             process.call(SCRIPT, "load", case)
-        except BaseException as error:
-            with self.lock:
-                self._drop(process)
-            if not isinstance(error, ChildError):
-                raise
+        except ChildError as error:
             problem = f"a worker on {platform.node()} cannot load the case {case!r};"
             problem += f" install its package where the workers run:\n{error.output.strip()}"
             raise SweepError(problem, what=case, where=platform.node()) from None
-        return process
-
-    def give_back(self, process: ChildProcess) -> None:
-        """Keep the process for the next case if it is alive."""
-        with self.lock:
-            if process.alive and not self.closed:
-                self.idle.append(process)
-            else:
-                self._drop(process)
 
     def close_idle(self) -> None:
         """End the processes that run no case."""
@@ -148,14 +131,19 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
                 other.close_idle()
             _teams[team] = Team()
         mine = _teams[team]
-    process = mine.borrow(case)
-    try:
-        return _outcome(process, case, parameters, time_limit)
-    except BaseException:  # Ctrl-C in a process pool: the next case must not get this one's answer
-        process.close()
-        raise
-    finally:
-        mine.give_back(process)
+    limit = None if time_limit is None else time_limit + GRACE  # for a process that cannot end itself
+    with mine.process(case) as process:
+        started = datetime.now(UTC)
+        try:
+            outcome: dict[str, Any] = process.call(SCRIPT, "run", case, parameters, time_limit, limit=limit)
+            return outcome
+        except ChildError as death:
+            status, message = "killed", f"ended its worker process ({_cause(death.code or 0)})"
+            if time_limit is not None and death.seconds >= time_limit:
+                status, message = "timed out", f"stopped at its time limit of {time_limit:g} s"
+            about = {"output": death.output, "host": platform.node(), "pid": process.process.pid}
+            about |= {"started": started.isoformat(timespec="milliseconds")}
+            return failed_outcome(status, message, death.seconds, about)
 
 
 def retire(team: str) -> None:

@@ -67,39 +67,45 @@ class Sweep:
         fixed = {name: _plain(value, name) for name, value in (fixed or {}).items()}
         object.__setattr__(self, "fixed", fixed)
         if not self.grid:
-            text = "the grid is empty; give at least one parameter a list of values"
-            raise OptionError(text, what="grid")
+            raise OptionError("the grid is empty; give at least one parameter a list of values", what="grid")
         for name in self.grid:
             if name in fixed:
                 text = f"{name!r} is in the grid and among the fixed; keep one"
                 raise OptionError(text, what="fixed", where=name)
-        self._check_against(_function(self.case))
+        self._check_parameters()
 
-    def _check_against(self, function: Callable[..., Any]) -> None:
-        """Refuse parameters that the function does not take, before any case is run."""
-        names = [*self.grid, *self.fixed]
+    def _check_parameters(self) -> None:
+        """Refuse a function that cannot be found, and parameters that it does not take."""
+        names, case = [*self.grid, *self.fixed], self.case
+        try:
+            function = resolve(case)
+        except (ImportError, AttributeError, ValueError) as error:
+            text = f"the case {case!r} cannot be found ({error}); expected 'package.module:function'"
+            raise OptionError(text, what="case", found=case) from error
+        if not callable(function):
+            text = f"the case {case!r} is not a function but {function!r:.60}"
+            raise OptionError(text, what="case", found=case)
         for name in names:
             if name == "case" or name in WORDS:
-                text = f"a parameter may not be called {name!r}: a column has that name"
-                raise OptionError(text, what=name)
+                raise OptionError(
+                    f"a parameter may not be called {name!r}: a column has that name", what=name
+                )
         try:
             taken = inspect.signature(function).parameters
         except (TypeError, ValueError):
-            text = f"{self.case!r} has no signature, so its parameters are unknown; wrap it in a function"
-            raise OptionError(text, what="case", found=self.case) from None
-        kinds = {p.kind for p in taken.values()}
+            text = f"{case!r} has no signature, so its parameters are unknown; wrap it in a function"
+            raise OptionError(text, what="case", found=case) from None
         named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
         keywords = [name for name, p in taken.items() if p.kind in named]
+        takes_all = any(p.kind == inspect.Parameter.VAR_KEYWORD for p in taken.values())
         for name in names:
-            if name not in keywords and inspect.Parameter.VAR_KEYWORD not in kinds:
-                text = f"{unknown('parameter', name, keywords)} (of {self.case})"
+            if name not in keywords and not takes_all:
+                text = f"{unknown('parameter', name, keywords)} (of {case})"
                 raise OptionError(text, what=name, found=name, expected=tuple(keywords))
         for name in keywords:
             if taken[name].default is inspect.Parameter.empty and name not in names:
-                text = f"{self.case} needs the parameter {name!r}, which has no value"
-                raise OptionError(text, what=name)
-        check = getattr(function, "check", None)
-        if check is not None:
+                raise OptionError(f"{case} needs the parameter {name!r}, which has no value", what=name)
+        if (check := getattr(function, "check", None)) is not None:
             for parameters in self:
                 check(**parameters)
 
@@ -108,19 +114,14 @@ class Sweep:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """The parameters of each case, in order."""
-        return cases(self.grid, self.fixed)
+        for values in itertools.product(*self.grid.values()):
+            yield dict(zip(self.grid, values, strict=True)) | dict(self.fixed)
 
     @property
     def fingerprint(self) -> str:
         """SHA-256 of the case's name, the grid with its order, and the fixed parameters."""
         parts = [self.case, list(self.grid.items()), sorted(self.fixed.items())]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def cases(grid: Mapping[str, Sequence[Any]], fixed: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The parameters of each case, in order."""
-    for values in itertools.product(*grid.values()):
-        yield dict(zip(grid, values, strict=True)) | dict(fixed)
 
 
 def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -136,18 +137,6 @@ def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Call
     return mark
 
 
-def _function(case: str) -> Callable[..., Any]:
-    try:
-        function = resolve(case)
-    except (ImportError, AttributeError, ValueError) as error:
-        text = f"the case {case!r} cannot be found ({error}); expected 'package.module:function'"
-        raise OptionError(text, what="case", found=case) from error
-    if not callable(function):
-        text = f"the case {case!r} is not a function but {function!r:.60}"
-        raise OptionError(text, what="case", found=case)
-    return function
-
-
 def _path(function: Callable[..., Any]) -> str:
     module = getattr(function, "__module__", None)
     name = getattr(function, "__qualname__", "<unnamed>")
@@ -160,16 +149,13 @@ def _path(function: Callable[..., Any]) -> str:
 
 def _axis(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping | Set) or not np.iterable(values):
-        raise OptionError(
-            f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs to fixed",
-            what="grid",
-            where=name,
-            found=values,
+        text = (
+            f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs to fixed"
         )
+        raise OptionError(text, what="grid", where=name, found=values)
     axis = [_plain(value, f"{name}[{i}]") for i, value in enumerate(values)]
     if not axis:
-        text = f"grid[{name!r}] is empty; give it at least one value"
-        raise OptionError(text, what="grid", where=name)
+        raise OptionError(f"grid[{name!r}] is empty; give it at least one value", what="grid", where=name)
     seen: dict[str, int] = {}
     for i, value in enumerate(axis):
         first = seen.setdefault(json.dumps(value, sort_keys=True), i)

@@ -14,8 +14,8 @@ from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
-from .short_table import with_units
 from .solving import mesh_columns, row
+from .tables import with_units
 
 
 def project_sweep(
@@ -113,7 +113,7 @@ def solve_project(
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
     outcome = projects.solve_project(replace(design, search=search), start)
-    outcome = replace(outcome, project=design, unfold=design.whole)
+    outcome = replace(outcome, project=design, unfold=design.output.whole)
     names = ("project", "project_digest", "method", "mesh_check", "search", *values)
     answer = row(outcome.solved, names, outcome)
     if mesh_check or design.mesh_check:

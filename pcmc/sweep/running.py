@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 from ..base import validate
 from ..base.errors import OptionError, SweepError
 from ..base.interrupts import interrupts_handled, stop_requested
+from .case_process import failed_outcome
 from .grid import Sweep
 from .store import Record, open_store
-from .table import table
+from .tables import table
 from .workers import OWN_VERSION, Submit, open_workers
 
 if TYPE_CHECKING:
@@ -30,21 +31,13 @@ PACE = 0.05  # seconds between two transactions: each costs some milliseconds
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a sweep, passed to ``on_record`` after each case.
+    """The state of a sweep, passed to ``on_record`` after each case."""
 
-    Attributes
-    ----------
-    record : the case just stored.
-    done, total : cases stored, cases in all.
-    counts : how many cases have each verdict (the status, where a case gave no verdict).
-    seconds_left : estimate from the pace of this run.
-    """
-
-    record: Record
-    done: int
-    total: int
-    counts: dict[str, int]
-    seconds_left: float
+    record: Record  # just stored
+    done: int  # cases stored
+    total: int  # cases in all
+    counts: dict[str, int]  # how many cases have each verdict (the status, where a case gave no verdict)
+    seconds_left: float  # estimate from the pace of this run
 
 
 def run(
@@ -191,9 +184,8 @@ def _submitted(
             try:
                 future = submit(parameters)
             except RuntimeError as error:  # shut down, or broken
-                raise SweepError(
-                    f"the executor takes no cases ({error}); give a new one", what="executor"
-                ) from error
+                text = f"the executor takes no cases ({error}); give a new one"
+                raise SweepError(text, what="executor") from error
             pending[future] = number
             future.add_done_callback(finished.put)
         yield pending
@@ -227,29 +219,19 @@ def _batches(
 
 
 def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
-    """The fields of a case's record; SweepError if the executor failed, not the case."""
+    """The fields of a case's record; SweepError if the executor failed, or a worker has another pcmc."""
     try:
-        return _of_this_version(future.result())
+        outcome = future.result()
     except SweepError:
         raise
     except (Exception, CancelledError) as error:
         text = f"{type(error).__name__}: {error}".removesuffix(": ")
         if type(error).__name__ == "KilledWorker":  # Dask's, after some tries on several workers
-            return {
-                "status": "killed",
-                "verdict": "",
-                "message": "ended its Dask worker, several times",
-                "numbers": {},
-                "wall_time": float("nan"),
-                "provenance": {"output": text},
-            }
+            message = "ended its Dask worker, several times"
+            return failed_outcome("killed", message, float("nan"), {"output": text})
         problem = f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
         problem += " again to go on from there"
         raise SweepError(problem, what="executor", found=text) from error
-
-
-def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
-    """The outcome; SweepError if a worker with another version of pcmc returned it."""
     about = outcome["provenance"]
     found = about.get("pcmc", OWN_VERSION)  # a case that ended its process does not say
     if found != OWN_VERSION:

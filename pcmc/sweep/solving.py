@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from ..certificate import Certificate
     from ..project import Outcome
 
-Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 
-
-def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
+def _split(
+    generator: str, method: str, arguments: Mapping[str, Any]
+) -> tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]:
     """The generator, and which arguments are its own and which the solver's."""
     try:
         build = resolve(generator)

@@ -17,7 +17,7 @@ import sqlite3
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,28 +37,16 @@ FAILED = ("raised", "timed out", "killed")  # statuses that ``run`` gives; a cas
 
 @dataclass(frozen=True)
 class Record:
-    """One finished case.
+    """One finished case."""
 
-    Attributes
-    ----------
-    case : its number in the sweep.
-    parameters : the values it was run with.
-    status : ``"raised"``, ``"timed out"`` or ``"killed"`` for a case that failed; otherwise the status that
-        the case returned, or ``"finished"``.
-    verdict, message : texts that the case returned. If the case failed, the message is the reason.
-    numbers : all else that the case returned.
-    wall_time : in seconds.
-    provenance : when and where the case ran, with which versions; the last output of a failed case.
-    """
-
-    case: int
-    parameters: dict[str, Any]
-    status: str
-    verdict: str
-    message: str
-    numbers: dict[str, Any]
-    wall_time: float
-    provenance: dict[str, Any]
+    case: int  # its number in the sweep
+    parameters: dict[str, Any]  # the values it was run with
+    status: str  # one of FAILED; otherwise what the case returned, or "finished"
+    verdict: str  # that the case returned
+    message: str  # that the case returned; of a failed one, the reason
+    numbers: dict[str, Any]  # all else that the case returned
+    wall_time: float  # in seconds
+    provenance: dict[str, Any]  # when and where it ran, with which versions; output of a failed case
 
     @property
     def failed(self) -> bool:
@@ -66,12 +54,13 @@ class Record:
         return self.status in FAILED
 
 
+@dataclass
 class Store:
     """An open store: ``records`` by case number, and ``append`` for more."""
 
-    def __init__(self, path: Path, database: sqlite3.Connection, records: dict[int, Record]) -> None:
-        self.path, self.records = path, records
-        self._database = database
+    path: Path
+    database: sqlite3.Connection
+    records: dict[int, Record]
 
     def append(self, records: Iterable[Record]) -> None:
         """Write records in one transaction, and return when the disk holds them.
@@ -81,11 +70,16 @@ class Store:
         FileError : the disk is full or fails. The records stored before stay.
         """
         new = {record.case: record for record in records}
-        rows = [_row(record) for record in new.values()]
+        rows = []
+        for record in new.values():
+            fields = dict(vars(record))
+            del fields["case"]
+            key, text = _key(fields.pop("parameters")), json.dumps(fields)
+            rows.append((key, text, zlib.crc32((key + text).encode())))  # SQLite has no checksums
         try:
-            self._database.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?, ?)", rows)
-            self._database.execute("COMMIT")
-            self._database.execute("BEGIN IMMEDIATE")
+            self.database.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?, ?)", rows)
+            self.database.execute("COMMIT")
+            self.database.execute("BEGIN IMMEDIATE")
         except sqlite3.Error as error:
             text = f"{self.path}: a record could not be written ({error}); the {len(self.records)} cases"
             text += " stored before it are safe; make room and run the same sweep again to go on from there"
@@ -103,11 +97,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
         cannot be opened.
     """
     path = Path(path)
-    _check_file(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise system_error(path, "opened for writing", error) from None
+    declared = {"case": sweep.case, "grid": dict(sweep.grid), "fixed": dict(sweep.fixed)}
     with _connected(path, "rwc") as database:
         _lock(path, database)
         if not database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]:
@@ -116,71 +106,55 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
             database.execute("INSERT INTO sweep VALUES (?, ?)", (version("pcmc"), "{}"))
             database.execute(f"PRAGMA user_version = {FORMAT}")
         else:
-            _check_declaration(path, _declaration(path, database), sweep)
-        database.execute("UPDATE sweep SET declaration = ?", (json.dumps(_declared(sweep)),))
+            _check_declaration(path, _declaration(path, database), declared)
+        database.execute("UPDATE sweep SET declaration = ?", (json.dumps(declared),))
         database.execute("COMMIT")
         database.execute("BEGIN IMMEDIATE")
         yield Store(path, database, _records(path, database, sweep.grid, sweep.fixed))
 
 
 def read_store(path: str | os.PathLike[str]) -> list[Record]:
-    """The records of a store; a sweep may be running on it.
+    """The records of a store, in the order of the grid; a sweep may be running on it.
 
-    The store may hold more: cases whose values the last sweep on it had no longer in its grid. They
-    are not returned.
-
-    Returns
-    -------
-    list of Record : in the order of the grid.
+    Cases whose values the last sweep on it had no longer in its grid are not returned.
 
     Raises
     ------
     FileError : the file cannot be read, or is no store.
     """
-    path = Path(path)
-    _check_file(path)
-    try:
-        path.open("rb").close()
-    except OSError as error:
-        raise system_error(path, "read", error) from None
-    with _connected(path, "rw") as database:
+    with _connected(Path(path), "rw") as database:
         database.execute("BEGIN")
-        declared = _declaration(path, database)
-        records = _records(path, database, declared["grid"], declared["fixed"])
-    return [records[number] for number in sorted(records)]
+        declared = _declaration(Path(path), database)
+        return [*_records(Path(path), database, declared["grid"], declared["fixed"]).values()]
 
 
 @contextmanager
 def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
-    """A connection to the file; errors of SQLite as FileError."""
-    database = None
-    try:
-        database = sqlite3.connect(
-            f"{path.absolute().as_uri()}?mode={mode}", READERS, isolation_level=None, uri=True
-        )
-        yield database
-    except sqlite3.Error as error:
-        raise FileError(f"{path}: cannot be used as a sweep's store ({error})", what=str(path)) from error
-    finally:
-        if database is not None:
-            database.close()
+    """A connection to the file, in mode "rwc" also to a new one; errors of SQLite as FileError.
 
-
-def _check_file(path: Path) -> None:
-    """Refuse a folder, a pipe, a device (some can be read without end), and a file of another kind."""
+    Refuses a folder, a pipe, a device (some can be read without end), and a file of another kind.
+    """
     check_regular(path)
+    start = b""
     try:
-        with path.open("rb") as file:
-            start = file.read(len(SQLITE))
-    except FileNotFoundError:
-        return
+        if mode == "rwc":
+            path.parent.mkdir(parents=True, exist_ok=True)
+        if mode == "rw" or path.exists():
+            with path.open("rb") as file:
+                start = file.read(len(SQLITE))
     except OSError as error:
-        raise system_error(path, "opened", error) from None
+        raise system_error(path, "opened for writing" if mode == "rwc" else "read", error) from None
     if start.startswith(LINES):
         text = f"{path}: is a store of an older pcmc, in lines of JSON; name a new file"
         raise FileError(text, what=str(path), found=1, expected=FORMAT)
     if start not in (b"", SQLITE):
         raise FileError(f"{path}: is not the store of a sweep; name another file", what=str(path))
+    try:
+        address = f"{path.absolute().as_uri()}?mode={mode}"
+        with closing(sqlite3.connect(address, READERS, isolation_level=None, uri=True)) as database:
+            yield database
+    except sqlite3.Error as error:
+        raise FileError(f"{path}: cannot be used as a sweep's store ({error})", what=str(path)) from error
 
 
 def _lock(path: Path, database: sqlite3.Connection) -> None:
@@ -201,12 +175,7 @@ def _lock(path: Path, database: sqlite3.Connection) -> None:
         if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
             raise
         text = f"{path}: another sweep is writing to it (or its disk has no file locks); wait for it, or"
-        text += " name another file"
-        raise FileError(text, what=str(path)) from error
-
-
-def _declared(sweep: Sweep) -> dict[str, Any]:
-    return {"case": sweep.case, "grid": dict(sweep.grid), "fixed": dict(sweep.fixed)}
+        raise FileError(f"{text} name another file", what=str(path)) from error
 
 
 def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
@@ -221,8 +190,7 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
     written_by, text = database.execute("SELECT version, declaration FROM sweep").fetchone() or ("", "")
     if found != FORMAT:
         text = f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
-        text += f" {written_by}"
-        raise FileError(text, what=str(path), found=found, expected=FORMAT)
+        raise FileError(f"{text} {written_by}", what=str(path), found=found, expected=FORMAT)
     columns = [row[1] for row in database.execute("PRAGMA table_info(cases)")]
     try:
         declared = {**json.loads(text), "version": written_by}
@@ -236,88 +204,59 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
     return declared
 
 
-def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None:
+def _check_declaration(path: Path, stored: dict[str, Any], new: dict[str, Any]) -> None:
     """Refuse a store of another sweep. The values in the grid may differ."""
-    if stored["version"] != version("pcmc"):
-        raise FileError(
-            f"{path}: written by pcmc {stored['version']}, this is pcmc {version('pcmc')}; numbers of"
-            " two versions do not mix: name a new file, or delete this one",
-            what=str(path),
-            where="version",
-            found=stored["version"],
-            expected=version("pcmc"),
-        )
-    new = _declared(sweep)
-    for part in ("case", "grid", "fixed"):
-        old, wanted = stored[part], new[part]
-        if part == "grid":
-            old, wanted = dict.fromkeys(old, "varied"), dict.fromkeys(wanted, "varied")
-        if old == wanted:
-            continue
-        where, was, now = part, old, wanted
-        if part != "case":
-            where = next(name for name in [*old, *wanted] if old.get(name) != wanted.get(name))
-            was, now = old.get(where, "missing"), wanted.get(where, "missing")
-        place = part if part == where else f"{part} {where!r}"
-        text = f"{path}: written for another sweep (its {place} is {was!r:.60}, this one's is {now!r:.60});"
+    old, own = stored["version"], version("pcmc")
+    if old != own:
+        text = f"{path}: written by pcmc {old}, this is pcmc {own}; numbers of two versions do not mix:"
         text += " name a new file, or delete this one"
-        raise FileError(text, what=str(path), where=where, found=was, expected=now)
+        raise FileError(text, what=str(path), where="version", found=old, expected=own)
+    was, now = (
+        {("case", ""): declared["case"]}
+        | {("grid ", name): "varied" for name in declared["grid"]}
+        | {("fixed ", name): value for name, value in declared["fixed"].items()}
+        for declared in (stored, new)
+    )
+    for part, name in [*was, *now]:
+        before, after = was.get((part, name), "missing"), now.get((part, name), "missing")
+        if before != after:
+            place = f"{part}{name!r}" if name else part
+            text = f"{path}: written for another sweep (its {place} is {before!r:.60}, this one's is"
+            text += f" {after!r:.60}); name a new file, or delete this one"
+            raise FileError(text, what=str(path), where=name or part, found=before, expected=after)
 
 
 def _key(value: Any) -> str:
     return json.dumps(value, sort_keys=True)
 
 
-def _row(record: Record) -> tuple[str, str, int]:
-    """Parameters, the rest of the record, and the checksum of both: SQLite has none."""
-    fields = dict(vars(record))
-    del fields["case"]
-    key = _key(fields.pop("parameters"))
-    text = json.dumps(fields)
-    return key, text, zlib.crc32((key + text).encode())
-
-
 def _records(
     path: Path, database: sqlite3.Connection, grid: Mapping[str, Sequence[Any]], fixed: Mapping[str, Any]
 ) -> dict[int, Record]:
     """The stored records of the grid's cases by case number; a record that is not sound is left out."""
-    places = {name: {_key(value): place for place, value in enumerate(grid[name])} for name in grid}
-    rest = {name: _key(value) for name, value in fixed.items()}
+    axes = dict(grid) | {name: [value] for name, value in fixed.items()}
+    places = {name: {_key(value): place for place, value in enumerate(axis)} for name, axis in axes.items()}
     records = {}
     for key, text, crc in database.execute("SELECT parameters, record, crc FROM cases"):
-        place = _place(key, places, rest)
-        if place is None:
+        try:
+            values = {name: _key(value) for name, value in json.loads(key).items()}
+            if values.keys() != axes.keys():
+                continue  # no case of the grid
+            case = {name: places[name][values[name]] for name in axes}
+        except (ValueError, TypeError, AttributeError, KeyError, RecursionError):
             continue
         number = 0
-        for name, axis in grid.items():
-            number = number * len(axis) + place[name]
-        parameters = {name: grid[name][place[name]] for name in grid} | dict(fixed)
+        for name, place in case.items():
+            number = number * len(axes[name]) + place
+        parameters = {name: axes[name][place] for name, place in case.items()}
         try:
             if zlib.crc32((key + str(text)).encode()) != crc:
                 raise ValueError
             records[number] = _record(number, parameters, json.loads(text))
         except (ValueError, TypeError, RecursionError):
-            warn(
-                f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
-                " case again",
-                FileWarning,
-                stacklevel=4,
-            )
+            text = f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
+            warn(f"{text} case again", FileWarning, stacklevel=4)
     return dict(sorted(records.items()))
-
-
-def _place(
-    key: Any, places: Mapping[str, Mapping[str, int]], fixed: Mapping[str, str]
-) -> dict[str, int] | None:
-    """Where on each axis the case with this key is; None if it is no case of the grid."""
-    try:
-        values = {name: _key(value) for name, value in json.loads(key).items()}
-    except (ValueError, TypeError, AttributeError, RecursionError):
-        return None
-    if values.keys() != places.keys() | fixed.keys() or any(values[name] != fixed[name] for name in fixed):
-        return None
-    place = {name: axis.get(values[name], -1) for name, axis in places.items()}
-    return None if min(place.values(), default=0) < 0 else place
 
 
 def _record(number: int, parameters: dict[str, Any], fields: Mapping[str, Any]) -> Record:

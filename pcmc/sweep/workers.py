@@ -60,7 +60,11 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
         except TimeoutError as error:
             text = f"the Dask scheduler at {address!r} has no workers; start one with: dask worker {address}"
             raise SweepError(text, what="scheduler", found=address) from error
-        _same_version(client)
+        for worker, found in client.run(version, "pcmc", on_error="return").items():
+            if found != OWN_VERSION:
+                text = f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
+                text += " the same version there"
+                raise SweepError(text, what="pcmc", where=worker, found=found, expected=OWN_VERSION)
         try:
             yield client.get_executor(pure=False)
         finally:
@@ -69,17 +73,6 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
                     client.run(retire, team, on_error="ignore")
 
 
-def _same_version(client: Any) -> None:
-    """Refuse a cluster whose workers have no pcmc, or another version of it."""
-    for worker, found in client.run(version, "pcmc", on_error="return").items():
-        if found != OWN_VERSION:
-            text = f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
-            text += " the same version there"
-            raise SweepError(text, what="pcmc", where=worker, found=found, expected=OWN_VERSION)
-
-
 def _processors() -> int:
     """The processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

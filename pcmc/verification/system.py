@@ -30,7 +30,6 @@ from ..forces.flat_pieces import flat_pieces
 from ..forces.motion_space import MotionSpace
 from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.rooms import closing_volumes, prescribed_volumes
-from ..stability.modes import full_matrix
 from .balls import SAFE, U
 from .enclosures import Elements, coordinates, elements, forces, second_variation, volume
 from .lipschitz import lipschitz
@@ -68,7 +67,7 @@ class System:
 
     def left_after(self, y: Floats) -> float:
         """A bound of ‖F - K y‖₂. Row i of the product is a sum of k_i terms, off by γ_(k_i+1) |K| |y|."""
-        matrix = full_matrix(self.pattern, self.matrix)
+        matrix = self.pattern.symmetric(self.matrix)
         terms = np.diff(matrix.indptr) + 3.0
         off = 2.0 * U * terms * (abs(matrix) @ np.abs(y) + np.abs(self.left)) + self.left_error
         total = np.abs(self.left - matrix @ y) + off

@@ -16,7 +16,7 @@ from pcmc import Surface, certify
 from pcmc.base.arrays import Bools, Floats
 from pcmc.base.errors import SurfaceError
 from pcmc.continuation import Branch, Direction, Ending, follow
-from pcmc.existence.folding import BACK, POOR, SOUND, Arrival, until_turned, way
+from pcmc.existence.homotopy import BACK, POOR, SOUND, classify_end, until_turned
 from pcmc.meshing.refinement import refine
 from pcmc.solvers import solve
 from pcmc.solvers.result import Progress, Result
@@ -24,7 +24,7 @@ from pcmc.solvers.result import Progress, Result
 PATCHES = ("wall", "large", "small")
 STEPS, SHORTEST = 25, 3e-4
 REACHED, FOLD, SLIP = "reached", "fold", "slip"
-ENDINGS = {Arrival.REACHED: REACHED, Arrival.FOLD: FOLD, Arrival.LOST: SLIP}
+ENDINGS = {"reached": REACHED, "fold": FOLD, "lost": SLIP}
 PAST = 1.03  # times its least tension: where a branch that weakens a patch has turned back
 
 
@@ -133,8 +133,8 @@ def branch_case(towards: list[Any], edge_length: float) -> dict[str, Any]:
     answer: dict[str, Any] = {}
     for start in towards[1:]:
         branch = _towards(target, np.array(start, dtype=float), edge_length)
-        end = way(branch, back=BACK)
-        ending, share, quality = ENDINGS[end.arrival], end.farthest, end.quality
+        end = classify_end(branch, back=BACK)
+        ending, share, quality = ENDINGS[end.kind], end.farthest, end.quality
         at = np.array(start) + share * (target - np.array(start))
         answer = {"ending": ending, "share": share, "quality": quality}
         answer |= {f"from_{name}": value for name, value in zip(PATCHES, start, strict=True)}

@@ -24,7 +24,7 @@ from pcmc.accuracy.estimator import error_shares, evenness
 from pcmc.base.arrays import Floats
 from pcmc.meshing.curve_projection import onto_held_curves
 from pcmc.meshing.refinement import refine
-from pcmc.plan import Area, Divider, Hole, Plan, circle
+from pcmc.plan import Divider, Hole, PatchSpec, Plan, circle
 
 from ..examples.elevations import with_triangles
 from ..figure_panels import graded_mesh
@@ -70,7 +70,7 @@ def roof() -> Surface:
         outline,
         dividers=[Divider([middle, end], wall=1.0, bottom="held") for end in ends],
         holes=[Hole(circle([17, 5], 2.0), name="courtyard")],
-        patches=[Area(name, 6.0, at=place) for name, place in PLACES.items()],
+        patches=[PatchSpec(name, 6.0, at=place) for name, place in PLACES.items()],
         edge_length=2.0,
     ).surface()
 

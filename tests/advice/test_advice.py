@@ -9,7 +9,7 @@ import tomlkit
 from nightly import night_but
 
 from pcmc import cli
-from pcmc.certificate.slipping import describe_saddle
+from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, Plan
 from pcmc.project import load, run_project
 

@@ -253,8 +253,8 @@ def test_a_vertex_on_no_top_edge_is_not_lifted():
 def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, lifts):
     state = State(two_squares(6, alpha_aux=alpha_aux), min_quality=0.45)
     crest = crest_of(state.full, state.walls)[:3]
-    drop = np.zeros_like(state.X)
-    drop[crest, 2] = -state.X[crest, 2]
+    drop = np.zeros_like(state.at.X)
+    drop[crest, 2] = -state.at.X[crest, 2]
     X, down = state.displaced(drop)
     np.testing.assert_array_equal(np.flatnonzero(down), np.sort(crest))
     state.move(X, down)
@@ -265,7 +265,7 @@ def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, l
     height = state.result_surface().vertices[crest, 2]
     assert ((height > 0.0) == (lifts > 0)).all()
     if lifts:  # its wall is back, with all its rows
-        quality = triangle_quality(state.X, state.surface.faces)
+        quality = triangle_quality(state.at.X, state.at.surface.faces)
         assert len(quality) == state.full.m
         assert quality.min() > 1e-3
 

@@ -71,8 +71,8 @@ def test_a_step_without_a_matrix_is_a_step_that_failed(kind, monkeypatch):
         raise SingularMatrix("a pivot is zero")
 
     state = State(two_squares(4), min_quality=0.45)
-    stepper = Stepper(state, minimum=False, backend=None)
-    X = state.X.copy()
+    stepper = Stepper(state, minimum=False)
+    X = state.at.X.copy()
     if kind == "descent":
         monkeypatch.setattr("pcmc.solvers.smoother.Smoother.refresh", singular)
         assert not stepper.descend()
@@ -80,7 +80,7 @@ def test_a_step_without_a_matrix_is_a_step_that_failed(kind, monkeypatch):
         monkeypatch.setattr("pcmc.solvers.smoother.HarmonicExtension.__init__", singular)
         motion = np.ones_like(X)
         np.testing.assert_array_equal(stepper._with_sheets(motion), motion)
-    np.testing.assert_array_equal(state.X, X)
+    np.testing.assert_array_equal(state.at.X, X)
 
 
 @pytest.mark.parametrize("alpha_aux", [1.0, 2.0, 3.0])

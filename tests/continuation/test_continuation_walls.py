@@ -152,7 +152,7 @@ def test_a_branch_in_one_rooms_pressure_does_not_depend_on_where_the_plan_is_dra
     direct = solve(two_rooms(0, 0).retensioned(None, {"west": 1.3}))
     assert direct.energy == pytest.approx(end["energy"], rel=1e-4)
     named = Direction(pressures={"west": 1.0, "wall 1": 0.5}, relative=True)
-    assert named.line(two_rooms(0, 0)).pressure_rates.tolist() == [1.0, 0.0, 0.5]
+    assert named.line(two_rooms(0, 0)).rates["pressures"].tolist() == [1.0, 0.0, 0.5]
 
 
 def test_a_wall_that_follows_its_rooms_stays_a_wall():

@@ -22,8 +22,8 @@ from pcmc.forces.rooms import (
     room_volumes,
     with_room_pressures,
 )
-from pcmc.stability.modes import morse_index
-from pcmc.surface.mirroring import mirrored
+from pcmc.stability.equilibrium import morse_index
+from pcmc.surface.symmetry import mirrored
 
 
 def arch() -> Surface:

@@ -9,7 +9,7 @@ from pcmc import Parameter, Target, cli, meet
 from pcmc.contact.pinching import standing_part
 from pcmc.design import sensitivities
 from pcmc.design.targets import measure
-from pcmc.plan import Area, Divider, Plan
+from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.surface.values import wall_changes
 
 HALL = """
@@ -28,7 +28,7 @@ def hall(west=1.0, east=1.0):
         [[0, 0], [12, 0], [12, 8], [0, 8]],
         [Divider([[6, 0], [6, 8]], 1.0, bottom="held")],
         edge_length=1.5,
-        patches=[Area("west", 6.0, west), Area("east", 6.0, east)],
+        patches=[PatchSpec("west", 6.0, west), PatchSpec("east", 6.0, east)],
     ).surface()
 
 
@@ -70,7 +70,11 @@ def test_a_wall_that_passes_several_rooms_has_no_one_pressure():
         [[0, 0], [12, 0], [12, 8], [0, 8]],
         [Divider([[6, 0], [6, 8]], name="spine"), Divider([[6, 4], [12, 4]], name="rib")],
         edge_length=1.0,
-        patches=[Area("west", 6.0, at=[3, 4]), Area("south", 6.0, at=[9, 2]), Area("north", 6.0, at=[9, 6])],
+        patches=[
+            PatchSpec("west", 6.0, at=[3, 4]),
+            PatchSpec("south", 6.0, at=[9, 2]),
+            PatchSpec("north", 6.0, at=[9, 6]),
+        ],
     ).surface()
     both = surface.retensioned(None, {"south": 0.9, "north": 0.9})
     assert np.abs(both.pressures).tolist() == pytest.approx([1.0, 0.9, 0.9, 0.1, 0.0])

@@ -13,13 +13,12 @@ from generators import hypar_roof, spherical_cap
 from pcmc import Parameter, Patch, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
 from pcmc.design.targets import measure
-from pcmc.existence.attempts import Attempts
-from pcmc.existence.loads import raise_loads
+from pcmc.existence.homotopy import Solves, attempt, raise_loads
 from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
 from pcmc.forces.rooms import room_pressures
-from pcmc.io.scaling import scaled_surface
-from pcmc.plan import Area, Plan
+from pcmc.io.mesh_data import scaled_surface
+from pcmc.plan import PatchSpec, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
@@ -39,7 +38,7 @@ files = ["hall.pcmc"]
 
 def hall(west: float = 0.25, east: float = 0.5) -> pcmc.Surface:
     """Two rooms with a wall between them, 0.9 and 1 the pressures of the air, under snow."""
-    areas = [Area("west", 4.0, 0.9, at=[1, 1], snow=west), Area("east", 4.0, at=[9, 1], snow=east)]
+    areas = [PatchSpec("west", 4.0, 0.9, at=[1, 1], snow=west), PatchSpec("east", 4.0, at=[9, 1], snow=east)]
     return Plan(HALL, [[[5, 0], [5, 6]]], patches=areas, edge_length=1.0).surface()
 
 
@@ -215,8 +214,8 @@ def test_the_form_pressure_of_a_structure_is_net_and_more_snow_is_a_load_of_its_
 def test_the_search_raises_what_is_net_of_the_snow(tension, word):
     """The cap over the unit disc rests up to a net pressure of 2 α: 0.8 carries 0.75, and 0.3 does not."""
     snowy = spherical_cap(0.25, alpha=tension).with_snow(0.25)
-    found, other = (raise_loads(low_start(s), Attempts(None, {})) for s in (snowy, net(snowy)))
-    assert word in (found.how or str(found.attempt))
+    found, other = (attempt(raise_loads(low_start(s)), Solves(None, {})) for s in (snowy, net(snowy)))
+    assert word in (found.note or str(found.attempt))
     if found.attempt is None:
         np.testing.assert_array_equal(found.surface.vertices, other.surface.vertices)
         assert found.surface.patches == snowy.patches

@@ -17,7 +17,7 @@ from pcmc.project import run
 from pcmc.sweep import run as sweep
 from pcmc.sweep import short_table
 from pcmc.sweep.projects import project_sweep
-from pcmc.sweep.short_table import with_units
+from pcmc.sweep.tables import with_units
 
 
 @pytest.fixture(scope="module")

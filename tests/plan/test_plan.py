@@ -12,7 +12,7 @@ from pcmc.curves.pieces import to_local
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
-from pcmc.plan import Area, Divider, Hole, Plan, draft, patch_names, plan_from
+from pcmc.plan import Divider, Hole, PatchSpec, Plan, draft, patch_names, plan_from
 from pcmc.plan.draft import drafted
 from pcmc.plan.heights import dome, harmonic_heights
 from pcmc.surface.topology import POINT
@@ -247,7 +247,7 @@ def test_a_sliding_outline():
 
 def test_seams_without_walls_and_one_patch_in_two_parts():
     dividers = [Divider([[x, 0], [x, 12]], wall=None) for x in (7, 14)]
-    patches = [Area("ends", 3.0, at=[[1, 1], [19, 1]]), Area("middle", 4.0, 0.5, at=[10, 6])]
+    patches = [PatchSpec("ends", 3.0, at=[[1, 1], [19, 1]]), PatchSpec("middle", 4.0, 0.5, at=[10, 6])]
     surface = Plan(BOX, dividers, patches=patches).surface()
     assert names(surface) == ["ends", "middle"]
     assert surface.patches[1].pressure == 0.5

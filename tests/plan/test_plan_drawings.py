@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 
 import drawn
 import numpy as np
@@ -15,7 +16,7 @@ import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError
 from pcmc.curves.curve_data import curve_data
-from pcmc.io.reading_process import read_arrays
+from pcmc.io.libraries import read_arrays
 from pcmc.plan import plan_from
 from pcmc.plan.drawing import read_drawing
 from pcmc.plan.proposal import ROOM, least_tension, proposed
@@ -216,11 +217,11 @@ def test_curves_of_rhino_stay_exact(tmp_path):
 
 
 def raise_for_overwriting(path):
-    from pcmc.cli.solving import _project
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        project.run_project(_project(path, None, [path], None, ""))
+        project.run_project(
+            replace(project.load(path), output=project.Output(files=[path]), folder=path.parent)
+        )
 
 
 def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():

@@ -14,7 +14,7 @@ import pcmc
 from pcmc import Verdict
 from pcmc.base.errors import PlanError, PlanWarning
 from pcmc.forces.rooms import room_volumes
-from pcmc.plan import Area, CableLine, Divider, Hole, Plan
+from pcmc.plan import CableLine, Divider, Hole, PatchSpec, Plan
 
 # ---- cables in a plan
 
@@ -126,7 +126,7 @@ def test_a_free_edge_without_cable_still_warns_and_one_with_a_cable_does_not():
 
 
 def test_weight_and_snow_are_those_of_the_patches():
-    areas = [Area("west", 3.0, at=[1, 1], weight=0.1), Area("east", 3.0, at=[9, 1], snow=0.5)]
+    areas = [PatchSpec("west", 3.0, at=[1, 1], weight=0.1), PatchSpec("east", 3.0, at=[9, 1], snow=0.5)]
     surface = Plan(HALL, [[[5, 0], [5, 6]]], patches=areas, snow=0.25).surface()
     assert surface.weights.tolist() == [0.1, 0.0, 0.0]
     assert surface.pressures.tolist() == [1.0, 1.0, 0.0]  # of the air, also on the wall
@@ -184,9 +184,9 @@ def test_a_wall_is_cut_where_the_room_beside_it_changes():
         HALL,
         lines,
         patches=[
-            Area("south", 3.0, at=[5, 1]),
-            Area("nw", 3.0, at=[1, 5]),
-            Area("ne", 3.0, at=[9, 5], volume=9.0),
+            PatchSpec("south", 3.0, at=[5, 1]),
+            PatchSpec("nw", 3.0, at=[1, 5]),
+            PatchSpec("ne", 3.0, at=[9, 5], volume=9.0),
         ],
     )
     surface = plan.surface()

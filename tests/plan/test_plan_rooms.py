@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pcmc import Plane, Verdict, certify, solve
-from pcmc.plan import Area, Divider, Plan, add_walls
+from pcmc.plan import Divider, PatchSpec, Plan, add_walls
 from tests.plan.test_plan import vertices_of
 
 
@@ -14,7 +14,7 @@ def two_rooms(at=(0.0, 0.0), pressures=(1.0, 0.8)):
         [[x, y], [x + 12, y], [x + 12, y + 8], [x, y + 8]],
         [Divider([[x + 6, y], [x + 6, y + 8]], 1.0, bottom="held")],
         edge_length=1.5,
-        patches=[Area("west", 6.0, pressures[0]), Area("east", 6.0, pressures[1])],
+        patches=[PatchSpec("west", 6.0, pressures[0]), PatchSpec("east", 6.0, pressures[1])],
     )
 
 
@@ -55,9 +55,9 @@ def test_a_divider_past_three_rooms_has_a_wall_for_each_difference():
         [Divider([[6, 0], [6, 8]], 2.0, name="spine"), Divider([[6, 4], [12, 4]], 2.0)],
         edge_length=1.0,
         patches=[
-            Area("west", 6.0, 1.0, at=[3, 4]),
-            Area("south", 6.0, 0.9, at=[9, 2]),
-            Area("north", 6.0, 0.8, at=[9, 6]),
+            PatchSpec("west", 6.0, 1.0, at=[3, 4]),
+            PatchSpec("south", 6.0, 0.9, at=[9, 2]),
+            PatchSpec("north", 6.0, 0.8, at=[9, 6]),
         ],
     )
     walls = {p.name: p.pressure for p in plan.surface().patches if p.wall}
@@ -70,7 +70,7 @@ def test_walls_put_under_a_mesh_carry_the_difference_too():
         [[0, 0], [12, 0], [12, 8], [0, 8]],
         [Divider([[6, 0], [6, 8]], wall=None)],
         edge_length=1.5,
-        patches=[Area("west", 6.0, 1.0), Area("east", 6.0, 0.8)],
+        patches=[PatchSpec("west", 6.0, 1.0), PatchSpec("east", 6.0, 0.8)],
     ).surface()
     found = certify(bare)
     assert "the pressures do not cancel: 0.2 is left over" in found.detail

@@ -11,7 +11,7 @@ from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
 from pcmc.curves.curves import circle, curve, polyline
-from pcmc.plan import Area, Plan, patch_names, plan_from
+from pcmc.plan import PatchSpec, Plan, patch_names, plan_from
 from tests.plan.test_plan import BOX, vertices_of
 
 COURT = {"curve": circle([17, 5], 2)}
@@ -106,10 +106,13 @@ def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
         ({"patches": {"a": {"tensions": 1.0}}}, {"what": "patch 'a'", "where": "tensions"}),
         ({"patches": {"a": {"at": [1, 1]}}}, {"what": "tension", "where": "a"}),
         ({"patches": {"a": 3.0}}, {"what": "patch 'a'", "found": 3.0}),
-        ({"patches": [Area("a", 1.0), Area("a", 1.0)]}, {"what": "name", "found": "a"}),
+        ({"patches": [PatchSpec("a", 1.0), PatchSpec("a", 1.0)]}, {"what": "name", "found": "a"}),
         ({"patches": {"a": {"tension": 1.0}}, "tension": 2.0}, {"what": "tension"}),
         ({"outline": [["0", "0"], ["8", "0"], ["8", "4"]]}, {"what": "outline"}),
-        ({"patches": [Area(f"{k}", 1.0) for k in range(200_000)]}, {"what": "patches", "found": 200_000}),
+        (
+            {"patches": [PatchSpec(f"{k}", 1.0) for k in range(200_000)]},
+            {"what": "patches", "found": 200_000},
+        ),
         ({"dividers": [WALL] * 1001}, {"what": "dividers", "found": 1001}),
         ({"points": {"a\nb": [1, 1]}}, {"what": "points"}),
         ({"dividers": [{"curve": WALL, "name": "a\nb"}]}, {"what": "name"}),

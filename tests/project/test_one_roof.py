@@ -109,7 +109,7 @@ def test_a_mesh_check_that_fails_is_in_the_report(folder, monkeypatch):
     roof = project.run("roof.toml")
     assert roof.mesh_check is None
     assert roof.mesh_failure == "too many triangles"
-    story = roof.report(roof.documents, files={})._story
+    story = roof.report(roof.output, files={})._story
     shown = [
         getattr(part, "text", "")
         for part in story(dict.fromkeys(("The roof", "Elevation", "Reactions"), PNG))

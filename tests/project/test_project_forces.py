@@ -13,7 +13,7 @@ import pcmc
 from pcmc import Verdict, cli, io
 from pcmc.base.errors import LostWarning, OptionError
 from pcmc.forces.rooms import room_volumes
-from pcmc.plan import Area, Divider, Plan
+from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.project import run, varied
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
@@ -152,7 +152,7 @@ def test_a_format_carries_the_forces_or_says_in_one_line_what_it_leaves_out(suff
     surface = Plan(
         [[0, 0], [5, 0], [5, 6], [0, 6]],
         [Divider([[0, 3], [5, 3]], cable=0.5)],
-        patches=[Area("a", 3.0, volume=8.0, weight=0.01), Area("b", 3.2, volume=8.0)],
+        patches=[PatchSpec("a", 3.0, volume=8.0, weight=0.01), PatchSpec("b", 3.2, volume=8.0)],
         mirrors=[[[5, 0], [5, 6]]],
         edge_length=1.5,
     ).surface()

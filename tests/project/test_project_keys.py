@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from pathlib import Path
 
 import pytest
 from refusals import refused
 from small_project import changed
 
 from pcmc.base.errors import FileError
-from pcmc.project import load, reference, sections
+from pcmc.project import json_schema, load, reference, sections
 
 
 @pytest.mark.parametrize(
@@ -146,17 +148,16 @@ def test_the_manual_lists_every_key_that_is_read():
     from dataclasses import fields
 
     from pcmc.design import Parameter, Target
-    from pcmc.plan import Area, Divider, Hole, Plan
+    from pcmc.plan import Divider, Hole, PatchSpec, Plan
     from pcmc.plot.scene import VIEWS
-    from pcmc.project import Remeshing
-    from pcmc.project.accuracy import AccuracyWanted
+    from pcmc.project import AccuracyWanted, Remeshing
     from pcmc.project.keys import KINDS
     from pcmc.solvers import find_method
     from pcmc.surface import Plane
 
     classes = {
         "plan": Plan,
-        "plan.patches.NAME": Area,
+        "plan.patches.NAME": PatchSpec,
         "plan.dividers": Divider,
         "plan.holes": Hole,
         "plan.plane": Plane,
@@ -166,10 +167,10 @@ def test_the_manual_lists_every_key_that_is_read():
     }
     listed = {(s.name, s.condition): s for s in sections()}
     for name, cls in classes.items():
-        unused = {Area: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
+        unused = {PatchSpec: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
         names = {f.name for f in fields(cls)} - unused
         # what Plan's lines are made from, and what stands for tensions
-        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, Area: {"rise", "apex"}}.get(cls, set())
+        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, PatchSpec: {"rise", "apex"}}.get(cls, set())
         assert {key.name for key in listed[name, ""].keys} == names
     for method in ("newton", "nesterov", "lbfgs"):
         options = {f.name: f.default for f in fields(find_method(method).options)}
@@ -181,7 +182,7 @@ def test_the_manual_lists_every_key_that_is_read():
     for section in sections():
         for key in section.keys:
             assert key.help, (section.name, key.name)
-            assert KINDS[key.kind]
+            assert key.kind in KINDS
             assert f"| `{key.name}` | " in manual
     (view,) = (key for key in listed["output", ""].keys if key.name == "view")
     assert all(name in view.help for name in VIEWS)
@@ -226,3 +227,20 @@ def test_a_bad_view_is_refused_before_any_work(small, view, found):
     changed(small, "files =", f"view = {view}\nfiles =")
     with pytest.raises(FileError, match=rf"view.* {re.escape(repr(found))}"):
         load(small)
+
+
+def test_editors_read_the_same_keys_from_the_schema():
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(tomllib.loads(Path("notebooks/roof.toml").read_text(encoding="utf-8")), schema)
+    plan = {"outline": [[0, 0], [4, 0], [4, 3]], "dividers": [{"polyline": [[2, 0], [2, 3]]}]}
+    jsonschema.validate({"plan": plan, "remesh": [{"edge_length": 1}]}, schema)
+    wrong = [
+        {"plan": {"edge_lenght": 1}},
+        {"remesh": [{"when": "never"}]},
+        {"targets": {"meet": [{"valu": 1}]}},
+    ]
+    for data in wrong:
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(data, schema)

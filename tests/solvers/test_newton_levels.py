@@ -9,8 +9,8 @@ import pytest
 from generators import spherical_cap, two_squares
 from pcmc.certificate import certificate
 from pcmc.meshing.refinement import refine
-from pcmc.solvers import solve, steps
-from pcmc.stability import modes
+from pcmc.solvers import solve
+from pcmc.stability import equilibrium
 from pcmc.stability.factorisation import available
 
 pytestmark = pytest.mark.parametrize("backend", available())
@@ -47,20 +47,16 @@ def factorisers(monkeypatch):
     gc.collect()
     gc.freeze()  # what other tests left need not be searched each time
 
-    def counted(module):
-        make = module.factoriser
+    make = equilibrium.factoriser
 
-        def factoriser(*arguments):
-            gc.collect()
-            alive.append(sum(each() is not None for each in made))
-            new = make(*arguments)
-            made.append(weakref.ref(new))
-            return new
+    def factoriser(*arguments):
+        gc.collect()
+        alive.append(sum(each() is not None for each in made))
+        new = make(*arguments)
+        made.append(weakref.ref(new))
+        return new
 
-        monkeypatch.setattr(module, "factoriser", factoriser)
-
-    counted(steps)
-    counted(modes)
+    monkeypatch.setattr(equilibrium, "factoriser", factoriser)
     yield alive
     gc.collect()
     gc.unfreeze()

@@ -51,17 +51,17 @@ def test_stopped_on_request(backend, error, iteration):
 @pytest.mark.parametrize("call", [1, 3, 5, 7])
 def test_interrupted_in_the_middle_of_a_step(backend, call, monkeypatch):
     """Ctrl-C comes while a trial shape is being measured: the result is the last finished step's."""
-    from pcmc.solvers import state
+    from pcmc.stability import equilibrium
 
-    measured = state.energy_and_gradient
+    measured = equilibrium.energy_and_gradient
     calls = iter(range(10**6))
 
-    def pressed(surface, X):
+    def pressed(surface, X, supports):
         if next(calls) == call:
             raise KeyboardInterrupt
-        return measured(surface, X)
+        return measured(surface, X, supports=supports)
 
-    monkeypatch.setattr(state, "energy_and_gradient", pressed)
+    monkeypatch.setattr(equilibrium, "energy_and_gradient", pressed)
     result = solve(two_caps(0.8), backend=backend)
     assert result.status is Status.STOPPED
     assert result.energy == pytest.approx(energy(result.surface), rel=1e-14)

@@ -7,8 +7,9 @@ import pcmc
 from generators import catenoid, four_fans, spherical_cap, two_caps
 from pcmc import BoundaryMotion, Patch, Surface, Verdict, certify, solve
 from pcmc.stability import modes as stability_modes
+from pcmc.stability.equilibrium import Equilibrium
 from pcmc.stability.factorisation import SingularMatrix
-from pcmc.stability.modes import ArpackError, SecondVariation, lowest, second_variation
+from pcmc.stability.modes import ArpackError, lowest
 from pcmc.stability.softness import count_soft
 
 
@@ -62,10 +63,8 @@ def test_certify_says_that_a_surface_is_at_a_fold(branch):
 @pytest.mark.parametrize("alpha_aux", [1.0, 2.0, 3.0, 4.0])
 def test_the_counts_are_those_of_the_computed_eigenvalues(alpha_aux):
     surface = solve(four_fans(4, alpha_aux=alpha_aux), target="stationary").surface
-    part = pcmc.stability.modes.standing_part(surface)
-    space = stability_modes.motion_space(part.surface, part.classes, part.surface.vertices)
-    variation = SecondVariation.of(part.surface, part.classes, space, np.zeros((space.size, 0)))
-    system = variation.at()
+    variation = Equilibrium.of(surface)
+    system = variation.factorised()
     weighted = system.matrix.toarray() / np.sqrt(np.outer(variation.tension_mass, variation.tension_mass))
     values = np.linalg.eigvalsh(weighted)
     for band in (0.01, 0.3, 3.0):
@@ -97,17 +96,17 @@ def test_without_convergence_the_verdict_is_undecided(monkeypatch, small_cap):
     assert "modes=0" in found.detail
     assert certify(finer, modes=0).verdict is Verdict.STABLE
     with pytest.raises(SingularMatrix, match="did not converge"):
-        lowest(second_variation(finer), 1)
+        lowest(Equilibrium.of(finer).factorised(), 1)
 
 
 def test_a_stable_roof_is_factorised_once(monkeypatch):
     cap = solve(spherical_cap(0.25)).surface
-    shifts, at = [], SecondVariation.at
+    shifts, factorised = [], Equilibrium.factorised
 
     def counted(self, shift=0.0):
         shifts.append(shift)
-        return at(self, shift)
+        return factorised(self, shift)
 
-    monkeypatch.setattr(SecondVariation, "at", counted)
+    monkeypatch.setattr(Equilibrium, "factorised", counted)
     assert certify(cap).verdict is Verdict.STABLE
     assert len(shifts) == 1

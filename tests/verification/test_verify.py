@@ -17,7 +17,7 @@ from pcmc.contact.pull import pull_and_capacity
 from pcmc.forces.motion_space import motion_space
 from pcmc.forces.pattern import hessian_pattern
 from pcmc.forces.second_variation import assemble
-from pcmc.stability.modes import full_matrix, second_variation
+from pcmc.stability.equilibrium import Equilibrium
 from pcmc.verification import balls, enclosures, theorem
 from pcmc.verification.lipschitz import lipschitz
 from pcmc.verification.system import system
@@ -112,7 +112,7 @@ def test_no_matrix_changes_faster_than_the_constant(surface):
         d = rng.normal(size=space.size) * (rng.random(space.size) < (1.0 if k % 2 else 3 / space.size))
         d *= 1e-5 * height / max(np.linalg.norm(d), 1e-9)
         ahead, behind = (
-            full_matrix(pattern, assemble(part.surface, part.classes, space, pattern, Y)).toarray()
+            pattern.symmetric(assemble(part.surface, part.classes, space, pattern, Y)).toarray()
             for Y in (X + space.to_vectors(d), X - space.to_vectors(d))
         )
         if d.any():
@@ -177,7 +177,7 @@ def test_free_rigid_motions_are_named_with_index_and_gap():
     """In the frozen frames they are not whole, and have small eigenvalues that no gap may deny."""
     surface = pcmc.solve(SURFACES["bubbles"](), target="stationary").surface
     found = verify(surface)
-    everything = second_variation(surface).matrix.toarray()
+    everything = Equilibrium.of(surface).factorised().matrix.toarray()
     assert np.abs(np.linalg.eigvalsh(everything)).min() < found.gap
     assert f"index is exactly {found.index}, among motions that are across its 5 free rigid" in str(found)
     assert "second variation among these is within" in str(found)

@@ -1,0 +1,332 @@
+"""Homotopies: from an easier surface at rest along the branch of equilibria to the one asked for.
+
+What grows is the load, the share of the way from equal tensions, or the distance between held curves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import solvers
+from ..base.arrays import Bools, Floats
+from ..base.errors import NoBranch
+from ..certificate.balance import load_name, load_ratio
+from ..certificate.neck import held_groups
+from ..certificate.proof import Attempt
+from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
+from ..forces.functional import gradient
+from ..solvers.result import Callback, Progress, Result, Status
+from ..surface import Surface
+from .starts import low_start
+
+BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
+SOUND = 0.2  # triangle quality from which a turn counts as the surface's, not the mesh's
+POOR = 0.1  # triangle quality at which a branch is given up
+MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
+LOADS = (0.5, 0.2, 0.05, 0.01)  # of the loads, or of what the boundary carries, at which to begin
+DISTANCES = (0.5, 0.25, 0.1, 0.03)  # of the distance between held curves, at which to begin
+STRONGER = 1.3  # of the load: at least so much the equal tensions could carry
+RAISED = (1.0, 1.6)  # times these tensions, tried in turn
+WALLS = (1.0, 0.6)  # of the equal tension: the most that a wall has at the start, tried in turn
+FLAT = 1e-6  # of the size: curves whose middles are nearer to each other are not moved
+
+
+class Start(NamedTuple):
+    """An easier surface, and the parameter of the branch from it; ``share`` of what is asked for it has."""
+
+    surface: Surface
+    parameter: Direction | BoundaryMotion | None  # None where it is the surface asked for
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Homotopy:
+    """A way to a surface: starts, tried in turn until one is at rest, and how the branch is followed from it.
+
+    ``way`` is as in Attempt, ``note`` a sentence with the start's ``share``, ``unit`` the share of what is
+    asked for at λ = 1, ``options`` those of the first solve, ``back`` as in ``classify_end``.
+    """
+
+    way: str
+    note: str
+    asked: Surface
+    starts: Iterable[Start]
+    unit: float = 1.0
+    options: Mapping[str, Any] = field(default_factory=lambda: {"levels": 0, "target": "minimum"})
+    steps: int = 80
+    smallest: float = 1e-4
+    back: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class HomotopyOutcome:
+    """A surface to solve from and how it was reached, or how the attempt ended; ``way`` as in Attempt."""
+
+    way: str
+    surface: Surface | None = None
+    note: str = ""
+    attempt: Attempt | None = None
+
+
+class LimitReached(Exception):
+    """A solve of the search has taken as many steps as it may; ``result`` is its end."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__()
+        self.result = result
+
+
+@dataclass
+class Solves:
+    """Solves and branches in a row, with the same ``options``; one callback counts their steps on."""
+
+    callback: Callback | None
+    options: Mapping[str, Any]
+    steps: int = 0
+    evaluations: int = 0
+
+    def solve(self, surface: Surface, **changes: Any) -> Result:
+        """Solve from one start; StopIteration if stopped, LimitReached at the limit asked for."""
+        before = self.steps
+
+        def count(progress: Progress) -> None:
+            self._show(progress.surface, {**progress.row, "iteration": before + progress.iteration})
+
+        result = solvers.solve(surface, "newton", count, **{**self.options, **changes})
+        self.steps = before + len(result.rows)
+        self.evaluations += result.evaluations
+        if result.status is Status.STOPPED:
+            raise StopIteration
+        rows = [{**row, "iteration": before + row["iteration"]} for row in result.rows]
+        result = replace(result, rows=rows)
+        if result.status is Status.ITERATION_LIMIT and "iterations" in self.options:
+            raise LimitReached(result)
+        return result
+
+    def follow(
+        self, surface: Surface, parameter: Direction | BoundaryMotion, homotopy: Homotopy
+    ) -> Branch | None:
+        """Follow a branch until it arrives or turns; StopIteration if that was stopped.
+
+        None where no branch starts: rigid motions are free, or the parameter moves nothing. It has no more
+        points than a solve may take steps.
+        """
+        interrupted: list[BaseException] = []
+
+        def count(progress: Progress) -> None:
+            square = float((gradient(progress.surface()) ** 2).sum())
+            row = {**progress.row, "iteration": self.steps, "step": "branch", "gradient_squared": square}
+            self.steps += 1
+            try:
+                self._show(progress.surface, row)
+            except BaseException as error:
+                interrupted.append(error)
+                raise
+
+        try:
+            branch = follow(
+                surface,
+                parameter,
+                1.0 / homotopy.unit,
+                callback=until_turned(count, homotopy.back),
+                min_quality=MIN_QUALITY,
+                steps=min(homotopy.steps, self.options.get("iterations", homotopy.steps)),
+                smallest=homotopy.smallest,
+            )
+        except NoBranch:
+            return None
+        if interrupted:  # by the callback, whatever it raised
+            raise interrupted[0]
+        self.evaluations += int(branch.points.iterations.sum())
+        return branch
+
+    def _show(self, surface: Callable[[], Surface], row: Mapping[str, Any]) -> None:
+        if self.callback is not None:
+            self.callback(Progress(row["iteration"], surface, row))
+
+
+def attempt(homotopy: Homotopy, solves: Solves) -> HomotopyOutcome:
+    """Follow a homotopy to the surface asked for, if the branch arrives there."""
+    way = homotopy.way
+    for start in homotopy.starts:
+        result = solves.solve(start.surface, **homotopy.options)
+        if result.converged:
+            break
+    else:
+        return HomotopyOutcome(way, attempt=Attempt(way, "no start"))
+    note = homotopy.note.format(share=start.share)
+    if start.parameter is None:
+        return HomotopyOutcome(way, result.surface, note)
+    branch = solves.follow(result.surface, start.parameter, homotopy)
+    if branch is None:
+        return HomotopyOutcome(way, attempt=Attempt(way, "no start"))
+    end = classify_end(branch, homotopy.back)
+    if end.kind == "reached":
+        return HomotopyOutcome(way, homotopy.asked.moved(branch.last.vertices), note)
+    rates = start.parameter.tensions if isinstance(start.parameter, Direction) else {}
+    at = tuple((p.name, p.tension + end.farthest * rates.get(p.name, 0.0)) for p in start.surface.patches)
+    tensions = tuple((name, tension) for name, tension in at if tension > 0.0) if rates else ()
+    value = end.farthest * homotopy.unit
+    return HomotopyOutcome(way, attempt=Attempt(way, end.kind, value, start.share, tensions))
+
+
+class BranchEnd(NamedTuple):
+    """How a branch ends: "reached", "fold", or "lost"; its largest parameter, and the triangles there."""
+
+    kind: str
+    farthest: float
+    quality: float
+
+
+def until_turned(
+    extra: Callable[[Progress], None] | None = None, back: float | None = None
+) -> Callable[[Progress], None]:
+    """A callback for ``follow``: ends a branch that has turned back, or whose triangles are poor.
+
+    ``extra`` is called with each point; ``back`` is as in ``classify_end``.
+    """
+    farthest = 0.0
+
+    def watch(progress: Progress) -> None:
+        nonlocal farthest
+        farthest = max(farthest, progress.row["parameter"])
+        if extra is not None:
+            extra(progress)
+        slack = BACK * farthest if back is None else back
+        if progress.row["parameter"] < farthest - slack or progress.row["quality"] < POOR:
+            raise StopIteration
+
+    return watch
+
+
+def classify_end(branch: Branch, back: float | None = None) -> BranchEnd:
+    """How a branch ends that was followed towards larger values.
+
+    It folds where the parameter turns for good, with an eigenvalue that changes its sign not far from
+    the turn and triangles that are sound: otherwise the mesh may be what turns. ``back`` is how far from the
+    turn; by default 0.03 of the farthest value.
+    """
+    points, folds = branch.points, branch.folds.parameter
+    if branch.ending is Ending.REACHED:
+        return BranchEnd("reached", float(points.parameter.iloc[-1]), float(points.quality.iloc[-1]))
+    farthest = float(max(points.parameter.max(), folds.max()))
+    quality = float(points.quality.iloc[int(points.parameter.argmax())])
+    opened = branch.events[branch.events.kind == "index"].parameter
+    turned = len(folds) and folds.max() >= points.parameter.max()
+    slack = BACK * farthest if back is None else back
+    folded = turned and quality > SOUND and (farthest - opened <= slack).any()
+    return BranchEnd("fold" if folded else "lost", farthest, quality)
+
+
+def raise_loads(low: Surface) -> Homotopy:
+    """All net pressures and weights grow in proportion, from the highest of a few loads with a minimum.
+
+    What grows is p - s, so the snow is not there at the start and comes with the pressure.
+    """
+    load, none = load_name(low), {patch.name: 0.0 for patch in low.patches}
+    pressures = {patch.name: patch.net_pressure for patch in low.patches if patch.net_pressure != 0.0}
+    weights = {patch.name: patch.weight for patch in low.patches if patch.weight != 0.0}
+    carried = min(1.0, 1.0 / max(load_ratio(low), 1e-300))
+    # λ is the load over what the boundary carries, so that a fold is near 1 however weak the patches
+    direction = Direction(
+        pressures={name: carried * p for name, p in pressures.items()},
+        weights={name: carried * w for name, w in weights.items()},
+    )
+
+    def start(share: float) -> Start:
+        net = none | {name: share * p for name, p in pressures.items()}
+        heavy = {name: share * w for name, w in weights.items()}
+        return Start(low.retensioned(None, net, weights=heavy, snows=none), direction, share)
+
+    starts = (start(share * carried) for share in LOADS)
+    return Homotopy(load, f"by raising the {load} from {{share:.3g}} of it", low, starts, carried)
+
+
+def relax_tensions(low: Surface) -> Homotopy | None:
+    """From equal tensions of all patches under pressure to those asked for; None for one such patch alone."""
+    asked = {patch.name: patch.tension for patch in low.patches if patch.tension > 0.0}
+    pressed = [patch.name for patch in low.patches if not patch.auxiliary]
+    if len(pressed) < 2:
+        return None
+    strongest = max(asked[name] for name in pressed)
+    needed = strongest * max(1.0, STRONGER * load_ratio(low.retensioned(dict.fromkeys(pressed, strongest))))
+
+    def start(raised: float, most: float) -> Start:
+        equal = raised * needed
+        given = {name: equal if name in pressed else min(t, most * equal) for name, t in asked.items()}
+        change = {name: asked[name] - given[name] for name in asked if asked[name] != given[name]}
+        return Start(low.retensioned(given), Direction(change, relative=True) if change else None, 0.0)
+
+    starts = (start(raised, most) for raised, most in product(RAISED, WALLS))
+    note = "along the branch from equal tensions"
+    return Homotopy("tensions", note, low, starts, 1.0, {"levels": 0}, 40, 3e-4, BACK)
+
+
+def continue_in_distance(surface: Surface) -> Homotopy | None:
+    """The distance between the held curves grows to the surface's; None where they cannot be moved."""
+    scaling = BoundaryScaling.of(surface)
+    if scaling is None:
+        return None
+    shapes = [start.vertices for start in (surface, low_start(surface)) if start is not None]
+    starts = (
+        Start(scaling.at(share, shape), BoundaryMotion(scaling.boundary, start=share), share)
+        for share, shape in product(DISTANCES, shapes)
+    )
+    return Homotopy("distance", "by moving the held curves apart", surface, starts)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryScaling:
+    """A surface whose held curves can be moved along one line, the distances between them in proportion."""
+
+    surface: Surface  # at the full distance
+    line: Floats  # (3,) unit vector along which the middles of the curves lie most apart
+    middle: Floats  # (3,) a point that stays
+    along: Floats  # (n,) how far each held vertex's curve is from it
+    held: Bools  # (n,) the vertices that move with their curves
+
+    @classmethod
+    def of(cls, surface: Surface) -> BoundaryScaling | None:
+        """The line through the middles of the fixed curves; that across Π where the surface slides there.
+
+        None without two curves to be moved apart, or where the end of a junction or cable slides along one.
+        The other vertices that slide so are held meanwhile, which changes no shape.
+        """
+        for _, along in surface.on_line:
+            if (along & surface.topology.on_junction).any() or along[surface.cable_edges.ends].any():
+                return None
+        if surface.on_line and not surface.on_planes:
+            surface = surface.rebuilt(fixed=surface.fixed, on_line=())
+        groups, lengths = held_groups(surface)
+        fixed = np.isfinite(lengths)
+        X, plane = surface.vertices, surface.plane
+        held = (groups >= 0) & surface.fixed
+        if len(lengths) < 2 or not fixed.any() or (surface.fixed & ~held).any() or surface.on_planes:
+            return None
+        centres = np.array([X[groups == number].mean(axis=0) for number in range(len(lengths))])
+        if surface.on_plane.any():
+            line, middle = np.array(plane.normal), np.array(plane.point)
+            apart = np.where(fixed, (centres - middle) @ line, 0.0)
+        else:
+            middle = centres.mean(axis=0)
+            line = np.linalg.svd(centres - middle)[2][0]
+            apart = (centres - middle) @ line
+        if np.ptp(apart) < FLAT * surface.size:
+            return None
+        return cls(surface, line, middle, np.where(held, apart[groups], 0.0), held)
+
+    def boundary(self, share: float) -> Floats:
+        """(k,3) the fixed vertices with their curves at a share of the distance."""
+        X = self.surface.vertices + ((share - 1.0) * self.along)[:, None] * self.line
+        return X[self.held]
+
+    def at(self, share: float, shape: Floats) -> Surface:
+        """The surface at a share of the distance; its free vertices are those of a shape (n,3), nearer."""
+        X = shape + ((share - 1.0) * ((shape - self.middle) @ self.line))[:, None] * self.line
+        X[self.held] = self.boundary(share)
+        return self.surface.moved(X)

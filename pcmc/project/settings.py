@@ -1,0 +1,266 @@
+"""The sections of a project file as values: [mesh], [remesh], the accuracy of [solve], and [output]."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .. import io
+from ..accuracy.adaptive import ACCURACY_OF, TRIANGLES
+from ..accuracy.goals import accuracies
+from ..advice.rises import Rise
+from ..base import validate
+from ..base.errors import FileError, OptionError, unknown
+from ..base.files import PathLike, suffix_of
+from ..base.units import Units, expect_length
+from ..drawings.drawing_set import check_suffix as check_drawing
+from ..drawings.sheet import FORMATS
+from ..meshing.remeshing import check_lengths
+from ..plot.figure import SUFFIXES, check_suffix
+from ..plot.scene import VIEWS
+from ..report.document import check_suffix as check_report
+from ..structure.model import Structure
+
+PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of a mesh
+BOUNDARY, GROUND = "boundary", "ground"
+WHEN = ("before", "after")
+COLOURS = ("patches", "curvature", "error", "reactions")
+CSV, INP = ".csv", ".inp"
+SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
+SECTION = TypeVar("SECTION")
+
+
+def section_of(kind: type[SECTION], name: str, table: Mapping[str, Any]) -> SECTION:
+    """The value of a section; an error names the section and its key.
+
+    >>> section_of(Remeshing, "remesh", {"edge_length": 0.5}).when
+    'after'
+    """
+    try:
+        return kind(**table)
+    except OptionError as error:
+        what = f"{name}.{error.what}" if error.what else name
+        raise OptionError(f"{name}: {error}", what=what, found=error.found) from None
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """The mesh of a project.
+
+    Attributes
+    ----------
+    file : its name, beside the project.
+    units : of the file's numbers, where it has none itself; by default those of the project.
+    tension : of all patches under pressure that ``patches`` does not name.
+    patches : by the names in the file: ``tension``, ``pressure``, ``snow``, ``weight``, ``wall``.
+    supports : what is fixed instead of the file's supports: "boundary", all of it; "ground", its lowest
+        level; or a list of points and lines [x, y, z], whose vertices are fixed.
+    rises : heights that it has instead of tensions.
+    """
+
+    file: str
+    units: str = ""
+    tension: float | None = None
+    patches: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    supports: str | Sequence[Any] = ()
+    rises: Sequence[Rise] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.supports, str):
+            validate.choice("mesh.supports", self.supports, (BOUNDARY, GROUND))
+        if self.tension is not None:
+            validate.positive("mesh.tension", self.tension)
+
+
+@dataclass(frozen=True)
+class Remeshing:
+    """New triangles before or after a project is solved.
+
+    Attributes
+    ----------
+    edge_length : of the triangles, length.
+    near_curves : edge length at junctions and boundaries, if shorter, length.
+    growth : largest ratio of the lengths of neighbouring edges, > 1.
+    chord : largest distance between the triangles and the smooth surface, length; without it a
+        tenth of ``edge_length``.
+    when : "before" the surface is solved, or "after"; then it is solved again.
+    """
+
+    edge_length: float
+    near_curves: float | None = None
+    growth: float = 1.2
+    chord: float | None = None
+    when: str = "after"
+
+    def __post_init__(self) -> None:
+        validate.choice("when", self.when, WHEN)
+        check_lengths(**self.options)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The arguments of ``pcmc.meshing.remeshing.remesh``."""
+        return {name: value for name, value in vars(self).items() if name != "when"}
+
+
+@dataclass(frozen=True)
+class AccuracyWanted:
+    """What ``pcmc.solve_to_accuracy`` is asked for; nothing if ``accuracy`` is empty.
+
+    Attributes
+    ----------
+    accuracy : error bars wanted, by quantity, such as {height = 1e-3, "area of north" = 0.01}; triangles get
+        finer where the error comes from until they are reached. Needs the extra ``remesh``.
+    accuracy_of : "mesh", the value on the mesh is to be so accurate; "limit", the extrapolated value is.
+    most_triangles : the most that a mesh made for the accuracy may have.
+    """
+
+    accuracy: Mapping[str, float] = field(default_factory=dict)
+    accuracy_of: str = "mesh"
+    most_triangles: int = TRIANGLES
+
+    def __post_init__(self) -> None:
+        validate.choice("accuracy_of", self.accuracy_of, ACCURACY_OF)
+        validate.integer("most_triangles", self.most_triangles, least=1)
+        if self.accuracy:
+            object.__setattr__(self, "accuracy", accuracies(self.accuracy))
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a project writes: files of the surface, a picture, and documents for those who build.
+
+    Attributes
+    ----------
+    files : files of the surface; the suffix names the format.
+    picture : name of a picture, .png, .svg or .pdf.
+    view : of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees.
+    views : of the picture, side by side, instead of ``view``.
+    colour : of the picture.
+    whole : whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it.
+    drawings : files of drawings: .dxf, .pdf, .svg; see ``pcmc draw``.
+    sheet : format of their sheets.
+    panels : the schedule of panels, .csv; NAME-families.csv and NAME-edges.csv come with it.
+    tolerance : largest difference of edges in a family of panels; with it drawings and report have them.
+    panel_sheets : whether drawings have each panel at true size; needs ``tolerance``.
+    structure : the structural model, .inp; needs the section [structure].
+    report : the report, .pdf; see ``pcmc report``.
+    date : printed in the report, which reads no clock.
+    """
+
+    files: Sequence[PathLike] = ()
+    picture: PathLike | None = None
+    view: Any = "diagonal"
+    views: Sequence[Any] | None = None
+    colour: str = "patches"
+    whole: bool = False
+    drawings: Sequence[PathLike] = ()
+    sheet: str = "A1"
+    panels: PathLike | None = None
+    tolerance: float | None = None
+    panel_sheets: bool = False
+    structure: PathLike | None = None
+    report: PathLike | None = None
+    date: str = ""
+
+    def __post_init__(self) -> None:
+        check_names(self.files, self.picture)
+        check_picture(self.all_views, self.colour)
+        validate.choice("sheet", self.sheet, tuple(FORMATS))
+        if self.tolerance is not None:
+            validate.positive("tolerance", self.tolerance)
+        for drawing in self.drawings:
+            check_drawing(Path(drawing))
+        if self.panels is not None:
+            suffix_of(self.panels, (CSV,), "a schedule of panels")
+        if self.structure is not None:
+            check_model(self.structure)
+        if self.report is not None:
+            check_report(self.report)
+        for name in ("panels", "panel_sheets"):
+            if getattr(self, name) and self.tolerance is None:
+                text = f"{name}: needs the largest difference of edges in a family; add tolerance = LENGTH"
+                raise OptionError(text, what="tolerance", expected="a length")
+
+    @property
+    def all_views(self) -> Sequence[Any]:
+        """The views of the picture, side by side."""
+        return [self.view] if self.views is None else self.views
+
+    @property
+    def documents(self) -> bool:
+        """Whether there are any besides files and a picture."""
+        return bool(self.drawings) or {self.panels, self.structure, self.report} != {None}
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the files, as they are given."""
+        single = [getattr(self, name) for name in SINGLE]
+        return [str(name) for name in (*self.files, *self.drawings, *single) if name is not None]
+
+    @property
+    def paths(self) -> list[Path]:
+        """All files that are known before the roof is; sheets as .svg get numbers."""
+        others = schedule_paths(Path(self.panels))[1:] if self.panels is not None else []
+        return [Path(name) for name in self.names] + others
+
+    def in_folder(self, folder: Path) -> Output:
+        """The same output in a folder."""
+        single = {name: folder / path for name in SINGLE if (path := getattr(self, name)) is not None}
+        lists: dict[str, Any] = {
+            name: [folder / path for path in getattr(self, name)] for name in ("files", "drawings")
+        }
+        return replace(self, **lists, **single)
+
+    def check(self, units: Units, structure: Structure | None) -> None:
+        """Refuse documents that need a unit of length or a [structure] which the project does not have."""
+        if self.drawings:
+            expect_length(units.length, "a drawing")
+        if self.report is not None:
+            expect_length(units.length, "a report")
+        if self.structure is not None and structure is None:
+            text = "a structural model needs material and thickness; add [structure] with young and thickness"
+            raise OptionError(text, what="structure", expected="a table")
+
+
+def check_model(path: PathLike) -> None:
+    """Refuse the name of a structural model that does not end with .inp."""
+    suffix_of(path, (INP,), "a structural model")
+
+
+def schedule_paths(path: Path) -> list[Path]:
+    """The files of a schedule of panels: panels, families, edges."""
+    return [path, *(path.with_name(f"{path.stem}-{name}{path.suffix}") for name in ("families", "edges"))]
+
+
+def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
+    """Refuse empty file names, and those whose suffix is no format of surfaces, or of pictures."""
+    for file in files:
+        if not str(file).strip():
+            text = "the name of an output file is empty; give one, such as 'roof.obj'"
+            raise FileError(text, what="output")
+        suffix = Path(file).suffix.lower()
+        if suffix not in io.FORMATS:
+            hint = "; a picture has its own option" if suffix in SUFFIXES else ""
+            text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
+            raise FileError(text, what=str(file), found=suffix)
+    if picture is not None:
+        check_suffix(picture)
+
+
+def check_picture(views: Sequence[Any], colour: str) -> None:
+    """Refuse views or a colour that a picture of a project cannot have."""
+    validate.choice("colour", colour, COLOURS)
+    if not views:
+        validate.refuse("views", views, "at least one view")
+    if colour == "reactions" and len(views) > 1:
+        validate.refuse("views", len(views), "one view for a picture of reactions")
+    for view in views:
+        if isinstance(view, str):
+            validate.choice("view", view, tuple(VIEWS))
+        else:
+            angles = view if isinstance(view, Sequence) and len(view) == 2 else [math.nan]
+            if not all(isinstance(angle, int | float) and math.isfinite(angle) for angle in angles):
+                validate.refuse("view", view, "a name or two angles in degrees")
