@@ -122,7 +122,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
     elif project.drawing is None and project.plan is not None:
         corners = project.plan.outline.at(project.plan.outline.dense)
         width = float(np.ptp(corners, axis=0).max())
-        for note in filter(None, (size_note(width, project.units.length), mast_note(project.plan))):
+        for note in filter(None, (mast_note(project.plan), size_note(width, project.units.length))):
             warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 

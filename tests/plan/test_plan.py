@@ -13,8 +13,8 @@ from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Divider, Hole, PatchSpec, Plan, draft, patch_names, plan_from
+from pcmc.plan.build import dome, harmonic_heights
 from pcmc.plan.draft import drafted
-from pcmc.plan.heights import dome, harmonic_heights
 from pcmc.surface.topology import POINT
 
 BOX = [[0, 0], [20, 0], [20, 12], [0, 12]]
