@@ -16,8 +16,7 @@ from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import Roof, read_roof
-from pcmc.explore.session import Session
-from pcmc.explore.variants import figures_data
+from pcmc.explore.session import Session, figures_data
 from pcmc.panelling.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
