@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial, wraps
 from itertools import count
 from typing import Any, TypeVar
 
@@ -133,7 +133,41 @@ class State:
         return self.variants[number]
 
 
-Act = Callable[[State, Stop], State]
+def act(moves: bool = False, ends: bool = False) -> Callable[[Callable[..., State]], Callable[..., State]]:
+    """A method of a session that makes a state of the present one, done after the acts before it.
+
+    One that ``moves`` or ``ends`` moves ends moves before it: their ``stop`` becomes true.
+    """
+
+    def made(method: Callable[..., State]) -> Callable[..., State]:
+        @wraps(method)
+        def run(self: Session, *given: Any, **named: Any) -> State:
+            with self.order:
+                mine = self.arrived
+                self.arrived += 1
+                if moves or ends:
+                    self.newest = mine
+                self.order.wait_for(lambda: self.served == mine)
+
+            def late() -> bool:
+                return moves and self.newest > mine
+
+            try:
+                with self.turn if moves else nullcontext():
+                    fresh: dict[str, Any] = {"message": "", "met": False, "note": "", "superseded": False}
+                    before = replace(self.now, number=self.now.number + 1, **fresh)
+                    self.now = before if late() else method(self, before, late, *given, **named)
+                    if late():
+                        self.now = replace(self.now, wanted=before.wanted, superseded=True)
+                    return self.now
+            finally:
+                with self.order:
+                    self.served += 1
+                    self.order.notify_all()
+
+        return run
+
+    return made
 
 
 def solved_start(surface: Surface) -> State:
@@ -168,190 +202,176 @@ class Session:
     progress: str = ""  # of the search for targets
 
     def __post_init__(self) -> None:
-        self._order = threading.Condition()
-        self._arrived = self._served = self._newest = 0
+        self.order = threading.Condition()
+        self.arrived = self.served = self.newest = 0  # numbers of acts
         self.fallback = self.fallback.with_walls(self.start.surface)
-        self._now = replace(self.start, steps=(self.start.surface,))
+        self.now = replace(self.start, steps=(self.start.surface,))
 
     @property
     def surface(self) -> Surface:
         """The surface shown."""
-        return self._now.surface
+        return self.now.surface
 
     @property
     def aims(self) -> Aims | None:
         """The targets met last, with what they vary."""
-        return self._now.aims
+        return self.now.aims
 
-    def state(self) -> State:
+    @act()
+    def state(self, state: State, stop: Stop) -> State:
         """The present state."""
-        return self._run(lambda state, stop: state)
+        return state
 
-    def follow(self, values: Values) -> State:
+    @act(moves=True)
+    def follow(self, state: State, stop: Stop, values: Values) -> State:
         """Move towards these values while a slider moves: as far as two quick attempts lead."""
+        state = state.asking(values)
+        end = time.monotonic() + FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000)
+        way = reach(state.surface, state.wanted, until(stop, end), attempts=2, **FOLLOW)
+        failed = way.failed if way.certificate is None else None
+        return state if stop() else state.following(replace(way, failed=failed), way.certificate)
 
-        def act(state: State, stop: Stop) -> State:
-            state = state.asking(values)
-            end = time.monotonic() + FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000)
-            way = reach(state.surface, state.wanted, until(stop, end), attempts=2, **FOLLOW)
-            failed = way.failed if way.certificate is None else None
-            return state if stop() else state.following(replace(way, failed=failed), way.certificate)
-
-        return self._run(act, moves=True)
-
-    def settle(self, values: Values) -> State:
+    @act(moves=True)
+    def settle(self, state: State, stop: Stop, values: Values) -> State:
         """Move to these values, or as close as possible, in as many steps as needed.
 
         The surface reached is a step that ``undo`` returns to.
         """
-
-        def act(state: State, stop: Stop) -> State:
-            state, end = state.asking(values), time.monotonic() + SETTLE_SECONDS
-            settled = self.fallback.settle(
-                state.surface, state.wanted, stop, end, self._show_progress, **SETTLE
-            )
-            if stop():
-                return state
-            way, note, self.fallback = settled
-            new = replace(state.following(way, None), note=note)
-            return (replace(new, wanted=way.surface) if note and way.failed is None else new).stepped()
-
-        return self._run(act, moves=True)
-
-    def stabilise(self) -> State:
-        """Move from a saddle to a stable shape, if there is one nearby."""
-
-        def act(state: State, stop: Stop) -> State:
-            end = time.monotonic() + SETTLE_SECONDS
-            result = attempt(state.surface, until(stop, end), target="minimum")
-            certificate = result.certify()
-            if stop():
-                return state
-            if certificate.verdict not in AT_REST:
-                return replace(state, failure=certificate)
-            return replace(state.showing(result.surface, certificate), wanted=state.wanted).stepped()
-
-        return self._run(act, moves=True)
-
-    def remesh(self) -> State:
-        """New triangles of the mean size for the surface shown, and from there to the values asked for."""
-
-        def act(state: State, stop: Stop) -> State:
-            asked, end = values_of(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
-            mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
-            result = attempt(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
-            if stop():
-                return state
-            if result.certificate.verdict not in AT_REST:
-                return replace(state, failure=result.certificate)
-            state = state.showing(result.surface).stepped().asking(asked)
-            if values_of(state.surface) != asked:
-                way = reach(state.surface, state.wanted, until(stop, end), **SETTLE)
-                state = state.following(way, None).stepped()
+        state, end = state.asking(values), time.monotonic() + SETTLE_SECONDS
+        progress = partial(setattr, self, "progress")
+        settled = self.fallback.settle(state.surface, state.wanted, stop, end, progress, **SETTLE)
+        if stop():
             return state
+        way, note, self.fallback = settled
+        new = replace(state.following(way, None), note=note)
+        return (replace(new, wanted=way.surface) if note and way.failed is None else new).stepped()
 
-        return self._run(act, moves=True)
+    @act(moves=True)
+    def stabilise(self, state: State, stop: Stop) -> State:
+        """Move from a saddle to a stable shape, if there is one nearby."""
+        end = time.monotonic() + SETTLE_SECONDS
+        result = attempt(state.surface, until(stop, end), target="minimum")
+        certificate = result.certify()
+        if stop():
+            return state
+        if certificate.verdict not in AT_REST:
+            return replace(state, failure=certificate)
+        return replace(state.showing(result.surface, certificate), wanted=state.wanted).stepped()
 
+    @act(moves=True)
+    def remesh(self, state: State, stop: Stop) -> State:
+        """New triangles of the mean size for the surface shown, and from there to the values asked for."""
+        asked, end = values_of(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
+        mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
+        result = attempt(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
+        if stop():
+            return state
+        if result.certificate.verdict not in AT_REST:
+            return replace(state, failure=result.certificate)
+        state = state.showing(result.surface).stepped().asking(asked)
+        if values_of(state.surface) != asked:
+            way = reach(state.surface, state.wanted, until(stop, end), **SETTLE)
+            state = state.following(way, None).stepped()
+        return state
+
+    @act(moves=True)
     def meet(
-        self, targets: tuple[Target, ...], vary: tuple[Parameter, ...], gone: Stop = lambda: False
+        self,
+        state: State,
+        stop: Stop,
+        targets: tuple[Target, ...],
+        vary: tuple[Parameter, ...],
+        gone: Stop = lambda: False,
     ) -> State:
         """Move to values that meet the targets; if there are none, ``message`` says why.
 
         The search ends when ``gone``: its page was closed.
         """
+        solves = count(1)
 
-        def act(state: State, stop: Stop) -> State:
-            solves = count(1)
+        def check(_: object) -> None:
+            self.progress = f"{next(solves)} solves"
+            if stop() or gone():
+                raise StopIteration
 
-            def check(_: object) -> None:
-                self.progress = f"{next(solves)} solves"
-                if stop() or gone():
-                    raise StopIteration
+        try:
+            design = meet(state.surface, targets, vary, callback=check)
+        finally:
+            self.progress = ""
+        if stop():
+            return state
+        certificate, message = design.certificate, design.text(self.units)
+        if design.met and certificate.verdict in AT_REST:
+            state = replace(state.showing(design.surface), aims=(targets, vary), met=True).stepped()
+        elif design.met:
+            message += f"; but {certificate.verdict.value}; {certificate.detail}"
+        return replace(state, message=message)
 
-            try:
-                design = meet(state.surface, targets, vary, callback=check)
-            finally:
-                self.progress = ""
-            if stop():
-                return state
-            certificate, message = design.certificate, design.text(self.units)
-            if design.met and certificate.verdict in AT_REST:
-                state = replace(state.showing(design.surface), aims=(targets, vary), met=True).stepped()
-            elif design.met:
-                message += f"; but {certificate.verdict.value}; {certificate.detail}"
-            return replace(state, message=message)
-
-        return self._run(act, moves=True)
-
-    def keep(self, name: str) -> State:
+    @act()
+    def keep(self, state: State, stop: Stop, name: str) -> State:
         """Keep the surface shown as a variant; one of the same name is replaced."""
+        kept = {variant.name: variant for variant in state.variants}
+        if name not in kept and len(kept) >= MOST_VARIANTS:
+            text = f"there are {MOST_VARIANTS} variants; remove one first"
+            raise OptionError(text, what="variants", found=len(kept))
+        kept[name] = Variant(name, state.surface, certify(state.surface))
+        return replace(state, variants=tuple(kept.values()))
 
-        def act(state: State, stop: Stop) -> State:
-            kept = {variant.name: variant for variant in state.variants}
-            if name not in kept and len(kept) >= MOST_VARIANTS:
-                text = f"there are {MOST_VARIANTS} variants; remove one first"
-                raise OptionError(text, what="variants", found=len(kept))
-            kept[name] = Variant(name, state.surface, certify(state.surface))
-            return replace(state, variants=tuple(kept.values()))
-
-        return self._run(act)
-
-    def forget(self, number: int) -> State:
+    @act()
+    def forget(self, state: State, stop: Stop, number: int) -> State:
         """Remove a variant."""
+        gone, compared = state.variant(number), state.compared
+        if compared is not None and compared >= number:
+            compared = None if compared == number else compared - 1
+        rest = tuple(variant for variant in state.variants if variant is not gone)
+        return replace(state, variants=rest, compared=compared)
 
-        def act(state: State, stop: Stop) -> State:
-            gone, compared = state.variant(number), state.compared
-            if compared is not None and compared >= number:
-                compared = None if compared == number else compared - 1
-            rest = tuple(variant for variant in state.variants if variant is not gone)
-            return replace(state, variants=rest, compared=compared)
-
-        return self._run(act)
-
-    def recall(self, number: int) -> State:
+    @act(ends=True)
+    def recall(self, state: State, stop: Stop, number: int) -> State:
         """Show a variant again, as a new step."""
-        return self._run(
-            lambda state, stop: state.showing(state.variant(number).surface).stepped(), ends=True
-        )
+        return state.showing(state.variant(number).surface).stepped()
 
-    def compare(self, number: int | None = None) -> State:
+    @act()
+    def compare(self, state: State, stop: Stop, number: int | None = None) -> State:
         """Compare the surface shown with a variant, or with none."""
+        if number is not None:
+            state.variant(number)
+        return replace(state, compared=number)
 
-        def act(state: State, stop: Stop) -> State:
-            if number is not None:
-                state.variant(number)
-            return replace(state, compared=number)
-
-        return self._run(act)
-
-    def renew(self, start: State, units: Units = NO_UNITS, fallback: ProjectFallback | None = None) -> State:
+    @act(ends=True)
+    def renew(
+        self,
+        state: State,
+        stop: Stop,
+        start: State,
+        units: Units = NO_UNITS,
+        fallback: ProjectFallback | None = None,
+    ) -> State:
         """Show another start, as a new step: the file behind the page was saved."""
+        self.start, self.units = start, units
+        self.fallback = (fallback or self.fallback).with_walls(start.surface)
+        state = replace(state.showing(start.surface, start.certificate), aims=None)
+        return replace(state, wanted=start.wanted, failure=start.failure).stepped()
 
-        def act(state: State, stop: Stop) -> State:
-            self.start, self.units = start, units
-            self.fallback = (fallback or self.fallback).with_walls(start.surface)
-            state = replace(state.showing(start.surface, start.certificate), aims=None)
-            return replace(state, wanted=start.wanted, failure=start.failure).stepped()
-
-        return self._run(act, ends=True)
-
-    def stop(self) -> State:
+    @act(ends=True)
+    def stop(self, state: State, stop: Stop) -> State:
         """End the work under way."""
-        return self._run(lambda state, stop: state, ends=True)
+        return state
 
-    def undo(self) -> State:
+    @act(ends=True)
+    def undo(self, state: State, stop: Stop) -> State:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""
-        return self._run(
-            lambda state, stop: state.at(state.place if state.unsaved else max(state.place - 1, 0)), ends=True
-        )
+        return state.at(max(state.undo - 1, 0))
 
-    def redo(self) -> State:
+    @act(ends=True)
+    def redo(self, state: State, stop: Stop) -> State:
         """Repeat the step that was undone."""
-        return self._run(lambda state, stop: state.at(min(state.place + 1, len(state.steps) - 1)), ends=True)
+        return state.at(min(state.place + 1, len(state.steps) - 1))
 
-    def reset(self) -> State:
+    @act(ends=True)
+    def reset(self, state: State, stop: Stop) -> State:
         """Return to the start, as a new step."""
-        return self._run(lambda state, stop: state.showing(self.start.surface).stepped(), ends=True)
+        return state.showing(self.start.surface).stepped()
 
     def check_mesh(self, gone: Stop = lambda: False) -> MeshCheck | None:
         """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
@@ -379,31 +399,3 @@ class Session:
                 return at(shown, check)
             except KeyboardInterrupt:
                 return None
-
-    def _show_progress(self, words: str) -> None:
-        self.progress = words
-
-    def _run(self, act: Act, moves: bool = False, ends: bool = False) -> State:
-        """Do an act after those before it; one that ``moves`` or ``ends`` moves ends moves before it."""
-        with self._order:
-            mine = self._arrived
-            self._arrived += 1
-            if moves or ends:
-                self._newest = mine
-            self._order.wait_for(lambda: self._served == mine)
-
-        def late() -> bool:
-            return moves and self._newest > mine
-
-        try:
-            with self.turn if moves else nullcontext():
-                number = self._now.number + 1
-                before = replace(self._now, message="", met=False, note="", number=number, superseded=False)
-                self._now = before if late() else act(before, late)
-                if late():
-                    self._now = replace(self._now, wanted=before.wanted, superseded=True)
-                return self._now
-        finally:
-            with self._order:
-                self._served += 1
-                self._order.notify_all()

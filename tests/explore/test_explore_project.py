@@ -94,7 +94,7 @@ def test_a_search_tells_its_progress_and_can_be_stopped(hall_session, monkeypatc
         told.append(hall_session.progress)
         stopping = threading.Thread(target=real, args=(hall_session,))
         stopping.start()
-        until(lambda: hall_session._arrived == 2, "the stop")
+        until(lambda: hall_session.arrived == 2, "the stop")
         with pytest.raises(StopIteration):
             callback(None)
         return pcmc.meet(surface, targets, vary, solves=1)

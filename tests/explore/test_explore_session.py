@@ -142,10 +142,10 @@ def test_a_newer_request_ends_the_work_on_an_older_one(cap):
     with turn:
         old = threading.Thread(target=ask, args=("old", 0.7))
         old.start()
-        until(lambda: session._arrived == 1, "the first request")
+        until(lambda: session.arrived == 1, "the first request")
         new = threading.Thread(target=ask, args=("new", 0.8))
         new.start()
-        until(lambda: session._arrived == 2, "the second request")
+        until(lambda: session.arrived == 2, "the second request")
     old.join()
     new.join()
     assert states["old"].superseded
@@ -169,7 +169,7 @@ def test_acts_are_done_in_order_and_none_is_dropped(cap, hall):
     with turn:
         for number, thread in enumerate(threads, 1):
             thread.start()
-            until(lambda number=number: session._arrived == number, "the request")
+            until(lambda number=number: session.arrived == number, "the request")
     for thread in threads:
         thread.join()
     state = session.state()
