@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.arrays import Ints
 from ..base.errors import OptionError
-from ..certificate.leaning import lean_sines
+from ..certificate.tables import lean_sines
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .measurement import Branches, Measurement, largest

@@ -15,8 +15,8 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..certificate.curve_tables import sides_at
 from ..certificate.reactions import SupportForces, support_forces
+from ..certificate.tables import sides_at
 from ..forces.functional import weighted
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base.arrays import plain
 from ..base.errors import unknown
-from ..base.names import checked_name
-from ..base.plain import plain
+from ..base.validate import checked_name
 from ..design import Parameter
 from ..margins.targets import Target
 from ..surface.values import KINDS

@@ -14,8 +14,8 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
+from ..base.arrays import plain
 from ..base.errors import FileWarning, SurfaceError, unknown
-from ..base.plain import plain
 from ..io import FORMATS, write
 from ..project import load, vertex_fields
 from ..surface import Surface

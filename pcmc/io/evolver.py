@@ -25,8 +25,7 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..forces.flat_pieces import flat_pieces
-from ..forces.plane_pieces import add_plane_volumes
+from ..forces.flat_pieces import add_plane_volumes, flat_pieces
 from ..forces.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface

@@ -20,7 +20,7 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
-from ..base.names import names_from_file
+from ..base.validate import names_from_file
 from ..surface import Cable, Patch, Plane, Room
 from . import text
 from .mesh_data import FIXED, FREE, SLIDING, MeshData

@@ -25,7 +25,7 @@ from ..base.errors import FileError
 from ..base.files import check_regular
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
-from ..surface.origin import file_origin
+from ..surface.geometry import file_origin
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata

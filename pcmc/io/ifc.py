@@ -22,7 +22,7 @@ from ..base.errors import FileError
 from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
-from ..surface.origin import file_origin
+from ..surface.geometry import file_origin
 from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata

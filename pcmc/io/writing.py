@@ -15,9 +15,8 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import as_path, atomic_write, check_name, writing
-from ..base.names import checked_name
 from ..base.units import Units, as_units, length_factor
-from ..base.validate import choice, refuse
+from ..base.validate import checked_name, choice, refuse
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .formats import FORMATS, format_of

@@ -19,7 +19,7 @@ from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from ..surface import Plane
 from .settings import COLOURS, PATCH_KEYS, WHEN, AccuracyWanted, MeshFile, Output, Remeshing
 
@@ -105,42 +105,24 @@ def fits(value: Any, schema: Schema) -> bool:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a project file.
-
-    Attributes
-    ----------
-    name : in its section.
-    kind : what its value may be, such as "a number"; one of ``KINDS``.
-    default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
-    help : what it means.
-    choices : the texts that are allowed; empty if any is.
-    unless : the keys that may stand for a required one.
-    """
+    """A key of a project file."""
 
     name: str
-    kind: str
-    default: Any
+    kind: str  # one of ``KINDS``
+    default: Any  # where the key is left out; ``REQUIRED`` if it must not be, None for none
     help: str
-    choices: tuple[str, ...] = ()
-    unless: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()  # the texts that are allowed; empty if any is
+    unless: tuple[str, ...] = ()  # the keys that may stand for a required one
 
 
 @dataclass(frozen=True)
 class Section:
-    """A table of a project file.
+    """A table of a project file."""
 
-    Attributes
-    ----------
-    name : as in TOML, such as "plan.holes"; NAME stands for any name, "" is the file itself.
-    help : what it is for.
-    keys : all that it may have.
-    condition : when these are its keys; empty for always.
-    """
-
-    name: str
+    name: str  # as in TOML, such as "plan.holes"; NAME stands for any name, "" is the file itself
     help: str
     keys: tuple[Key, ...] = field(repr=False)
-    condition: str = ""
+    condition: str = ""  # when these are its keys; empty for always
 
     def is_curve(self, table: Mapping[str, Any]) -> bool:
         """Whether the table of a divider or hole is a curve itself."""

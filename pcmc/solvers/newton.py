@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import SurfaceError
-from ..certificate.collapse import held_wall_down
-from ..certificate.slipping import describe_saddle, slipping_ends
+from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..contact.pinching import find_walls
 from ..forces.functional import energy
 from ..forces.rooms import check_rooms, room_pressures

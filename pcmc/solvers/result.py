@@ -144,7 +144,7 @@ class Result:
     @cached_property
     def rooms(self) -> pd.DataFrame:
         """A row per room of prescribed volume: the certificate's, and the ``change`` of its pressure."""
-        from ..certificate.certificate import room_table
+        from ..certificate.tables import room_table
 
         return room_table(self.surface).assign(change=self.room_changes)
 

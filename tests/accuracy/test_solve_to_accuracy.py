@@ -19,7 +19,7 @@ from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.certificate.reactions import reactions
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy, volume
-from pcmc.meshing.curve_projection import onto_held_curves
+from pcmc.meshing.held_curves import onto_held_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

@@ -8,7 +8,7 @@ import pytest
 import tomlkit
 
 from pcmc import cli
-from pcmc.certificate.slipping import describe_saddle
+from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, Plan
 from pcmc.project import load, run_project
 
