@@ -52,10 +52,8 @@ def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) 
     Any basis of their space is as good, and rounding alone would choose one: a symmetric saddle would lean
     to another side on each processor. ``root`` (s,) are the roots of the masses.
     """
-    vectors, ends = (
-        vectors.copy(),
-        np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max(initial=0.0)) + 1,
-    )
+    vectors = vectors.copy()
+    ends = np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max(initial=0.0)) + 1
     for group in np.split(np.arange(len(values)), ends):
         if len(group) > 1:
             wave = np.arange(3 * len(space.dimension)).reshape(-1, 3)
