@@ -12,7 +12,6 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra
 from ..base.units import TABLE, length_factor
 from .sheet import LAYERS, SMALL, Sheet
-from .views import section_layer
 
 VERSION = "R2018"
 MODEL_TEXT = 0.004  # height of letters in the model, in its size
@@ -72,12 +71,10 @@ def _add_model(space: Any, model: Any) -> None:
     roof = surface.roof[surface.patch_of_face]
     for corners in surface.vertices[surface.faces[roof]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
-    lines: list[tuple[str, Any, str]] = [(curve.layer, curve, curve.name) for curve in model.curves]
-    names = [patch.name for patch in surface.patches]
-    lines += [(section_layer(surface, line), line, names[line.patch]) for line in model.sections]
-    for layer, line, name in lines:
-        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs={"layer": layer})
-        entity.set_xdata("PCMC", [(1000, name[:250])])
+    for line in (*model.curves, *model.sections):
+        look = {"layer": line.layer}
+        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs=look)
+        entity.set_xdata("PCMC", [(1000, line.name[:250])])
     height = MODEL_TEXT * surface.size
     rows = model.points[["point", "x", "y", "z"]].to_numpy().tolist()
     labels = [(name, at, "PCMC-POINT") for name, *at in rows]

@@ -186,7 +186,7 @@ def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():
     assert size_field(cap, np.zeros(cap.m), 400).min() > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_order_two_is_regained_at_a_re_entrant_corner():
     start = solve(l_roof(2.0)).surface
     wall = start.patches[-1].name
