@@ -20,10 +20,9 @@ from ..forces.functional import patch_areas
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
 from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
-from ..stability.equilibrium import Equilibrium
+from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import lowest
-from ..stability.softness import Spectrum, count_soft
+from ..stability.modes import NEAR, NEUTRAL, Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
 from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
@@ -32,7 +31,7 @@ from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
 from .supports import boundary_view, pull_table, support_table
 from .tables import junction_table, lean_table, lean_texts, patch_table, room_table
-from .verdict import COLLAPSED, NEAR, NEUTRAL, Evidence, Findings, Verdict, judge, only_coarse
+from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge, only_coarse
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
 
@@ -207,6 +206,7 @@ def certify(
     evidence: Evidence | None = None,
     tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
+    clear: SecondVariation | None = None,
 ) -> Certificate:
     """Examine a surface.
 
@@ -219,6 +219,7 @@ def certify(
         ``Result.certify`` passes them on.
     whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
         index then, and not only those symmetric in these planes. True, or the planes to unfold at.
+    clear : what the solver factorised at this shape, so that it is not factorised again.
 
     Examples
     --------
@@ -246,7 +247,7 @@ def certify(
     at_rest = residual <= tolerance and quality > COLLAPSED
     spectrum, eigenvalues, fields = Spectrum(), np.empty(0), np.empty((0, 0, 3))
     if at_rest:
-        spectrum, eigenvalues, fields = _stability(equilibrium, modes)
+        spectrum, eigenvalues, fields = _stability(equilibrium, modes, clear)
     findings = Findings(
         surface=surface,
         pinchable=pinchable,
@@ -303,10 +304,13 @@ def certify(
     )
 
 
-def _stability(equilibrium: Equilibrium, modes: int) -> tuple[Spectrum, Floats, Floats]:
+def _stability(
+    equilibrium: Equilibrium, modes: int, clear: SecondVariation | None
+) -> tuple[Spectrum, Floats, Floats]:
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
     square = equilibrium.shape.size**2
-    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square)
+    clear = clear if clear is not None and clear.of.same_as(equilibrium) else None
+    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square, clear)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..forces.triangles import compressed, effective_tensions
-from ..stability.softness import Spectrum
+from ..stability.modes import NEAR, NEUTRAL, Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
@@ -21,11 +21,6 @@ from .proof import Attempt, Overload, Proof
 
 NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-# |λ| size²/α up to which the detail names a fold. A mesh's own branch folds where the derivative of the
-# forces left is singular, which is not quite the second variation: at reported folds of coarse caps,
-# catenoids and pairs of caps |λ| is 0.003 to 0.55. A flat film over a disc has 46.
-NEAR = 1.0
-NEUTRAL = 1e-2  # |λ| size²/α up to which a motion counts as neutral, α the tension of what it moves
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 NO_TENSION = "no patch has a tension: every shape is at rest"
 COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate

@@ -28,8 +28,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from ..stability.bordered import BorderedFactor
-from ..stability.factorisation import Factor, SingularMatrix
+from ..stability.factorisation import BorderedFactor, Factor, SingularMatrix
 from .state import BranchMesh, State
 
 ITERATIONS = 12  # most Newton steps of a correction

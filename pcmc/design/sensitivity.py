@@ -36,8 +36,7 @@ from ..forces.parameters import gradient_by
 from ..forces.pattern import hessian_pattern
 from ..forces.rooms import prescribed_volumes, volume_defects, volume_gradients_at
 from ..forces.second_variation import assemble
-from ..stability.bordered import BorderedFactor
-from ..stability.factorisation import Factor, SingularMatrix, factoriser
+from ..stability.factorisation import BorderedFactor, Factor, SingularMatrix, factoriser
 from ..surface import Surface
 from ..surface.values import rates_of
 from .quantities import Measurement

@@ -13,19 +13,17 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
+from .formats import Content
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata
@@ -36,19 +34,11 @@ NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does n
 ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
-def write(
-    path: Path,
-    surface: Surface,
-    scalars: Mapping[str, Floats],
-    metadata: str,
-    walls: str | None,
-    colour: str,
-    **_: Any,
-) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
-    for name, values in scalars.items():
+    for name, values in content.scalars.items():
         if len(values) == surface.n:
             finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
             data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
@@ -58,9 +48,9 @@ def write(
     turned = turned - place[:3, 3]
     scene = trimesh.Scene()
     shades = None
-    if colour:
-        shades, least, most = scalar_colors(scalars[colour])
-        scene.metadata["pcmc colours"] = {"scalar": colour, "least": least, "most": most}
+    if content.colour:
+        shades, least, most = scalar_colors(content.scalars[content.colour])
+        scene.metadata["pcmc colours"] = {"scalar": content.colour, "least": least, "most": most}
     for k, color, used, faces in patch_meshes(surface):
         name = surface.patches[k].name
         mesh = trimesh.Trimesh(turned[used], faces, process=False)
@@ -73,9 +63,9 @@ def write(
             rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
             mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
-    scene.metadata["pcmc"] = metadata
-    if walls is not None:
-        scene.metadata[WALLS] = walls
+    scene.metadata["pcmc"] = content.metadata
+    if content.walls is not None:
+        scene.metadata[WALLS] = content.walls
     if path.suffix.lower() == ".glb":
         path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
     else:
@@ -84,10 +74,31 @@ def write(
 
 
 def read(path: Path) -> MeshData:
-    """Meshes as patches, by the names of their nodes."""
-    trimesh = load_library("trimesh")
+    """Meshes as patches, by the names of their nodes.
+
+    trimesh believes that parts are files, and that arrays are not larger than the bytes there are.
+    """
+    trimesh, content = load_library("trimesh"), path.read_bytes()
+    size, items = len(content), 0
+    if path.suffix.lower() == ".glb":
+        content = content[20 : 20 + int.from_bytes(content[12:16], "little")]
     with translated_errors("glTF"):
-        _check_header(path)
+        header = json.loads(content)  # in a file that is cut off, trimesh would look for another file
+        for buffer in header.get("buffers", ()):
+            name = buffer.get("uri", "base64,").strip()
+            if "base64," not in name:
+                for part in {
+                    path.parent / each for each in (name, name.lstrip("/"), os.path.split(name)[-1])
+                }:
+                    check_regular(part)  # trimesh tries each
+                    size += part.stat().st_size if part.exists() else 0
+        for number, accessor in enumerate(header.get("accessors", ())):
+            items += accessor["count"]
+            if not isinstance(items, int) or accessor["count"] < 0 or items > ITEMS * size:
+                text = (
+                    f"accessor {number} has {accessor['count']!r:.30} items, and the file only {size} bytes"
+                )
+                raise FileError(text, where=number, found=accessor["count"], expected=size)
         try:
             scene = trimesh.load_scene(path, process=False, skip_materials=True)
         except FileNotFoundError as error:
@@ -100,24 +111,3 @@ def read(path: Path) -> MeshData:
     support = mesh.scalars.get(SUPPORT)
     held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))
-
-
-def _check_header(path: Path) -> None:
-    """Check what trimesh believes: parts are files, and arrays are not larger than the bytes there are."""
-    data = path.read_bytes()
-    size, items = len(data), 0
-    if path.suffix.lower() == ".glb":
-        data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
-    header = json.loads(data)  # in a file that is cut off, trimesh would look for another file
-    for buffer in header.get("buffers", ()):
-        name = buffer.get("uri", "base64,")
-        if "base64," not in name:
-            for place in {name.strip(), name.strip().lstrip("/"), os.path.split(name)[-1]}:  # it tries each
-                part = path.parent / place
-                check_regular(part)
-                size += part.stat().st_size if part.exists() else 0
-    for number, accessor in enumerate(header.get("accessors", ())):
-        items += accessor["count"]
-        if not isinstance(items, int) or accessor["count"] < 0 or items > ITEMS * size:
-            text = f"accessor {number} has {accessor['count']!r:.30} items, and the file only {size} bytes"
-            raise FileError(text, where=number, found=accessor["count"], expected=size)

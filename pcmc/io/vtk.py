@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Ints
 from ..base.errors import FileError
 from ..surface import Surface
+from .formats import Content
 from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
@@ -26,15 +27,15 @@ ITEMS = 100  # of an array, for each byte of a file; those of one value compress
 FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata: str, **_: Any) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """Polygons in a .vtp, cells in a .vtu."""
     pyvista = load_library("pyvista")
     mesh = pyvista.PolyData.from_regular_faces(surface.vertices, surface.faces)
     mesh.point_data["support"] = support_of(surface)
     mesh.cell_data["patch"] = surface.patch_of_face
-    for name, values in scalars.items():
+    for name, values in content.scalars.items():
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
-    mesh.field_data["pcmc"] = [metadata]
+    mesh.field_data["pcmc"] = [content.metadata]
     if path.suffix.lower() == ".vtu":
         mesh = mesh.cast_to_unstructured_grid()
     library = load_library("vtkmodules.vtkIOXML")
@@ -50,17 +51,6 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata:
 def read(path: Path) -> MeshData:
     """Triangles, quads and polygons of either; lines and points are left out."""
     require("vtkmodules", "pyvista")
-    _check_text(path)
-    arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
-    corners, counts, chosen = _cells(arrays)
-    metadata = parse_metadata(arrays["text"])
-    points = np.asarray(arrays["points"]).reshape(-1, 3)
-    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
-    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)
-
-
-def _check_text(path: Path) -> None:
-    """Refuse a file without its end, and counts that no file of its size can have."""
     data = path.read_bytes()
     if not data[-64:].rstrip().endswith(b"</VTKFile>"):
         raise FileError("not a VTK XML file, or cut off before '</VTKFile>'", expected="</VTKFile>")
@@ -68,6 +58,12 @@ def _check_text(path: Path) -> None:
         if len(match[1]) > 18 or int(match[1]) > ITEMS * len(data):
             text = f"{match[0][:60].decode()}, but the file has only {len(data)} bytes"
             raise FileError(text, where=1 + data.count(b"\n", 0, match.start()), found=match[1][:60].decode())
+    arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
+    corners, counts, chosen = _cells(arrays)
+    points = np.asarray(arrays["points"]).reshape(-1, 3)
+    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
+    metadata = parse_metadata(arrays["text"])
+    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)
 
 
 def _cells(arrays: Mapping[str, Any]) -> tuple[Ints, Ints, Ints]:

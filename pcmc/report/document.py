@@ -7,24 +7,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from .. import quantities
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
-from ..certificate import Certificate
+from ..certificate import Certificate, quantities
+from ..certificate.quantities import Figure
 from ..certificate.required import certified, warning_mark
 from ..drawings.pdf import register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png
-from ..quantities import Figure
 from ..surface import Surface, expect_surface
 from . import tables
-from .blocks import Block, Heading, NewPage, Picture, Table
 from .plan import PaperPlan, paper_plan
+from .tables import Block, Heading, Picture, Table
 from .words import ERROR_BARS, LEGEND, about_forces, panel_text, verdict_sentences
 
 if TYPE_CHECKING:
@@ -38,22 +37,22 @@ PIXELS = 1300  # width of a picture
 
 @dataclass(frozen=True, eq=False)
 class RoofReport:
-    """A report about a roof."""
+    """A report about a roof; see ``roof_report``."""
 
     surface: Surface
     units: Units  # of its numbers
     certificate: Certificate
-    name: str  # in the head of the pages; empty for none
-    date: str  # in their foot; empty for none
     plan: PaperPlan  # to scale
-    schedule: Panels | None = None  # the panels, if a tolerance was given
+    figures: Sequence[Figure]  # the key figures
+    schedule: Panels | None = None
+    name: str = ""  # in the head of the pages
+    date: str = ""  # in their foot
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
+    theorem: Theorem | None = None
     targets: pd.DataFrame | None = None
     margins: Sequence[Margin] = ()
-    files: Mapping[str, str] = field(default_factory=dict)  # name of each file, and what it is
-    figures: Sequence[Figure] = ()  # the key figures
-    theorem: Theorem | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the report as a PDF file; the same report gives the same bytes.
@@ -88,8 +87,7 @@ class RoofReport:
         yield tables.key_figures(surface, self.figures, units)
         roof = draw(surface, view="diagonal", legend=True, width=PIXELS)
         yield Picture("View from above", png(roof))
-        yield NewPage()
-        yield Heading(f"Plan, scale {self.plan.scale}, lengths in {units.length}")
+        yield Heading(f"Plan, scale {self.plan.scale}, lengths in {units.length}", new_page=True)
         yield self.plan
         yield LEGEND
         yield Picture("Elevation", png(draw(surface, view="elevation", width=PIXELS)))
@@ -113,8 +111,7 @@ class RoofReport:
             yield Heading("Mesh check")
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.schedule is not None:
-            yield NewPage()
-            yield Heading("Panels")
+            yield Heading("Panels", new_page=True)
             yield panel_text(self.schedule, units)
             yield Picture("", png(families(self.schedule, width=PIXELS)))
             yield tables.family_table(self.schedule, units)
@@ -128,19 +125,12 @@ def roof_report(
     surface: Surface,
     units: Units | str,
     *,
-    name: str = "",
     tolerance: float | None = None,
-    mesh_check: MeshCheck | None = None,
-    mesh_failure: str = "",
-    theorem: Theorem | None = None,
-    targets: pd.DataFrame | None = None,
-    margins: Sequence[Margin] = (),
-    files: Mapping[str, str] | None = None,
-    date: str = "",
     anyway: bool = False,
     certificate: Certificate | None = None,
     schedule: Panels | None = None,
     figures: Sequence[Figure] | None = None,
+    **about: Any,
 ) -> RoofReport:
     """A report about a roof: pictures, plan, verdict in words, forces, panels, files.
 
@@ -148,17 +138,13 @@ def roof_report(
     ----------
     surface : a certified surface, z up.
     units : of its numbers, such as ``Units("m", "kN")``; a text is the unit of length.
-    name : of the roof.
     tolerance : of the panels' families, length; None for no panels.
-    mesh_check : of the surface, for error bars; None for none.
-    mesh_failure : why it was asked for and failed; empty otherwise.
-    theorem : of the surface; None for none.
-    targets : ``Design.targets``; None for none.
-    margins : how far the roof is from the edge, a sentence each.
-    files : name of each file that belongs to the roof, and what it is.
-    date : of the report, as it is to be printed; no clock is read.
     anyway : report on a surface that is not certified; every page is marked.
     certificate, schedule, figures : of the surface, where they are known; otherwise computed.
+    about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
+        surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
+        of a ``Design``; ``margins``, how far the roof is from the edge, a sentence each; ``files``, the name
+        of each file that belongs to the roof, and what it is.
 
     Raises
     ------
@@ -182,22 +168,9 @@ def roof_report(
     certificate = certified(surface, anyway, certificate)
     if schedule is None and tolerance is not None:
         schedule = panels(surface, tolerance, anyway=anyway, certificate=certificate)
-    return RoofReport(
-        surface,
-        units,
-        certificate,
-        name,
-        date,
-        paper_plan(surface, certificate, units),
-        schedule,
-        mesh_check,
-        mesh_failure,
-        targets,
-        margins,
-        dict(files or {}),
-        quantities.figures(surface, certificate) if figures is None else figures,
-        theorem,
-    )
+    figures = quantities.figures(surface, certificate) if figures is None else figures
+    plan = paper_plan(surface, certificate, units)
+    return RoofReport(surface, units, certificate, plan, figures, schedule, **about)
 
 
 def check_suffix(path: str | os.PathLike[str]) -> Path:

@@ -19,8 +19,8 @@ from reportlab.platypus import Flowable, Image, KeepTogether, PageBreak, Paragra
 from reportlab.platypus import Table as Grid
 
 from ..drawings.pdf import BOLD, FONT, paint
-from .blocks import Block, Heading, NewPage, Table
 from .plan import PaperPlan
+from .tables import Block, Heading, Table
 
 INK, GREY, RED = "#202020", "#707070", "#C00000"
 SIDE, TOP, BOTTOM = 18.0 * mm, 20.0 * mm, 17.0 * mm  # margins of a page
@@ -95,10 +95,8 @@ def _cut(text: str, width: float) -> str:
 
 def _flowables(block: Block) -> list[Any]:
     """What reportlab lays out for a block."""
-    if isinstance(block, NewPage):
-        return [PageBreak()]
     if isinstance(block, Heading):
-        return [_paragraph(block.text, HEADING)]
+        return [*([PageBreak()] if block.new_page else []), _paragraph(block.text, HEADING)]
     if isinstance(block, str):
         return [_paragraph(block, _Look(before=2.0, after=2.0))]
     if isinstance(block, PaperPlan):

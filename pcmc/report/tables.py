@@ -1,20 +1,20 @@
-"""The numbers of a roof as tables of texts: a head, and rows of equal length."""
+"""The blocks of a report, and the numbers of a roof as tables of texts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from ..base.units import Units
 from ..certificate import Certificate
+from ..certificate.quantities import Figure, dimension_of
 from ..panelling import Panels
-from ..quantities import Figure, dimension_of
 from ..surface import Surface
-from .blocks import Table
+from .plan import PaperPlan
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -22,6 +22,33 @@ if TYPE_CHECKING:
 DIGITS = 4  # of the largest number of a column
 MIDDLE = ("middle_x", "middle_y", "middle_z")
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them
+
+
+class Heading(NamedTuple):
+    """A heading that stays with what follows it, perhaps on a new page."""
+
+    text: str
+    new_page: bool = False
+
+
+class Picture(NamedTuple):
+    """A picture across the page, as a PNG file, with its title above it."""
+
+    title: str
+    png: bytes
+
+
+class Table(NamedTuple):
+    """A table: its title, the head, the rows, and how many columns at the left are words."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+    words: int = 1
+
+
+Block = str | Heading | Picture | Table | PaperPlan
+"""What the pages of a report are made of; a text alone is a paragraph."""
 
 
 def column(values: Iterable[float], digits: int = DIGITS) -> list[str]:
@@ -61,27 +88,23 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
     width, depth, _ = np.ptp(surface.vertices, axis=0).tolist()
     rows = [["size in the plan", f"{one(width)} × {one(depth)} {units.length}"]]
     for (quantity, owner), label in LISTED.items():
-        values = [
-            f.value for f in figures if (f.quantity, f.owner) == (quantity, owner) and f.value is not None
-        ]
+        found = [f.value for f in figures if (f.quantity, f.owner) == (quantity, owner)]
+        values = [value for value in found if value is not None]
         if values:
-            unit = units.behind(dimension_of(quantity)).strip()
-            rows.append([label, f"{one(sum(values))} {unit}"])
+            rows.append([label, f"{one(sum(values))} {units.behind(dimension_of(quantity)).strip()}"])
     rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
     return Table("Key figures", [], rows)
 
 
 def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
-    table, length = certificate.patches, units.length
-    loads = {"pressure": "pressure", "snow": "snow", "net": "net pressure"}
-    columns = {
-        f"tension, {units.tension}": column(table["tension"]),
-        **{f"{name}, {units.pressure}": column(table[key]) for key, name in loads.items() if key in table},
-        f"area, {units.area}": column(table["area"]),
-        f"mean curvature, 1/{length}": column(table["mean_H"]),
-        "its largest error": [small(x) for x in table["variational_max"].tolist()],
-    }
+    table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
+    pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]
+    columns = _numbers(table, ["tension"], units.tension) | _numbers(table, pressures, units.pressure)
+    columns |= _numbers(table, ["area"], units.area) | _numbers(
+        table, ["mean curvature"], f"1/{units.length}"
+    )
+    columns["its largest error"] = [small(x) for x in table["variational_max"].tolist()]
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)

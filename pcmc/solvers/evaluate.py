@@ -37,9 +37,8 @@ class Point(NamedTuple):
 def converged_below(surface: Surface, tolerance: float | None) -> float:
     """‖∇E‖² up to which a run from a surface has converged, force²; 0 for none.
 
-    This is the tolerance wherever the norm F of the single triangles' forces, at the start, is 1 or more.
-    Where F is less, it is tolerance · F², or a surface small enough would be at rest in any shape. Nor is
-    it below (ROUNDING · F)², which rounding keeps a large surface from.
+    The tolerance, times F² where the norm F of the single triangles' forces at the start is below 1, or a
+    small surface would be at rest in any shape; at least (ROUNDING · F)², which rounding leaves.
 
     >>> from pcmc import Patch, Surface
     >>> corners, faces = [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]]
@@ -81,9 +80,8 @@ class Evaluator:
         self.count += 1
         tension, pressure = self._mesh.tension, self._mesh.pressure
         if self._single:  # the same sums as triangles.measure, without its overhead for threads
-            area, volume, G = np.zeros_like(tension), np.zeros_like(tension), np.zeros(X.shape)
-            m = len(self._mesh.faces)
-            triangles.measure_block(self._mesh, X, 0, m, area, volume, G)
+            (area, volume), G = np.zeros((2, len(tension))), np.zeros(X.shape)
+            triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), area, volume, G)
         else:
             area, volume, G = triangles.measure(self._mesh, X)
         if self._pieces:

@@ -13,7 +13,7 @@ from small_project import changed
 
 from pcmc import cli
 from pcmc.base.errors import FileError
-from pcmc.project import json_schema, load, reference, sections
+from pcmc.project import load, reference, sections
 
 
 @pytest.mark.parametrize(
@@ -235,7 +235,6 @@ def test_editors_read_the_same_keys_from_the_schema(capsys):
     jsonschema = pytest.importorskip("jsonschema")
     assert cli.main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert schema == json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(tomllib.loads(Path("notebooks/roof.toml").read_text(encoding="utf-8")), schema)
     plan = {"outline": [[0, 0], [4, 0], [4, 3]], "dividers": [{"polyline": [[2, 0], [2, 3]]}]}
