@@ -24,8 +24,7 @@ from .cache import clear as clear_cache
 from .cache import folder as cache_folder
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, load, project_of, read_data, with_rise
-from .keys import sections
-from .manual import json_schema, reference
+from .keys import json_schema, reference, sections
 from .outcome import MOST_CHECKED, Outcome
 from .output import OnStep, check_outputs, paint, schedule_jobs, write_all
 from .planning import drawing_reference, project_text, proposal_text
