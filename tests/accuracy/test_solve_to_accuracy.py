@@ -12,9 +12,8 @@ import generators
 import pcmc
 from pcmc import Patch, Surface, Target, cli, solve, solve_to_accuracy
 from pcmc.accuracy import adaptive, check_mesh
-from pcmc.accuracy.adaptive import AccuracyStatus, size_field
+from pcmc.accuracy.adaptive import AccuracyStatus, goals_in, size_field
 from pcmc.accuracy.estimator import _FineMesh, _held_vertices, _slope, error_shares
-from pcmc.accuracy.goals import goals_in
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.certificate.reactions import reactions
 from pcmc.design.targets import measure
@@ -186,7 +185,7 @@ def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():
     assert size_field(cap, np.zeros(cap.m), 400).min() > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_order_two_is_regained_at_a_re_entrant_corner():
     start = solve(l_roof(2.0)).surface
     wall = start.patches[-1].name

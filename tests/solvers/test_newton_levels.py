@@ -45,6 +45,8 @@ def test_from_coarse_to_fine_takes_fewer_steps_on_the_finest_mesh(backend):
 def factorisers(monkeypatch):
     """Those alive, counted whenever another is made."""
     made, alive = [], []
+    gc.collect()
+    gc.freeze()  # what other tests left need not be searched each time
 
     make = equilibrium.factoriser
 
@@ -58,6 +60,7 @@ def factorisers(monkeypatch):
     monkeypatch.setattr(equilibrium, "factoriser", factoriser)
     yield alive
     gc.collect()
+    gc.unfreeze()
     assert not any(each() is not None for each in made)
 
 
