@@ -105,8 +105,9 @@ class Explorer:
         given = checked(ACTS[act] if act in ACTS else OTHERS[act], asked)
         if act == "check":
             check = session.check_mesh(gone)
-            found = None if check is None else {"check": page_data.mesh_findings(check, units)}
-            return pack(found or {"superseded": True})
+            if check is None:
+                return pack({"superseded": True})
+            return pack({"check": page_data.mesh_findings(check, units)})
         if act == "margin":
             margin = session.margin(**given, gone=gone)
             if margin is None:
