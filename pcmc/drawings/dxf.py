@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra
 from ..base.units import TABLE, length_factor
+from ..io.libraries import load_library
 from .sheet import LAYERS, SMALL, Sheet
 
 VERSION = "R2018"
@@ -26,11 +26,7 @@ def document(drawings: Any) -> Any:
     name of its patches or its cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports
     of one point, each on the layer of its kind; beside the roof the panels flat at true size.
     """
-    try:
-        import ezdxf
-    except ImportError:
-        raise MissingExtra("ezdxf", "cad") from None
-    doc: Any = ezdxf.new(VERSION)
+    doc = load_library("ezdxf", "cad").new(VERSION)
     units = drawings.units
     doc.units = TABLE[units].dxf
     doc.header["$MEASUREMENT"] = int(units not in ("ft", "in"))

@@ -14,6 +14,7 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
+from ..certificate.quantities import dimension_of
 from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
 from ..design.quantities import MEASURES
@@ -23,7 +24,6 @@ from ..margins.varied import named
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import values_of
-from ..quantities import dimension_of
 from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded

@@ -20,11 +20,11 @@ from ..accuracy import MeshCheck, check_mesh
 from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
+from ..certificate.quantities import figures
 from ..design import Parameter, Target, meet
 from ..margins import Margin, margin
 from ..meshing.remeshing import remesh
 from ..project.values import values_of
-from ..quantities import figures
 from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface

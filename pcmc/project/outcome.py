@@ -20,12 +20,12 @@ from .settings import Output
 
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
+    from ..certificate.quantities import Figure
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..margins import Margin
     from ..panelling import Panels
-    from ..quantities import Figure
     from ..report import RoofReport
     from ..structure import StructuralModel
     from ..verification import Theorem
@@ -132,7 +132,7 @@ class Outcome:
     @cached_property
     def figures(self) -> list[Figure]:
         """The key figures of what is shown."""
-        from ..quantities import figures
+        from ..certificate.quantities import figures
 
         return figures(*self.shown)
 

@@ -71,7 +71,7 @@ def solve_case(
     dict : ``status`` (the solver's, in small letters), ``verdict`` of the certificate, ``message``;
         ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the paper's
         squared sum); the certificate's numbers, those of its tables as ``large.area``, ``junction 0.length``,
-        ``boundary 0.reaction_z``; and, of a surface at rest, the key figures of ``pcmc.quantities``:
+        ``boundary 0.reaction_z``; and, of a surface at rest, the key figures of the roof:
         ``large.apex``, and ``rise`` of the whole roof. A number with the name of one of the arguments is
         called ``name_reached``. With ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the
         height, volume, energy, reaction and lowest eigenvalue ``height_error``, ``height_limit``,
@@ -102,7 +102,7 @@ def row(result: Result, names: Container[str], outcome: Outcome | None = None) -
     With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between
     mirror planes: see the column ``extent``. Without an equilibrium the row has no numbers of the shape.
     """
-    from ..quantities import figures  # takes long to import
+    from ..certificate.quantities import figures  # takes long to import
 
     surface, certificate = result.surface, result.certificate
     numbers = {

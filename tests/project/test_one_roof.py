@@ -92,7 +92,7 @@ def test_a_run_with_all_outputs_computes_each_finding_once(folder, monkeypatch):
         "pcmc.drawings.drawing_set.panels",
         "pcmc.report.document.panels",
         "pcmc.accuracy.check_mesh",
-        "pcmc.quantities.figures",
+        "pcmc.certificate.quantities.figures",
     )
     roof = project.run("roof.toml")
     assert len(roof.files) == 7
