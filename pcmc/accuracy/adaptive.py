@@ -45,14 +45,8 @@ SPARE = 1.3  # times the triangles foreseen, so that fewer rounds are needed
 WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
 ACCURACY_OF = ("mesh", "limit")
 QUANTITIES = (
-    "height",
-    "area",
-    "volume",
-    "energy",
-    "reaction",
-    "thrust",
-    "reaction per length",
-    "lowest eigenvalue",
+    *("height", "area", "volume", "energy", "reaction", "thrust"),
+    *("reaction per length", "lowest eigenvalue"),
 )
 Accuracy = Mapping[str, float] | str
 
@@ -203,19 +197,8 @@ def accuracies(given: Any) -> dict[str, float]:
     pcmc.base.errors.OptionError: unknown quantity 'hight'; did you mean 'height'? Known: height, ...
     """
     expected = "a table such as {'height': 1e-3}, or a text such as 'height=1e-3'"
-    wanted = _parsed(given) if isinstance(given, str) else given
-    if not isinstance(wanted, Mapping) or not wanted:
-        validate.refuse("accuracy", given, expected)
-    found = {}
-    for name, value in wanted.items():
-        validate.choice("quantity", str(name).partition(" of ")[0], QUANTITIES)
-        found[str(name)] = validate.number("accuracy", value, above=0.0, where=str(name))
-    return found
-
-
-def _parsed(text: str) -> dict[str, float]:
-    wanted = {}
-    for part in text.split(","):
+    wanted: dict[Any, Any] = dict(given) if isinstance(given, Mapping) else {}
+    for part in given.split(",") if isinstance(given, str) else ():
         name, sign, value = part.rpartition("=")
         try:
             wanted[name.strip()] = validate.parsed(value)
@@ -223,7 +206,13 @@ def _parsed(text: str) -> dict[str, float]:
             sign = ""
         if not sign or not name.strip():
             validate.refuse("accuracy", part.strip(), "QUANTITY=NUMBER, such as height=1e-3")
-    return wanted
+    if not wanted:
+        validate.refuse("accuracy", given, expected)
+    found = {}
+    for name, value in wanted.items():
+        validate.choice("quantity", str(name).partition(" of ")[0], QUANTITIES)
+        found[str(name)] = validate.number("accuracy", value, above=0.0, where=str(name))
+    return found
 
 
 def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
