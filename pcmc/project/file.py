@@ -94,17 +94,14 @@ def load(path: PathLike, *, units: str = "") -> Project:
 
     Raises
     ------
-    FileError
-        If the file cannot be read or is not TOML; for an unknown key (the message names its line and
+    FileError : if the file cannot be read or is not TOML; for an unknown key (the message names its line and
         the nearest known key), a missing key or a bad value. ``what`` is the key.
-    PlanError
-        For a drawing that is no plan; ``what`` is its layer.
+    PlanError : for a drawing that is no plan; ``what`` is its layer.
 
     Warns
     -----
-    FileWarning
-        For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
-        and for a roof held at single points inside.
+    FileWarning : for what was changed and left out of a drawing, for a plan whose size is unlikely in its
+        unit, and for a roof held at single points inside.
     """
     path = as_path(path)
     if not is_project(path):
@@ -133,10 +130,7 @@ def is_project(path: PathLike) -> bool:
 
 
 def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
-    """The text of a project file and its data, all keys checked; a drawing's data refer to it.
-
-    Errors as in ``load``.
-    """
+    """The text of a project file and its data, all keys checked; a drawing's data refer to it."""
     check_regular(path)
     if is_drawing(path):
         return "", {"plan": {"drawing": path.name}} | ({"units": units} if units else {})

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 def drawing_reference(drawing: Path, project: Path) -> str:
     """The name by which a project refers to its drawing, which lies in the project's folder or below it.
 
-    Raises
-    ------
-    FileError : for a drawing elsewhere; the message has the line to type.
+    FileError for a drawing elsewhere; the message has the line to type.
     """
     try:
         name = Path(os.path.relpath(drawing, project.parent))
@@ -49,21 +47,12 @@ def project_text(
     gap: float | None = None,
     refer: bool = False,
 ) -> tuple[str, Drawing]:
-    """The text of the project for a drawing, and the drawing.
+    """The text of the project for a drawing, .dxf or .3dm, and the drawing.
 
-    Parameters
-    ----------
-    path : of the drawing, .dxf or .3dm.
-    folder : of the project, which refers to the drawing from there; by default the drawing's.
-    units : the unit of length of the project; "" for the drawing's.
-    gap : gaps between lines up to this length are closed, in that unit.
-    refer : refer to the drawing by name, so that the project follows it, instead of holding its lines.
-
-    Raises
-    ------
-    FileError, PlanError : for a drawing that cannot be read, is no plan, or is outside the folder of a
-        project that refers to it.
-    MissingExtra : without the library that reads the drawing.
+    The project is in ``units``, by default those of the drawing; gaps between lines up to the length ``gap``
+    are closed. With ``refer`` it refers to the drawing by name, so that it follows it, instead of holding its
+    lines; ``folder`` is that of the project, by default the drawing's. FileError or PlanError for a drawing
+    that cannot be read, is no plan, or is outside that folder; MissingExtra without the library for it.
     """
     from ..plan.proposal import proposed
 
