@@ -185,15 +185,7 @@ def project_of(
         data, drawing, chosen = with_drawing(path, data)
     stages = data.get("remesh", [])
     with in_file(path, FileError):
-        options = dict(data.get("solve", {}))
-        about = {
-            name: options.pop(name)
-            for name in ("method", "mesh_check", "margin", "verify")
-            if name in options
-        }
-        accuracy = {name: options.pop(name) for name in vars(AccuracyWanted()) if name in options}
-        wanted = section_of(AccuracyWanted, "solve", accuracy)
-        find_method(about.get("method", "newton")).options(**options)  # refuses bad values before meshing
+        solving = _solving(data.get("solve", {}))
         output = _output(data.get("output", {}))
         units = Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
@@ -214,9 +206,7 @@ def project_of(
             text=text,
             data=given,
             units=units,
-            options=options,
-            wanted=wanted,
-            **about,
+            **solving,
             remeshing=[
                 section_of(Remeshing, "remesh", stage)
                 for stage in (stages if isinstance(stages, list) else [stages])
@@ -230,6 +220,16 @@ def project_of(
             rises=rises,
             chosen=chosen,
         )
+
+
+def _solving(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What [solve] says, as values of a Project; bad ones are refused before the plan is meshed."""
+    given = {name: table[name] for name in ("method", "mesh_check", "margin", "verify") if name in table}
+    accuracy = {name: table[name] for name in vars(AccuracyWanted()) if name in table}
+    given["wanted"] = section_of(AccuracyWanted, "solve", accuracy)
+    given["options"] = {name: v for name, v in table.items() if name not in given and name not in accuracy}
+    find_method(given.get("method", "newton")).options(**given["options"])
+    return given
 
 
 def _output(table: Mapping[str, Any]) -> Output:
