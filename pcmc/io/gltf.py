@@ -87,18 +87,15 @@ def read(path: Path) -> MeshData:
         for buffer in header.get("buffers", ()):
             name = buffer.get("uri", "base64,").strip()
             if "base64," not in name:
-                for part in {
-                    path.parent / each for each in (name, name.lstrip("/"), os.path.split(name)[-1])
-                }:
-                    check_regular(part)  # trimesh tries each
+                for place in {name, name.lstrip("/"), os.path.split(name)[-1]}:  # trimesh tries each
+                    check_regular(part := path.parent / place)
                     size += part.stat().st_size if part.exists() else 0
         for number, accessor in enumerate(header.get("accessors", ())):
-            items += accessor["count"]
-            if not isinstance(items, int) or accessor["count"] < 0 or items > ITEMS * size:
-                text = (
-                    f"accessor {number} has {accessor['count']!r:.30} items, and the file only {size} bytes"
-                )
-                raise FileError(text, where=number, found=accessor["count"], expected=size)
+            count = accessor["count"]
+            items += count
+            if not isinstance(items, int) or count < 0 or items > ITEMS * size:
+                text = f"accessor {number} has {count!r:.30} items, and the file only {size} bytes"
+                raise FileError(text, where=number, found=count, expected=size)
         try:
             scene = trimesh.load_scene(path, process=False, skip_materials=True)
         except FileNotFoundError as error:
