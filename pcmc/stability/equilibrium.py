@@ -271,11 +271,7 @@ class Equilibrium:
 
         Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part that
         rests on Π. Then, with ``soften``, a little more stiffness is added: such motions do not lower the
-        energy.
-
-        Raises
-        ------
-        SingularMatrix : it is singular, also with a little stiffness added.
+        energy. SingularMatrix if that does not help.
         """
         pattern, solver = self.unknowns
         for added in (0.0, SOFT) if soften else (0.0,):
@@ -344,11 +340,7 @@ def negatives_without(factor: Factor, columns: Floats) -> int:
     """Negative eigenvalues on the complement of the columns (N,k).
 
     Haynsworth: the bordered matrix [[A, Q], [Qᵀ, 0]] has the inertia of A restricted to the
-    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q.
-
-    Raises
-    ------
-    SingularMatrix : the inertia of A, or that of QᵀA⁻¹Q, is hidden by rounding.
+    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q. SingularMatrix if rounding hides one of these.
     """
     k = columns.shape[1]
     if not k:
