@@ -74,10 +74,11 @@ class Equilibrium:
         return new
 
     def same_as(self, other: Equilibrium) -> bool:
-        """Whether both are of the same faces and patches, at the same positions."""
+        """Whether both have the same faces, patches, supports, cables, rooms and positions."""
         here, there = self.surface, other.surface
-        alike = np.array_equal(self.X, other.X) and np.array_equal(here.faces, there.faces)
-        return alike and here.patches == there.patches and here.rooms == there.rooms
+        arrays = [(at.X, at.surface.faces, *at.space, *at.surface.cable_edges) for at in (self, other)]
+        values = [(surface.patches, surface.rooms, surface.plane) for surface in (here, there)]
+        return values[0] == values[1] and all(map(np.array_equal, *arrays))
 
     def release(self) -> None:
         """Give back the memory of the factoriser; another is made when it is asked for."""
