@@ -24,7 +24,7 @@ from .walls import most_in_corners
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
 ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
-ROOM = 1.6  # tension, over the least at which a roof over the plan exists
+ABOVE_LEAST = 1.6  # a first tension, over the least at which a roof over the plan exists
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
 MANY, ROUGH = 4000, 1e-5  # curves of more points are simplified, by so much of their length
@@ -207,7 +207,7 @@ def _patches(
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
     least = least_tension(_roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE))
-    default = float(f"{ROOM * least:.2g}") if tension is None else tension
+    default = float(f"{ABOVE_LEAST * least:.2g}") if tension is None else tension
     labels, specs = _labels(parts, drawing), []
     for k, part in enumerate(parts):
         point = [_rounded(value, part.radius) for value in part.middle]
