@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
@@ -124,11 +124,10 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     parts = parts_of(drawing)
     specs = _patches(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
-    for key in ("pressure", "weight"):  # of all patches, which have their own tensions here
-        if key in values:
-            common = values.pop(key)
-            for spec in specs:
-                spec.setdefault(key, common)
+    common = {"pressure": 0.0} if sail else {}  # an edge that nothing holds closes no space for a pressure
+    common |= {key: values.pop(key) for key in ("pressure", "weight") if key in values}
+    for spec, (key, value) in product(specs, common.items()):
+        spec.setdefault(key, value)
     tensions = [spec["tension"] for spec in specs]
     edge_length = values.setdefault("edge_length", _edge_length(parts, drawing))
     outline = Line("the outline", Kind.OUTLINE, drawing.outline)
@@ -157,8 +156,6 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
             entry.setdefault("cable", cable)
     patches: dict[str, dict[str, Any]] = {}
     for spec in specs:
-        if sail:  # an edge that nothing holds closes no space for a pressure
-            spec.setdefault("pressure", 0.0)
         same = patches.setdefault(spec.pop("name"), spec)
         if same is not spec:  # several parts of one name are one patch
             same["at"] = [*_as_points(same["at"]), *_as_points(spec["at"])]
