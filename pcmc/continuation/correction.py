@@ -33,7 +33,7 @@ from .state import BranchMesh, State
 
 ITERATIONS = 12  # most Newton steps of a correction
 SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
-COLLAPSED = 0.02  # triangle quality below which no point is accepted
+LEAST_QUALITY = 0.02  # triangle quality below which no point is accepted
 CONSTRAINT_TOLERANCE = 1e-9  # |g| that counts as zero
 
 
@@ -176,7 +176,7 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
         value = at.parameter + change if constraint.parameter is None else constraint.parameter
         at = at.step(step, value, iteration + 1, at.with_rooms(s[size:]))
         _check_tensions(at)
-        if at.quality < COLLAPSED:
+        if at.quality < LEAST_QUALITY:
             raise MeshCollapsed("triangles collapse")
         if mesh.reaches_plane(at.X).any():
             raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method
