@@ -30,7 +30,7 @@ from .outcome import Design, DesignStatus, NoStart
 from .quantities import vertices_up
 from .sensitivity import slopes
 from .steps import Iterate, StepPlan, Trial
-from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
+from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 TRIES = 6  # points tried along a step, each nearer, before it is given up
@@ -237,9 +237,9 @@ class Search:
 
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
-        values: dict[str, dict[str, float]] = {f"{kind}s": {} for kind in KINDS}
+        values: dict[str, dict[str, float]] = {parameter.key: {} for parameter in self.parameters}
         for parameter, value in zip(self.parameters, self.values(x).tolist(), strict=True):
-            values[f"{parameter.kind}s"] |= dict.fromkeys(parameter.names, value)
+            values[parameter.key] |= dict.fromkeys(parameter.names, value)
         return surface.retensioned(**values)
 
     def trial(self, x: Floats, result: Result) -> Trial:

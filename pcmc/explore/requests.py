@@ -8,8 +8,7 @@ from typing import Any
 
 from ..base.errors import unknown
 from ..base.names import checked_name
-from ..design import Parameter
-from ..margins.targets import Target
+from ..design import Parameter, Target
 from ..surface.values import KINDS
 
 LONGEST_NAME = 1000  # characters
