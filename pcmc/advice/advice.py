@@ -1,4 +1,4 @@
-"""What was chosen for a project, and what to type where its roof has no equilibrium."""
+"""What was chosen for a project, and what to type where its roof has no equilibrium or misses its targets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
 
 from ..base.errors import PcmcError
 from ..base.units import Units
@@ -21,9 +23,8 @@ from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
 from ..solvers.result import Result, Status
 from ..surface import Surface
-from .masts import SHARES, point_masts, ring_lines, with_rings
 from .rises import Rise, net_pressures
-from .sails import as_sail, sail_lines
+from .supports import SHARES, as_sail, point_masts, ring_lines, with_rings
 
 if TYPE_CHECKING:
     from ..design import Design, Parameter, Target
@@ -32,6 +33,7 @@ BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of 
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
+SAME = 1e-6  # of the surface's size: heights that differ by less are one
 
 
 class Ended(Protocol):
@@ -52,26 +54,34 @@ Trial = Callable[[Plan, Surface, Sequence["Target"]], Ended]  # solves a plan fr
 
 @dataclass(frozen=True)
 class Task:
-    """What a project asks for.
+    """What a project asks for."""
 
-    Attributes
-    ----------
-    plan : of its roof; None for a mesh.
-    file, drawing : the names of its file and of the drawing of its plan; ``drawing`` is empty without one.
-    rises, targets, vary : heights instead of tensions, which are the last targets; all targets; what varies.
-    method, options : of the solver.
-    units : of its numbers.
-    """
-
-    plan: Plan | None
+    plan: Plan | None  # None for a mesh
     file: str
-    drawing: str
-    rises: Sequence[Rise]
+    drawing: str  # of its plan; empty without one
+    rises: Sequence[Rise]  # heights instead of tensions, which are the last targets
     targets: Sequence[Target]
     vary: Sequence[Parameter]
     method: str
-    options: Mapping[str, Any]
+    options: Mapping[str, Any]  # of the method
     units: Units
+
+
+class Mended(NamedTuple):
+    """A plan that was changed until its roof comes to rest, and what was changed."""
+
+    plan: Plan
+    result: Result  # of the plan with its first changes
+    rests: bool
+    sail: bool = False  # cables instead of free edges
+    rings: Sequence[str] = ()  # what to type or draw for rings instead of single points
+
+    @property
+    def cause(self) -> str:
+        """Why, before a heading; empty without changes of what holds the roof."""
+        causes = ["edges that nothing holds"] if self.sail else []
+        causes += ["a roof held at a single point"] if self.rings else []
+        return f"the cause is {' and '.join(causes)}; " if causes else ""
 
 
 def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
@@ -81,10 +91,42 @@ def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
     left_open = [divider for divider in plan.dividers if divider.wall == BALANCED]
     chosen = [p for p in surface.patches if any(_is_wall_of(divider, p.name) for divider in left_open)]
     values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
-    balanced = (
-        f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)"
-    )
-    return [*filter(None, [drawn]), *([balanced] if chosen else [])]
+    change = "to choose one, type wall = under its divider"
+    balanced = f"walls balanced with their neighbours: {values} ({change})" if chosen else ""
+    return [text for text in (drawn, balanced) if text]
+
+
+def apexes_below_supports(
+    plan: Plan | None, surface: Surface, targets: Sequence[Target], units: Units
+) -> list[str]:
+    """A line for each apex that is wanted below a part of the patch which is held higher.
+
+    >>> from pcmc import Target
+    >>> from pcmc.plan import Hole
+    >>> eye = Hole({"circle": {"centre": [4, 4, 2], "radius": 1}}, name="eye")
+    >>> plan = Plan([[0, 0], [8, 0], [8, 8], [0, 8]], holes=[eye], tension=5.0, edge_length=1.0)
+    >>> apexes_below_supports(plan, plan.surface(), [Target("apex", value=1.5)], Units("m"))
+    ["hole 'eye' is held at 2 m, so the apex cannot be 1.5 m"]
+    """
+    heights, near = surface.plane.height(surface.vertices), SAME * surface.size
+    lines, unit = [], units.behind("length")
+    for target in targets:
+        highest = target.at_most if target.value is None else target.value
+        if target.quantity != "apex" or highest is None:
+            continue
+        own = surface.roof if target.of is None else np.array([p.name == target.of for p in surface.patches])
+        corners = np.unique(surface.faces[own[surface.patch_of_face]])
+        top = float(heights[corners[surface.pinned[corners]]].max(initial=-math.inf))
+        if top <= highest + near:
+            continue
+        holder = "a support"
+        for hole in plan.holes if plan is not None else ():
+            edge = hole.curve.local(surface.plane).at(hole.curve.dense)
+            if holder == "a support" and edge.shape[1] > 2 and abs(float(edge[:, 2].max()) - top) <= near:
+                holder = hole.name
+        held = f"{holder} is held at {top:.6g}{unit}"
+        lines.append(f"{held}, so the {target.label} cannot be {highest:.6g}{unit}")
+    return lines
 
 
 def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: Trial) -> list[str]:
@@ -97,8 +139,8 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
     ended : how that ended.
     try_plan : solves another plan from a surface, with targets.
     """
-    plan, certificate = task.plan, ended.certificate
-    if certificate.certified and (plan is None or ended.design is None or ended.design.met):
+    plan, certified = task.plan, ended.certificate.certified
+    if certified and (plan is None or ended.design is None or ended.design.met):
         return []
     if plan is None or start is not given:
         strained = strained_junction(start, standing_part(start).walls.pinchable)
@@ -107,102 +149,60 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        result, reshaping = ended.solved, Reshaping()
-        if certificate.certified:
-            base, better, rests = plan, plan, True
-        else:
-            base, reshaping, result = _reshaped(task, plan, result)
-            better, rests = _tried(task, base, result)
-        targets = task.targets[: -len(task.rises)] if reshaping.sail and task.rises else task.targets
+        mended = Mended(plan, ended.solved, True) if certified else _mended(task, plan, ended.solved)
+        better = mended.plan
+        targets = task.targets[: -len(task.rises)] if mended.sail and task.rises else task.targets
         met, reached = False, ""
-        if rests and targets:
-            better, met, reached = _with_targets(task, better, result, targets, try_plan)
-        lines = _lines(base, better)
-    if not (lines or reshaping.lines):
+        if mended.rests and targets:
+            better, met, reached = _with_targets(task, better, mended.result, targets, try_plan)
+        lines = changes(plan, better, task.rises if mended.sail else ())
+    if not (lines or mended.rings):
         return []
-    tried = "which was tried and comes to rest" if rests else "as a first step"
+    tried = "which was tried and comes to rest" if mended.rests else "as a first step"
     if met:
         tried = "which was tried, comes to rest and meets the targets"
-    elif rests and targets:
+    elif mended.rests and targets:
         tried = "which was tried without the targets and comes to rest"
+    where = f"type in {Path(task.file).with_suffix('.toml').name}"
+    if task.drawing and mended.rings:
+        where = " and ".join([f"draw in {task.drawing}", *([where] if lines else [])])
     ending = [f"with them, the targets are {reached}"] if reached else []
-    return [
-        f"{reshaping.cause}{_where(task, reshaping, lines)}, {tried}:",
-        *reshaping.lines,
-        *lines,
-        *ending,
-    ]
+    return [f"{mended.cause}{where}, {tried}:", *lines, *mended.rings, *ending]
 
 
-@dataclass(frozen=True)
-class Reshaping:
-    """Changes of what holds a roof: a sail instead of free edges, rings instead of points."""
+def _mended(task: Task, plan: Plan, result: Result) -> Mended:
+    """The plan with other supports if these alone bring it to rest; else with other tensions and walls.
 
-    sail: Sequence[str] = ()
-    rings: Sequence[str] = ()
-
-    @property
-    def lines(self) -> list[str]:
-        """What to type or draw."""
-        return [*self.sail, *self.rings]
-
-    @property
-    def cause(self) -> str:
-        """Why, before a heading; empty without changes."""
-        causes = ["edges that nothing holds"] if self.sail else []
-        causes += ["a roof held at a single point"] if self.rings else []
-        return f"the cause is {' and '.join(causes)}; " if causes else ""
-
-
-def _where(task: Task, reshaping: Reshaping, lines: Sequence[str]) -> str:
-    """Where to make the changes: in the project, or in its drawing."""
-    toml = Path(task.file).with_suffix(".toml").name
-    if not task.drawing or not reshaping.rings:
-        return f"type in {toml}"
-    typed = lines or reshaping.sail
-    drawn = f"draw in {task.drawing}"
-    return f"{drawn} and type in {toml}" if typed else drawn
-
-
-def _reshaped(task: Task, plan: Plan, result: Result) -> tuple[Plan, Reshaping, Result]:
-    """The plan as a sail, if edges are free, with rings instead of single points, and its result.
-
-    The rings are the smallest with which the roof comes to rest; the plan itself where nothing does.
+    Free edges get cables and single points the smallest rings that do.
     """
     sail, masts = as_sail(plan, task.rises), point_masts(plan)
     base = plan if sail is None else sail
-    shares = SHARES if masts else () if sail is None else (0.0,)
-    for share in shares:
+    for share in SHARES if masts else () if sail is None else (0.0,):
         changed = with_rings(base, masts, share) if masts else base
-        try:
-            other = solve(_coarse(changed, result).surface(), task.method, **task.options)
-        except PcmcError:  # such as a patch whose point is in the ring
-            continue
-        if other.certificate.certified:
-            typed = [] if sail is None else sail_lines(plan, sail, task.rises)
+        other = _tried(task, changed, result)
+        if other is not None and other.certificate.certified:
             rings = ring_lines(masts, share, drawn=bool(task.drawing))
-            return changed, Reshaping(typed, rings), other
-    return plan, Reshaping(), result
-
-
-def _tried(task: Task, plan: Plan, result: Result) -> tuple[Plan, bool]:
-    """The plan mended until it comes to rest, on a mesh that is not fine; and whether it does."""
-    if result.certificate.certified:
-        return plan, True
+            return Mended(changed, other, True, sail is not None, rings)
+    better, last = plan, result
     for _ in range(TRIES):
-        better = mended(plan, result)
-        if not _lines(plan, better):
+        before, better = better, _step(better, last)
+        other = _tried(task, better, last) if changes(before, better) else None
+        if other is None:  # nothing left to change, or too coarse for this plan
             break
-        plan = better
-        try:
-            result = solve(_coarse(plan, result).surface(), task.method, **task.options)
-        except PcmcError:  # too coarse for this plan
-            break
-        if result.certificate.certified:
-            return plan, True
-        if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+        if other.certificate.certified:
+            return Mended(better, result, True)
+        if other.status is Status.STOPPED:  # by Ctrl-C, which ends the command
             raise KeyboardInterrupt
-    return plan, False
+        last = other
+    return Mended(better, result, False)
+
+
+def _tried(task: Task, plan: Plan, result: Result) -> Result | None:
+    """How a plan ends on a mesh that is not fine; None where it has none, as with a patch inside a ring."""
+    try:
+        return solve(_coarse(plan, result).surface(), task.method, **task.options)
+    except PcmcError:
+        return None
 
 
 def _coarse(plan: Plan, result: Result) -> Plan:
@@ -214,8 +214,8 @@ def _with_targets(
     task: Task, plan: Plan, result: Result, targets: Sequence[Target], try_plan: Trial
 ) -> tuple[Plan, bool, str]:
     """The first plan that meets the targets, and whether one does; else the plan, and what it reaches."""
-    looser, reached = _loosened(plan, task.vary), ""
-    for candidate in (plan, looser):
+    reached = ""
+    for candidate in (plan, _loosened(plan, task.vary)):
         if candidate is task.plan or candidate is None:  # tried already, or nothing to loosen
             continue
         try:
@@ -244,7 +244,7 @@ def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
     return replace(_with_dividers(plan, walls, wall=BALANCED), patches=areas)
 
 
-def mended(plan: Plan, result: Result) -> Plan:
+def _step(plan: Plan, result: Result) -> Plan:
     """The plan with the tensions and supports that remove what its certificate complains of."""
     certificate = result.certificate
     grew = any(isinstance(proof, Overload) for proof in certificate.proofs)
@@ -254,29 +254,7 @@ def mended(plan: Plan, result: Result) -> Plan:
     plan = _with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
         plan = _with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
-    return _balanced(plan)
-
-
-def _stiffer(plan: Plan, result: Result) -> Plan:
-    """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
-    from ..plan.proposal import ROOM, least_tension, plan_area  # needs shapely
-
-    pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
-    least = ROOM * least_tension(plan_area(plan), max(pressures))
-    folds = [1.0 / attempt.value for attempt in result.certificate.tried if attempt.folds and attempt.value]
-    factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
-
-    def raised(tension: float) -> float:
-        return float(f"{max(least, factor * tension, tension):.2g}")
-
-    if plan.tension is not None:
-        return replace(plan, tension=raised(plan.tension))
-    return replace(plan, patches=[replace(area, tension=raised(area.tension)) for area in plan.patches])
-
-
-def _balanced(plan: Plan) -> Plan:
-    """The plan with those walls balanced at which tensions do not, or hardly, balance."""
-    for _ in range(len(plan.dividers) + len(plan.patches)):
+    for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
         surface = plan.surface()
         strained = strained_junction(surface, standing_part(surface).walls.pinchable)
         if strained is None or strained.remedy is None:
@@ -288,27 +266,58 @@ def _balanced(plan: Plan) -> Plan:
     return plan
 
 
-def _with_dividers(plan: Plan, names: set[str], **changes: Any) -> Plan:
-    dividers = [replace(d, **changes) if d.name in names else d for d in plan.dividers]
-    return replace(plan, dividers=dividers)
+def _stiffer(plan: Plan, result: Result) -> Plan:
+    """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
+    from ..plan.proposal import ROOM, least_tension, plan_area  # needs shapely
+
+    pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
+    least = ROOM * least_tension(plan_area(plan), max(pressures))
+    folds = [1.0 / attempt.value for attempt in result.certificate.tried if attempt.folds and attempt.value]
+    factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
+
+    def higher(tension: float) -> float:
+        return float(f"{max(least, factor * tension, tension):.2g}")
+
+    if plan.tension is not None:
+        return replace(plan, tension=higher(plan.tension))
+    return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
 
 
-def _lines(plan: Plan, other: Plan) -> list[str]:
-    """The lines to type that make the one plan the other: tensions, walls and bottoms."""
-    lines = [("[plan]", "tension", plan.tension, other.tension)]
+def _with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:
+    return replace(plan, dividers=[replace(d, **new) if d.name in names else d for d in plan.dividers])
+
+
+def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
+    """The lines to type that make the one plan the other; some tensions stand ``instead`` of rises."""
+    rows: list[tuple[str, Any, Any, Sequence[str]]]
+    rows = [("[plan]", plan, other, ("edge", "cable", "tension", "pressure"))]
     for before, after in zip(plan.patches, other.patches, strict=True):
-        lines.append((f"[plan.patches] {before.name}:", "tension", before.tension, after.tension))
-    made = other.surface().patches
-    for number, (was, new) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
-        place = f"[[plan.dividers]] number {number} ({was.name!r}):"
-        wall = next((p.tension for p in made if _is_wall_of(new, p.name)), None)
-        lines.append((place, "wall", was.wall, was.wall if new.wall == was.wall else wall))
-        lines.append((place, "bottom", was.bottom, new.bottom))
-    return [f"{a} {key} = {_toml(new)}  (now {_toml(old)})" for a, key, old, new in lines if new != old]
+        rows.append((f"[plan.patches] {before.name}:", before, after, ("tension", "pressure")))
+    for number, (hole, new) in enumerate(zip(plan.holes, other.holes, strict=False), 1):
+        rows.append((f"[[plan.holes]] number {number}:", hole, new, ("edge", "cable")))
+    for number, (divider, line) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
+        rows.append(
+            (f"[[plan.dividers]] number {number} ({divider.name!r}):", divider, line, ("wall", "bottom"))
+        )
+    risen = {"[plan]" if r.patch is None else f"[plan.patches] {r.patch}:": r.kind for r in instead}
+    walls, lines = other.surface().patches, []
+    for place, before, after, keys in rows:
+        for key in keys:
+            old, new = getattr(before, key), getattr(after, key)
+            kind = risen.get(place) if key == "tension" and new is not None else None
+            if key == "pressure" and place == "[plan]" and plan.tension is None:
+                continue  # its patches have their own
+            if new == old and kind is None:
+                continue
+            if key == "wall":
+                new = next((p.tension for p in walls if _is_wall_of(after, p.name)), None)
+            why = f"instead of {kind}" if kind else f"now {_toml(old)}"
+            lines.append(f"{place} {key} = {_toml(new)}  ({why})")
+    return lines
 
 
 def _toml(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, int | float) else f'"{value}"'
+    return "none" if value is None else f"{value:g}" if isinstance(value, int | float) else f'"{value}"'
 
 
 def _is_wall_of(divider: Divider, name: str) -> bool:

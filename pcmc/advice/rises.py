@@ -50,17 +50,13 @@ def take_rises(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Rise]]:
     """
     plan = dict(data["plan"])
     patches = {name: dict(values) for name, values in plan.get("patches", {}).items()}
-    rises = []
-    for name, values in patches.items():
-        rises += taken(values, RISES, name)
+    rises = [rise for name, values in patches.items() for rise in taken(values, RISES, name)]
     if not patches and "tension" not in plan:
-        rises += taken(plan, WHOLE, None)
+        rises = taken(plan, WHOLE, None)
     elif misplaced := [key for key in WHOLE[1:] if key in plan]:
         text = f"plan.{misplaced[0]} is for a plan without tensions; remove it, or the tensions"
         raise OptionError(text, what=f"plan.{misplaced[0]}")
-    if patches:
-        plan["patches"] = patches
-    return {**data, "plan": plan}, rises
+    return {**data, "plan": plan | ({"patches": patches} if patches else {})}, rises
 
 
 def taken(
@@ -70,8 +66,8 @@ def taken(
     given = [kind for kind in kinds if kind in values]
     if not given:
         return []
-    where = "the plan" if patch is None else f"patch {patch!r}"
     if len(given) > 1 or "tension" in values:
+        where = "the plan" if patch is None else f"patch {patch!r}"
         both = " and a ".join([*given, *(["tension"] if "tension" in values else [])])
         text = f"{where} has a {both}; give one of them, the others follow"
         raise OptionError(text, what=given[0], where=patch)
@@ -81,23 +77,39 @@ def taken(
 
 
 def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], list[Parameter]]:
-    """The plan with a first tension for each rise, the targets, and the tensions that are to be found.
-
-    The first tension is that of a cap with this rise over a round plan of the same least tension,
-    α = p (R² + h²) / (4 h), R twice the least tension over p.
-    """
+    """The plan with a first tension for each rise, the targets, and the tensions that are to be found."""
     from ..design import Parameter, Target
 
+    if not rises:
+        return plan, [], []
+    try:
+        from ..plan.proposal import largest_circle, least_tension, plan_area
+    except ModuleNotFoundError:
+        raise MissingExtra("shapely", "plan") from None
+    area = plan_area(plan)
+    outline = plan.outline.local(plan.plane).at(plan.outline.dense)
+    heights = outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
+    level, loads = float(heights.mean()), net_pressures(plan)
     targets, vary = [], []
-    for one in rises:
-        height = _height(plan, one)
-        if one.patch is None:
-            plan = _retensioned(plan, None, height - _level(plan))
-            vary.append(Parameter(_lifted(plan, one.kind)))
-        else:
-            plan = _retensioned(plan, one.patch, height - _level(plan))
-            vary.append(Parameter(one.patch))
-        targets.append(Target("apex", one.patch, height))
+    for rise in rises:
+        if rise.kind != "apex" and np.ptp(heights) > LEVEL * plan.outline.length:
+            text = (
+                f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead"
+            )
+            raise OptionError(f"{text}, the greatest height over the plane", what=rise.kind, where=rise.patch)
+        over = rise.value if rise.kind != "span_ratio" else 2.0 * largest_circle(area)[1] / rise.value
+        height = rise.value if rise.kind == "apex" else level + over
+        names: str | list[str] = rise.patch or [
+            name for name in patch_names(plan) if loads.get(name, plan.pressure - plan.snow)
+        ]
+        if not names:
+            text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
+            raise OptionError(
+                f"{text} pressure = ..., or tension = ... instead of {rise.kind}", what=rise.kind
+            )
+        plan = _retensioned(plan, rise.patch, least_tension(area), height - level)
+        vary.append(Parameter(names))
+        targets.append(Target("apex", rise.patch, height))
     return plan, targets, vary
 
 
@@ -106,28 +118,15 @@ def net_pressures(plan: Plan) -> dict[str, float]:
     return {a.name: a.pressure - (plan.snow if a.snow is None else a.snow) for a in plan.patches}
 
 
-def _lifted(plan: Plan, kind: str) -> list[str]:
-    """The names of the patches under pressure, whose tensions decide on the height; refused if none is."""
-    load = net_pressures(plan)
-    names = [name for name in patch_names(plan) if load.get(name, plan.pressure - plan.snow)]
-    if not names:
-        problem = f"{kind} is for a roof that a pressure lifts, and none is left here; give"
-        raise OptionError(f"{problem} pressure = ..., or tension = ... instead of {kind}", what=kind)
-    return names
-
-
-def _retensioned(plan: Plan, patch: str | None, rise: float) -> Plan:
+def _retensioned(plan: Plan, patch: str | None, least: float, rise: float) -> Plan:
     """The plan with the first tension for a rise, of a patch or of all."""
-    least, _ = _sizes(plan)
-
     if plan.tension is not None:
         return replace(plan, tension=first_tension(least, plan.pressure - plan.snow, rise))
     first = {name: first_tension(least, pressure, rise) for name, pressure in net_pressures(plan).items()}
-    areas = [replace(a, tension=first[a.name]) if patch in (None, a.name) else a for a in plan.patches]
     if patch is None:
-        highest = max(area.tension for area in areas)
-        areas = [replace(area, tension=highest) for area in areas]
-    return replace(plan, patches=areas)
+        first = dict.fromkeys(first, max(first.values()))
+    patches = [replace(a, tension=first[a.name]) if patch in (None, a.name) else a for a in plan.patches]
+    return replace(plan, patches=patches)
 
 
 def first_tension(least: float, pressure: float, rise: float) -> float:
@@ -141,31 +140,3 @@ def first_tension(least: float, pressure: float, rise: float) -> float:
     radius, strength = 2.0 * least, abs(pressure or 1.0)
     cap = strength * (radius**2 + rise**2) / (4.0 * rise)
     return float(f"{max(cap, LEAST * least * strength):.3g}")
-
-
-def _height(plan: Plan, rise: Rise) -> float:
-    """The height over Π that a rise asks for."""
-    if rise.kind == "apex":
-        return rise.value
-    heights = plan.outline.local(plan.plane).at(plan.outline.dense)
-    if heights.shape[1] > 2 and np.ptp(heights[:, 2]) > LEVEL * plan.outline.length:
-        text = f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead"
-        raise OptionError(f"{text}, the greatest height over the plane", what=rise.kind, where=rise.patch)
-    over = rise.value if rise.kind == "rise" else 2.0 * _sizes(plan)[1] / rise.value
-    return _level(plan) + over
-
-
-def _level(plan: Plan) -> float:
-    """The mean height of the outline over Π."""
-    heights = plan.outline.local(plan.plane).at(plan.outline.dense)
-    return float(heights[:, 2].mean()) if heights.shape[1] > 2 else 0.0
-
-
-def _sizes(plan: Plan) -> tuple[float, float]:
-    """The least tension of a roof over the plan per pressure, and the radius of the largest circle in it."""
-    try:
-        from ..plan.proposal import largest_circle, least_tension, plan_area
-    except ModuleNotFoundError:
-        raise MissingExtra("shapely", "plan") from None
-    area = plan_area(plan)
-    return least_tension(area), largest_circle(area)[1]

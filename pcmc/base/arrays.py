@@ -1,8 +1,10 @@
-"""Names for the arrays that travel through pcmc."""
+"""Names for the arrays that travel through pcmc, and values in the terms of JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
+from enum import Enum
 from functools import cached_property, wraps
 from typing import Any, TypeVar
 
@@ -35,3 +37,25 @@ def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
         return read_only(method(owner))
 
     return cached_property(computed)
+
+
+def plain(value: Any) -> Any:
+    """The value in terms of JSON: tables as lists of rows, members of an Enum as words, None for numbers that
+    are not finite.
+
+    >>> plain({"a": np.array([1.5, np.nan]), "b": (np.int64(2), "text")})
+    {'a': [1.5, None], 'b': [2, 'text']}
+    """
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "to_dict"):  # a table; pandas takes long to import
+        return [plain(row) for row in value.to_dict(orient="records")]
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    return value.name.lower() if isinstance(value, Enum) else value

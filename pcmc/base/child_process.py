@@ -26,13 +26,10 @@ OUTPUT = 4000  # characters of a dead process' output that are kept
 
 
 class ChildError(Exception):
-    """A call that failed.
+    """A call that failed after some ``seconds``.
 
-    Attributes
-    ----------
-    output : the traceback if the function raised an exception, else the last output of the process.
-    code : the exit code of the process if it ended, else None.
-    seconds : the time of the call.
+    ``output`` is the traceback if the function raised an exception, else the last output of the process;
+    ``code`` its exit code if it ended.
     """
 
     def __init__(self, message: str, output: str, code: int | None, seconds: float) -> None:
@@ -66,21 +63,12 @@ class ChildProcess:
         limit: float | None = None,
         memory: int | None = None,
     ) -> Any:
-        """What a function in a file returns.
+        """What a function in the file ``place`` returns; the file is loaded without its package.
 
-        After another exception, such as KeyboardInterrupt, the process must be closed: the next call would
-        get this one's answer.
-
-        Parameters
-        ----------
-        place : the file, which is loaded without its package.
-        arguments : of the function; they and the value returned are pickled.
-        limit : seconds after which the process is killed.
-        memory : bytes that it may use besides what it has and a gigabyte, on Linux; from then on.
-
-        Raises
-        ------
-        ChildError : the function raised an exception, or the process ended, or was killed at its limit.
+        The arguments and the value returned are pickled. The process is killed after ``limit`` seconds; on
+        Linux ``memory`` are the bytes that it may use from then on, besides what it has and a gigabyte.
+        ChildError if the function raises an exception, or the process ends. After another exception, such as
+        KeyboardInterrupt, close the process: the next call would get this one's answer.
         """
         assert self.process.stdin is not None
         assert self.process.stdout is not None

@@ -16,7 +16,7 @@ import time
 import traceback
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 GIGABYTE = 1 << 30  # bytes that a call may use, besides those asked for
 ORPHANED = 1.0  # seconds between two checks that the parent is alive
@@ -46,14 +46,7 @@ def limit_memory(size: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
 
 
-def _cut_forks_off(*pipes: BinaryIO) -> None:
-    """Close the pipes in every process that a call forks: it must neither answer nor hold them open."""
-    nothing = os.open(os.devnull, os.O_RDWR)
-    if hasattr(os, "register_at_fork"):
-        os.register_at_fork(after_in_child=lambda: [os.dup2(nothing, pipe.fileno(), False) for pipe in pipes])
-
-
-def _outlive(parent: int) -> None:
+def outlive(parent: int) -> None:
     """End this process and all that it started soon after its parent, also in the middle of a call."""
     while os.getppid() == parent:  # always true on Windows, where the call runs to its end
         time.sleep(ORPHANED)
@@ -68,8 +61,10 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     faulthandler.enable()
-    _cut_forks_off(requests, answers)
-    threading.Thread(target=_outlive, args=(os.getppid(),), daemon=True).start()
+    if hasattr(os, "register_at_fork"):  # what a call forks must neither answer nor hold the pipes open
+        nothing, pipes = os.open(os.devnull, os.O_RDWR), (requests.fileno(), answers.fileno())
+        os.register_at_fork(after_in_child=lambda: [os.dup2(nothing, pipe, False) for pipe in pipes])
+    threading.Thread(target=outlive, args=(os.getppid(),), daemon=True).start()
     try:
         sys.path[:] = pickle.load(requests)
         while True:

@@ -21,11 +21,8 @@ inlined = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=Tr
 def threads() -> int:
     """Threads used on large meshes: the processors this process may run on, at most eight.
 
-    The environment variable PCMC_THREADS sets another number, as sweeps do for their workers.
-
-    Raises
-    ------
-    OptionError : PCMC_THREADS is not a whole number ≥ 1.
+    The environment variable PCMC_THREADS sets another number, as sweeps do for their workers; OptionError if
+    that is not a whole number ≥ 1.
     """
     wish = os.environ.get("PCMC_THREADS", "")
     if wish:

@@ -8,9 +8,7 @@ from difflib import get_close_matches
 
 
 class PcmcError(ValueError):
-    """Base of every error that pcmc raises on purpose.
-
-    The message is for a person, the attributes are for a program.
+    """Base of every error that pcmc raises on purpose. The attributes are for programs.
 
     Attributes
     ----------
@@ -38,20 +36,14 @@ class PcmcError(ValueError):
     def in_file(
         self, path: str | os.PathLike[str], kind: type[PcmcError] | None = None, what: str | None = None
     ) -> PcmcError:
-        """The same error with the name of a file in front of its message.
-
-        Parameters
-        ----------
-        kind : of the new error, if another.
-        what : its ``what``, if another.
+        """The same error with the name of a file in front of its message; of another ``kind`` if given.
 
         >>> PcmcError("line 3: no number", what="x", where=3).in_file("roof.obj", FileError)
         FileError('roof.obj: line 3: no number')
         """
         text, what = f"{os.fspath(path)}: {self}", self.what if what is None else what
-        return (kind or type(self))(
-            text, what=what, where=self.where, found=self.found, expected=self.expected
-        )
+        about = {"where": self.where, "found": self.found, "expected": self.expected}
+        return (kind or type(self))(text, what=what, **about)
 
 
 class SurfaceError(PcmcError):

@@ -17,7 +17,7 @@ from .validate import refuse
 PathLike = str | os.PathLike[str]
 
 
-def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> FileError:
+def system_error(path: PathLike, act: str, error: OSError) -> FileError:
     """The error for a file that the system does not let be read, written or opened.
 
     >>> system_error("roof.obj", "read", FileNotFoundError(2, "No such file or directory"))
@@ -28,13 +28,7 @@ def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> File
 
 
 def as_path(path: object) -> Path:
-    """The path that a caller gives.
-
-    >>> as_path(5)
-    Traceback (most recent call last):
-    ...
-    pcmc.base.errors.OptionError: path: expected the path of a file, found 5
-    """
+    """The path that a caller gives; OptionError for anything else."""
     if isinstance(path, str | os.PathLike):
         return Path(path)
     refuse("path", path, "the path of a file")
@@ -43,10 +37,7 @@ def as_path(path: object) -> Path:
 def check_regular(path: Path) -> None:
     """Refuse a folder, a pipe and a device before they are opened: reading them may never end.
 
-    Raises
-    ------
-    FileError : also for a name with the character NUL, and a path that the system refuses. A file that is
-        missing passes.
+    FileError also for a name that no file can have and a path that the system refuses; a missing file passes.
 
     >>> check_regular(Path("/"))
     Traceback (most recent call last):
@@ -85,7 +76,7 @@ def check_name(path: Path) -> None:
         raise FileError(text, what=str(path)) from None
 
 
-def suffix_of(path: str | os.PathLike[str], known: Iterable[str], thing: str) -> str:
+def suffix_of(path: PathLike, known: Iterable[str], thing: str) -> str:
     """The suffix of a path in small letters; FileError unless it is one of those known for a thing.
 
     >>> suffix_of("roof.CSV", (".csv", ".parquet"), "a table")
@@ -104,30 +95,25 @@ def suffix_of(path: str | os.PathLike[str], known: Iterable[str], thing: str) ->
 
 
 @contextmanager
-def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary path beside ``path``. It replaces ``path`` when the block ends without error.
-
-    >>> import tempfile
-    >>> folder = Path(tempfile.mkdtemp())
-    >>> with atomic_write(folder / "a.txt") as temporary:
-    ...     _ = temporary.write_text("all of it")
-    >>> [p.name for p in folder.iterdir()]
-    ['a.txt']
-    """
+def atomic_write(path: PathLike) -> Iterator[Path]:
+    """A temporary path beside ``path``. It replaces ``path`` when the block ends without error."""
     with atomic_writes([path]) as (temporary,):
         yield temporary
 
 
 @contextmanager
-def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+def atomic_writes(paths: Iterable[PathLike]) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths``. They replace ``paths`` together when the block ends.
 
     No file system replaces several files at once. So all are written first, and then replaced one by one. If
     one cannot be replaced (because another program has it open, say), those before it are restored.
     """
     wanted = [Path(path) for path in paths]
-    written = [_beside(path) for path in wanted]
-    backups = [_beside(path) for path in wanted]
+    written, backups = (
+        [path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}") for path in wanted]
+        for _ in range(2)
+    )
+    done = 0
     try:
         yield written
         with defer_interrupts():
@@ -137,22 +123,25 @@ def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path
                         os.link(path, old)
                     except OSError:  # not every file system has links
                         shutil.copy2(path, old)
-            _replace(wanted, written, backups)
+            try:
+                for new, path in zip(written, wanted, strict=True):
+                    done += 1  # before it: a move that Ctrl-C interrupts counts too
+                    os.replace(new, path)
+            except BaseException:
+                for new, path, old in zip(written[:done], wanted, backups, strict=False):
+                    if not new.exists() and old.exists():  # it was moved
+                        os.replace(old, path)
+                    elif not new.exists():
+                        path.unlink(missing_ok=True)
+                raise
     finally:
         for path in (*written, *backups):
             path.unlink(missing_ok=True)
 
 
 @contextmanager
-def writing(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Name the file, as a FileError, if the system refuses to write it in the block.
-
-    >>> with writing("roof.obj"):
-    ...     raise OSError(28, "No space left on device")
-    Traceback (most recent call last):
-    ...
-    pcmc.base.errors.FileError: roof.obj: cannot be written (No space left on device)
-    """
+def writing(path: PathLike) -> Iterator[None]:
+    """Name the file, as a FileError, if the system refuses to write it in the block."""
     try:
         yield
     except OSError as error:
@@ -170,26 +159,4 @@ def folder(path: Path) -> Iterator[None]:
         for made in missing:
             with suppress(OSError):  # it is not empty
                 made.rmdir()
-        raise
-
-
-def _beside(path: Path) -> Path:
-    """A new name in the same folder, with the same suffix."""
-    return path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
-
-
-def _replace(wanted: list[Path], written: list[Path], backups: list[Path]) -> None:
-    done = 0
-    try:
-        for new, path in zip(written, wanted, strict=True):
-            done += 1  # before it: a move that Ctrl-C interrupts counts too
-            os.replace(new, path)
-    except BaseException:
-        for new, path, old in zip(written[:done], wanted, backups, strict=False):
-            if new.exists():
-                continue  # it was never moved
-            if old.exists():
-                os.replace(old, path)
-            else:
-                path.unlink(missing_ok=True)
         raise

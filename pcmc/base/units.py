@@ -10,16 +10,12 @@ from .errors import OptionError
 
 
 class Length(NamedTuple):
-    """A unit of length in every file format: its whole micrometres, and what the formats call it.
+    """A unit of length in every file format."""
 
-    ``dxf`` is the number of ``$INSUNITS``, ``rhino`` the name of a .3dm file's unit system, ``ifc`` the
-    prefix of the metre, or for a unit that is none of the SI its name.
-    """
-
-    micrometres: int
-    dxf: int
-    rhino: str
-    ifc: str
+    micrometres: int  # whole, so that factors are exact quotients
+    dxf: int  # the number of ``$INSUNITS``
+    rhino: str  # the name of a .3dm file's unit system
+    ifc: str  # the prefix of the metre, or the name of a unit that is none of the SI
 
 
 TABLE = {
@@ -34,48 +30,33 @@ TABLE = {
     "yd": Length(914_400, 10, "Yards", "yard"),
     "mi": Length(1_609_344_000, 3, "Miles", "mile"),
 }
-"""All units of length. Micrometres are whole, so that factors are exact quotients."""
-
 MICROMETRES = {name: unit.micrometres for name, unit in TABLE.items()}
-"""The whole micrometres in each unit of length."""
-
-LENGTHS = ("m", "mm", "cm", "ft", "in")
-"""The units of length of a project."""
-
+LENGTHS = ("m", "mm", "cm", "ft", "in")  # of a project
 NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}
-"""The newtons in each unit of force."""
+FORCES = tuple(NEWTONS)  # of a project
+KILOGRAMS = {"kg": 1.0, "t": 1e3, "slug": NEWTONS["lbf"] / 0.3048}
+LARGEST, SMALLEST = 1000.0, 1.0  # metres: the size of a plan is between, as a rule
 
-MASSES = {"kg": 1.0, "t": 1e3, "slug": NEWTONS["lbf"] / 0.3048}
-"""The kilograms in each unit of mass."""
-
-FORCES = tuple(NEWTONS)
-"""The units of force of a project."""
-
-
-def unit_in_file(system: int | str) -> tuple[str, str]:
-    """The unit of length that a drawing names, and a note if it is none of ours; both empty without one.
-
-    ``system`` is the ``$INSUNITS`` of a .dxf file, or the name of a .3dm file's unit system.
-
-    >>> unit_in_file(3), unit_in_file("Microns"), unit_in_file(0)
-    (('mi', ''), ('µm', ''), ('', ''))
-    >>> unit_in_file(21)
-    ('', 'its unit of length (21) is unknown here: the numbers are taken as they are')
-    """
-    if system in (0, "None", "Unset"):
-        return "", ""
-    known = [name for name, unit in TABLE.items() if system in (unit.dxf, unit.rhino)]
-    if known:
-        return known[0], ""
-    return "", f"its unit of length ({system}) is unknown here: the numbers are taken as they are"
+DERIVED = {
+    "area": "{length}²",
+    "volume": "{length}³",
+    "curvature": "1/{length}",
+    "tension": "{force}/{length}",  # and reactions per length
+    "pressure": "{force}/{length}²",
+    "eigenvalue": "{force}/{length}³",  # force per displacement and area
+    "energy": "{force}·{length}",
+    "angle": "°",
+    "times": "times",  # of a factor
+}
+"""The unit of each kind of quantity."""
 
 
 @dataclass(frozen=True)
 class Units:
     """The units of a surface's numbers: coordinates in ``length``, tensions in ``force``/``length``.
 
-    Every other quantity follows: pressures are in force/length², curvatures in 1/length, volumes in length³.
-    An empty text is no unit.
+    Every other quantity follows, and its unit is an attribute: ``area``, ``volume``, ``curvature``,
+    ``tension``, ``pressure``, ``eigenvalue``, ``energy``, ``angle``. An empty text is no unit.
 
     Attributes
     ----------
@@ -111,50 +92,16 @@ class Units:
         """Whether there is a unit of length."""
         return bool(self.length)
 
-    @property
-    def area(self) -> str:
-        """The unit of areas: "m²"."""
-        return f"{self.length or 'length'}²"
-
-    @property
-    def angle(self) -> str:
-        """The unit of angles, degrees."""
-        return "°"
-
-    @property
-    def times(self) -> str:
-        """What follows a factor."""
-        return "times"
-
-    @property
-    def volume(self) -> str:
-        """The unit of volumes: "m³"."""
-        return f"{self.length or 'length'}³"
-
-    @property
-    def curvature(self) -> str:
-        """The unit of curvatures: "1/m"."""
-        return f"1/{self.length or 'length'}"
-
-    @property
-    def tension(self) -> str:
-        """The unit of tensions, and of reactions per length: "kN/m"."""
-        return f"{self.force or 'force'}/{self.length or 'length'}"
-
-    @property
-    def pressure(self) -> str:
-        """The unit of pressures: "kN/m²"."""
-        return f"{self.tension}²"
-
-    @property
-    def eigenvalue(self) -> str:
-        """The unit of eigenvalues, force per displacement and area: "kN/m³"."""
-        return f"{self.tension}³"
+    def __getattr__(self, kind: str) -> str:
+        """The unit of a kind of quantity; see ``DERIVED``."""
+        if kind not in DERIVED:
+            raise AttributeError(f"Units have no {kind!r}")
+        return DERIVED[kind].format(length=self.length or "length", force=self.force or "force")
 
     def behind(self, kind: str) -> str:
         """What follows a number: a space and the unit of its kind; nothing if no unit is given.
 
-        ``kind`` is length, force, or a property of Units such as volume.
+        ``kind`` is length, force, or a quantity such as volume.
 
         >>> Units("m", "kN").behind("volume"), Units("m").behind("force"), Units().behind("volume")
         (' m³', ' force', '')
@@ -181,59 +128,16 @@ class Units:
         if not self.force:
             return "force·s²/" + (self.length or "length")
         kilograms = NEWTONS[self.force] / length_factor(self.length, "m")
-        near = (name for name, known in MASSES.items() if abs(kilograms - known) < 1e-9 * known)
+        near = (name for name, known in KILOGRAMS.items() if abs(kilograms - known) < 1e-9 * known)
         return next(near, f"{kilograms:.6g} kg")
-
-    @property
-    def energy(self) -> str:
-        """The unit of E: "kN·m"."""
-        return f"{self.force or 'force'}·{self.length or 'length'}"
 
 
 NO_UNITS = Units()
 """Those of numbers whose units are not given."""
 
 
-LARGEST, SMALLEST = 1000.0, 1.0  # metres: the size of a plan is between, as a rule
-
-
-def size_note(size: float, unit: str, drawn: str = "") -> str:
-    """A sentence on a plan whose size is unlikely in its unit, with the line to type; else empty.
-
-    Parameters
-    ----------
-    size : the larger side of the plan, in ``unit``.
-    unit : of the numbers; without one nothing is known.
-    drawn : the unit that the drawing of the plan itself has.
-
-    >>> size_note(12000.0, "m"), size_note(12.0, "m")
-    ('the plan is 12 km long; are its numbers in mm? Then type units = "mm"', '')
-    """
-    if not unit:
-        return ""
-    metres = size * length_factor(unit, "m")
-    if SMALLEST <= metres <= LARGEST:
-        return ""
-    own = size * length_factor(unit, drawn) if drawn else size
-    likely = [name for name in LENGTHS if SMALLEST <= own * length_factor(name, "m") <= LARGEST]
-    shown = f"{metres / 1000:.4g} km" if metres > LARGEST else f"{metres * 1000:.4g} mm"
-    note = f"the plan is {shown} long"
-    if not likely:
-        return f"{note}; check its unit, which is {drawn or unit}"
-    if drawn:
-        note += (
-            f"; is the drawing in {likely[0]}? Its unit is {drawn}: set it to {likely[0]} in CAD, or write"
-        )
-        return f'{note} the project with pcmc plan and type units = "{likely[0]}" there'
-    return f'{note}; are its numbers in {likely[0]}? Then type units = "{likely[0]}"'
-
-
 def as_units(units: object) -> Units:
-    """Units as given, or by their unit of length alone.
-
-    Raises
-    ------
-    OptionError : for an unknown unit, and for anything else.
+    """Units as given, or by their unit of length alone; OptionError for an unknown unit, and anything else.
 
     >>> as_units("mm").volume
     'mm³'
@@ -246,11 +150,7 @@ def as_units(units: object) -> Units:
 
 
 def expect_length(unit: object, purpose: str) -> str:
-    """The unit of lengths that a purpose such as "a drawing" cannot do without.
-
-    Raises
-    ------
-    OptionError : there is none, or it is unknown.
+    """The unit of lengths that a purpose cannot do without; OptionError where it is missing or unknown.
 
     >>> expect_length("", "a drawing")
     Traceback (most recent call last):
@@ -268,20 +168,14 @@ def expect_length(unit: object, purpose: str) -> str:
 def length_factor(source: str, target: str) -> float:
     """What a length in ``source`` is multiplied by to be in ``target``; 1 where one of them is empty.
 
-    Raises
-    ------
-    OptionError : for a text that is no unit of ``MICROMETRES``.
+    OptionError for a text that is no unit of ``MICROMETRES``.
 
-    Examples
-    --------
     >>> length_factor("mm", "m"), length_factor("ft", "in"), length_factor("", "m")
     (0.001, 12.0, 1.0)
     """
     for unit in filter(None, (source, target)):
         validate.choice("units", unit, tuple(MICROMETRES))
-    if not source or not target or source == target:
-        return 1.0
-    return MICROMETRES[source] / MICROMETRES[target]
+    return MICROMETRES[source] / MICROMETRES[target] if source and target else 1.0
 
 
 def conversion_note(source: str, target: str) -> str:
@@ -291,8 +185,43 @@ def conversion_note(source: str, target: str) -> str:
     'lengths converted from mm to m (1 mm = 0.001 m)'
     """
     factor = length_factor(source, target)
-    return (
-        ""
-        if factor == 1.0
-        else f"lengths converted from {source} to {target} (1 {source} = {factor:g} {target})"
-    )
+    text = f"lengths converted from {source} to {target} (1 {source} = {factor:g} {target})"
+    return "" if factor == 1.0 else text
+
+
+def unit_in_file(system: int | str) -> tuple[str, str]:
+    """The unit of length that a drawing names, and a note if it is none of ours; both empty without one.
+
+    ``system`` is the ``$INSUNITS`` of a .dxf file, or the name of a .3dm file's unit system.
+
+    >>> unit_in_file(3), unit_in_file("Microns"), unit_in_file(0)
+    (('mi', ''), ('µm', ''), ('', ''))
+    >>> unit_in_file(21)
+    ('', 'its unit of length (21) is unknown here: the numbers are taken as they are')
+    """
+    if system in (0, "None", "Unset"):
+        return "", ""
+    note = f"its unit of length ({system}) is unknown here: the numbers are taken as they are"
+    return next(((name, "") for name, unit in TABLE.items() if system in (unit.dxf, unit.rhino)), ("", note))
+
+
+def size_note(size: float, unit: str, drawn: str = "") -> str:
+    """A sentence on a plan whose size is unlikely in its unit, with the line to type; else empty.
+
+    ``size`` is the larger side of the plan in ``unit``, ``drawn`` the unit that its drawing itself has.
+
+    >>> size_note(12000.0, "m"), size_note(12.0, "m")
+    ('the plan is 12 km long; are its numbers in mm? Then type units = "mm"', '')
+    """
+    metres = size * length_factor(unit, "m")
+    if not unit or SMALLEST <= metres <= LARGEST:
+        return ""
+    own = size * length_factor(unit, drawn)
+    likely = [name for name in LENGTHS if SMALLEST <= own * length_factor(name, "m") <= LARGEST]
+    note = f"the plan is {f'{metres / 1000:.4g} km' if metres > LARGEST else f'{metres * 1000:.4g} mm'} long"
+    if not likely:
+        return f"{note}; check its unit, which is {drawn or unit}"
+    if not drawn:
+        return f'{note}; are its numbers in {likely[0]}? Then type units = "{likely[0]}"'
+    note += f"; is the drawing in {likely[0]}? Its unit is {drawn}: set it to {likely[0]} in CAD, or write"
+    return f'{note} the project with pcmc plan and type units = "{likely[0]}" there'

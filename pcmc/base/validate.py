@@ -7,7 +7,7 @@ message; ``error`` is the exception to raise.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from reprlib import Repr
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
 MOST = 2**31 - 1  # of a count: more steps, levels or vertices than that no run can have
+LONGEST = 100  # characters of a name
 
 Options = TypeVar("Options", bound="DataclassInstance")
 
@@ -63,31 +64,21 @@ def real(value: object) -> float:
     >>> real(2), real("2"), real(10**400)
     (2.0, nan, nan)
     """
-    if not isinstance(value, Real) or isinstance(value, bool):
-        return math.nan
     try:
-        return float(value)
+        return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
         return math.nan
 
 
 def parsed(text: str) -> float:
-    """The number in a text; ValueError for another text, and for 1_000, which Python alone reads as one.
-
-    >>> parsed("1.5e3")
-    1500.0
-    """
+    """The number in a text; ValueError for another text, and for 1_000, which Python alone reads as one."""
     if "_" in text or not text.isascii():
         raise ValueError(f"no number: {text!r}")
     return float(text)
 
 
 def positive(name: str, value: object) -> float:
-    """A finite float > 0.
-
-    >>> positive("radius", 2)
-    2.0
-    """
+    """A finite float > 0."""
     return number(name, value, above=0.0)
 
 
@@ -157,6 +148,61 @@ def build(kind: type[Options], method: str, given: dict[str, Any]) -> Options:
     for name in given:
         choice(f"option of method {method!r}", name, names)
     return kind(**given)
+
+
+def checked_name(
+    what: str, name: object, *, empty: bool = False, error: type[PcmcError] = OptionError
+) -> str:
+    """The name of a part as a plain text: 1 to 100 printable characters, no blank at either end.
+
+    Line breaks, tabs, other control characters and halves of surrogate pairs are not printable; so a name
+    stays in one line of a file or message. Each format escapes what is special to it. ``what`` is the
+    parameter; with ``empty`` there may be no name, "".
+
+    >>> checked_name("Cable.name", "Süd/Ost")
+    'Süd/Ost'
+    >>> checked_name("Cable.name", "east\\n")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.OptionError: Cable.name: expected no blank at either end, found 'east\\n'; change
+    the name
+    """
+    expected = ""
+    if not isinstance(name, str):
+        expected = "a text"
+    elif not name and not empty:
+        expected = "at least one character"
+    elif name != name.strip():
+        expected = "no blank at either end"
+    elif not name.isprintable():
+        odd = next(c for c in name if not c.isprintable())
+        expected = f"printable characters and none like {odd!a}"
+    elif len(name) > LONGEST:
+        expected = f"at most {LONGEST} characters and not {len(name)}"
+    if expected:
+        refuse(what, name, expected, hint="change the name", error=error)
+    return str(name)
+
+
+def names_from_file(given: Iterable[str]) -> tuple[dict[str, str], str]:
+    """A name that a part may have for each name in a file of another program, and a note on those changed.
+
+    Characters that are not printable become blanks, long names are cut; different names stay different.
+
+    >>> names_from_file(["roof", " east\\t1", "east 1"])
+    ({'roof': 'roof', ' east\\t1': 'east 1 2', 'east 1': 'east 1'}, "1 names were changed, as ' east\\\\t1'")
+    """
+    names = {name: "".join(c if c.isprintable() else " " for c in name).strip() for name in given}
+    names = {name: text[:LONGEST].rstrip() or "unnamed" for name, text in names.items()}
+    taken = {name for name, text in names.items() if name == text}
+    changed = [name for name in names if name not in taken]
+    for name in changed:
+        text, number = names[name], 1
+        while names[name] in taken:
+            number += 1
+            names[name] = f"{text[: LONGEST - 10]} {number}"
+        taken.add(names[name])
+    return names, f"{len(changed)} names were changed, as {changed[0][:40]!r}" if changed else ""
 
 
 def refuse(

@@ -10,8 +10,7 @@ import pandas as pd
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
-from ..surface.origin import uncancelled_pressures
-from ..surface.supports import common_point
+from ..surface.supports import common_point, uncancelled_pressures
 from ..surface.topology import Curve
 from ..surface.values import balanced_wall
 from .proof import Overload, UnbalancedJunction, Unheld

@@ -12,9 +12,9 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..forces.cables import directions
 from ..surface import Surface
-from ..surface.cable import Cable
 from ..surface.geometry import segment_lengths
-from ..surface.mirroring import mirrored
+from ..surface.parts import Cable
+from ..surface.symmetry import mirrored
 from ..surface.topology import Curve
 from .curve_tables import conormal_sum, middle
 from .proof import WeakCable

@@ -19,11 +19,11 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
 from ..forces import kernels
-from ..forces.functional import add_cables_and_weights, apply_supports
+from ..forces.functional import add_cables_and_weights
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
-from ..surface.supports import symmetric_part
+from ..surface.supports import apply_supports, symmetric_part
 from .cables import cable_ends
 from .curve_tables import conormal_sum
 

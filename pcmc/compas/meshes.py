@@ -19,8 +19,8 @@ from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
 from ..forces.curvature import mean_curvature
-from ..io.import_warnings import import_warnings
 from ..io.mesh_data import FIXED, SLIDING, MeshData, given_support
+from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
 from ..surface.topology import topology
 from . import mesh_arrays

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .. import certificate, existence, io
-from ..base.plain import plain
+from ..base.arrays import plain
 from ..certificate import Certificate
 from ..surface import Surface
 from .meshes import from_meshes, to_meshes

@@ -19,12 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..forces.functional import apply_supports
 from ..forces.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
-from ..surface.supports import guides_and_points
+from ..surface.supports import apply_supports
 from ..surface.topology import topology
 from .held_bottoms import across_bottom, held_walls
 from .wall_rows import WallRows, join_rows, wall_rows
@@ -197,25 +196,13 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     F.setflags(write=False)
     patch.setflags(write=False)
     topo, held = topology(F, patch, surface.n), resting & walls.held
-    supports: dict[str, object]
-    supports = {"fixed": surface.fixed | held, "on_plane": surface.on_plane | (resting & ~held)}
-    if surface.on_planes:
-        supports |= resting_supports(surface, resting & ~held)
+    given = surface.given_supports
+    rests = given._replace(fixed=given.fixed | held, on_plane=surface.on_ground | (resting & ~held))
+    supports = rests.resolved(surface.plane, surface.on_planes)
     cables = tuple(filter(None, (cable.carried(owner) for cable in surface.cables)))
     return surface._with(
         vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, curves=(), **supports
     )
-
-
-def resting_supports(surface: Surface, resting: Bools) -> dict[str, object]:
-    """The supports with vertices that come to rest on Π, some of which slide on other planes, too."""
-    planes = ((surface.plane, surface.on_ground | resting), *surface.on_planes)
-    lines, points = guides_and_points(planes, surface.given_supports.fixed, surface.given_supports.on_line)
-    fixed = surface.given_supports.fixed | points
-    for _, along in lines:
-        fixed |= along
-    sliding = (surface.on_plane | resting) & ~fixed
-    return {"fixed": fixed, "on_plane": sliding, "on_line": tuple(lines)}
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:

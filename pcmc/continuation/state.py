@@ -10,12 +10,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..contact.pull import excess_pull
-from ..forces.functional import (
-    apply_supports,
-    energy_and_gradient,
-    energy_at,
-    onto_circles,
-)
+from ..forces.functional import energy_and_gradient, energy_at
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.motion_space import MotionSpace, force_scale, motion_space
 from ..forces.rooms import (
@@ -30,6 +25,7 @@ from ..solvers.smoother import HarmonicExtension
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
+from ..surface.supports import apply_supports, onto_circles
 from ..surface.topology import SHEET
 from .direction import ParameterLine
 

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
+from .guides import Plane
 from .pieces import Alike, Piece
-from .plane import Plane
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 NEAR = 0.5  # of the edge length: an extreme nearer to another stop than this becomes no vertex

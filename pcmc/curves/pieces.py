@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from .plane import Plane
+from .guides import Plane
 
 SAME = 1e-9  # of a curve's size or parameter: differences up to this are none
 SAMPLES, BISECTIONS = 66, 60  # of a coordinate of a Bézier curve, and to find where it turns between two

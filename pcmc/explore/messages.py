@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base.plain import plain
+from ..base.arrays import plain
 
 KINDS = {"f": "<f4", "u": "<u4"}
 

@@ -26,7 +26,7 @@ from ..project.values import values_of
 from ..quantities import dimension_of
 from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
-from ..surface.mirroring import Whole, unfolded
+from ..surface.symmetry import Whole, unfolded
 from .session import State
 from .variants import Variant
 

@@ -7,7 +7,7 @@ from http import HTTPStatus
 from typing import Any
 
 from ..base.errors import unknown
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from ..design import Parameter, Target
 from ..surface.values import KINDS
 

@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
+from ..base.arrays import plain
 from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
-from ..base.plain import plain
 from ..io import FORMATS, write
 from ..project import load, vertex_fields
 from ..project.values import values_of

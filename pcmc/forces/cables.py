@@ -14,7 +14,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
 from ..surface import Surface
-from ..surface.cable import CableEdges
+from ..surface.parts import CableEdges
 from ..surface.topology import Topology
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
+from ..surface.supports import apply_supports
 from . import kernels
 from .cables import add_cables
 from .plane_pieces import add_plane_forces, add_plane_volumes
@@ -96,32 +97,6 @@ def gradient(surface: Surface) -> Floats:
     """
     expect_surface(surface)
     return energy_and_gradient(surface)[1]
-
-
-def apply_supports(surface: Surface, vectors: Floats, X: Floats | None = None) -> Floats:
-    """Leave of vectors (n,3) what the supports allow, in place.
-
-    Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
-    along their plane at those that slide there; with the vertices at X (n,3) or where the surface has them.
-    """
-    X = surface.vertices if X is None else X
-    along = [line.along(vectors[vertices], X[vertices]) for line, vertices in surface.on_line]
-    vectors[surface.fixed] = 0.0
-    for (_, vertices), part in zip(surface.on_line, along, strict=True):
-        vectors[vertices] = part
-    for plane, sliding in surface.sliding:
-        vectors[sliding] = plane.along(vectors[sliding])
-    return vectors
-
-
-def onto_circles(surface: Surface, X: Floats) -> Floats:
-    """X (n,3) with the vertices that slide along a circle put back on it; X itself without any."""
-    circles = surface.on_circle
-    if circles:
-        X = X.copy()
-    for circle, along in circles:
-        X[along] = circle.nearest(X[along])
-    return X
 
 
 def weighted(

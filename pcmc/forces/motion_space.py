@@ -21,12 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
-from ..base.compiled import compiled
-from ..surface import Circle, Surface
+from ..base.arrays import Bools, Floats, Ints, Vector
+from ..base.compiled import compiled, inlined
+from ..surface import Surface
 from ..surface.geometry import (
     accumulate,
     add,
+    cross,
     divided,
     dot,
     norm,
@@ -42,8 +43,8 @@ from ..surface.topology import (
     POINT,
     SHEET,
     Topology,
-    components,
     curve_neighbours,
+    one_sided_copies,
     topology,
     vertex_kind,
 )
@@ -190,40 +191,67 @@ def _pulled_unevenly(edges: Ints, pull: Floats, n: int) -> Bools:
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
-    """Basis of the motion space of the surface with its vertices at X (n,3)."""
-    n = surface.n
-    basis, dimension = np.zeros((n, 3, 3)), np.zeros(n, dtype=np.int64)
-    moving = ~(surface.fixed | classes.idle)
-    for _, along_line in surface.on_line:
-        moving |= along_line & ~classes.idle
+    """Basis of the motion space of the surface with its vertices at X (n,3).
 
-    sheet = moving & (classes.kind == SHEET)
-    _along_normals(vertex_area_vectors(X, classes.faces)[0], sheet, basis, dimension)
-
-    curve = np.flatnonzero(moving & (classes.kind == CURVE))
-    tangent = np.zeros((n, 3))
-    chord = curve_chords(surface, classes, X)
-    length = np.linalg.norm(chord, axis=1)
-    tangent[classes.curve] = chord / np.where(length > 0.0, length, 1.0)[:, None]
-    straight = np.einsum("ij,ij->i", tangent[curve], tangent[curve]) > 0.5
-    ring = curve[straight]
-    basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
-    dimension[ring] = 2
-    point = np.concatenate([np.flatnonzero(moving & (classes.kind == POINT)), curve[~straight]])
-    basis[point], dimension[point] = np.eye(3), 3
-
-    for plane, mask in surface.sliding:
-        sliding = np.flatnonzero(moving & mask)
-        if len(sliding):
-            _within_plane(np.array(plane.normal), tangent, sliding, basis, dimension)
-    for line, along_line in surface.on_line:
-        sliding = np.flatnonzero(along_line & moving)
-        if isinstance(line, Circle):
-            basis[_beside_the_same(surface, classes, line, along_line)] = 0.0
-            _within_circle(line.directions(X[sliding]), sliding, basis, dimension)
-        else:
-            _within_line(np.array(line.direction), sliding, basis, dimension)
+    Of the directions that the supports admit the ones along the shape are removed.
+    """
+    freedom, axis = surface.admissible_at(X)
+    freedom = np.where(classes.idle, np.int8(0), freedom)
+    for circle, along in surface.on_circle:
+        # a curve along the circle on both sides: the polygon's chord is not quite along the tangent
+        near = surface.fixed & (circle.distance(surface.vertices) <= 1e-9 * surface.size)
+        freedom[classes.curve[along[classes.curve] & near[classes.beside].all(axis=1)]] = 0
+    chord = np.zeros_like(X)
+    chord[classes.curve] = curve_chords(surface, classes, X)
+    basis, dimension = np.zeros((surface.n, 3, 3)), np.zeros(surface.n, dtype=np.int64)
+    area_vector = vertex_area_vectors(X, classes.faces)[0]
+    _fill(classes.kind, area_vector, chord, freedom, axis, basis, dimension)
     return MotionSpace.of(basis, dimension)
+
+
+@compiled
+def _fill(
+    kind: Ints,
+    normal: Floats,
+    chord: Floats,
+    freedom: Ints,
+    axis: Floats,
+    basis: Floats,
+    dimension: Ints,
+) -> None:
+    """The basis at each vertex, from the shape's normal or chord and what the supports admit."""
+    none = (0.0, 0.0, 0.0)
+    for v in range(len(kind)):
+        if freedom[v] == 0:
+            continue
+        # the directions that change the shape
+        along = point(normal, v) if kind[v] == SHEET else point(chord, v)
+        length = norm(along)
+        along = divided(along, length) if length > 0.0 else none
+        first, second, third, size = along, none, none, 1 if length > 0.0 else 0
+        if kind[v] == CURVE and length > 0.0:
+            pair = perpendicular_pair(along)
+            first, second, size = pair[0], pair[1], 2
+        elif kind[v] != SHEET:
+            first, second, third, size = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), 3
+        a = point(axis, v)
+        if freedom[v] == 2 and size > 0:  # within the plane across a
+            rest = cross(a, along) if size == 2 else sub(first, scaled(dot(first, a), a))
+            length = norm(rest)
+            if size == 3 or (size == 2 and length <= PARALLEL):
+                pair = perpendicular_pair(a)
+                first, second, third, size = pair[0], pair[1], none, 2
+            else:
+                size = 1 if length > PARALLEL else 0
+                first, second = divided(rest, length) if size else none, none
+        elif freedom[v] == 1:  # along a
+            across = (dot(first, a), dot(second, a), dot(third, a))
+            first, second, third, size = a, none, none, 1 if norm(across) > PARALLEL else 0
+        dimension[v] = size
+        for d in range(3):
+            if size > 0:
+                basis[v, 0, d] = first[d]
+            basis[v, 1, d], basis[v, 2, d] = second[d], third[d]
 
 
 def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
@@ -253,85 +281,37 @@ def tension_forces(surface: Surface) -> float:
     return sqrt(sheets**2 + squared_cable_forces(surface).sum()) if surface.cables else sheets
 
 
+@inlined
+def perpendicular_pair(direction: Vector) -> tuple[Vector, Vector]:
+    """Two unit vectors that complete a unit direction to a right-handed frame."""
+    x, y, z = abs(direction[0]), abs(direction[1]), abs(direction[2])
+    if x <= y and x <= z:
+        first = cross(direction, (1.0, 0.0, 0.0))
+    else:
+        first = cross(direction, (0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0))
+    first = divided(first, norm(first))
+    return first, cross(direction, first)
+
+
+@compiled
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
-    axis = np.eye(3)[np.abs(directions).argmin(axis=1)]
-    first = np.cross(directions, axis)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return first, np.cross(directions, first)
+    out = np.empty((2, len(directions), 3))
+    for v in range(len(directions)):
+        first, second = perpendicular_pair(point(directions, v))
+        for d in range(3):
+            out[0, v, d], out[1, v, d] = first[d], second[d]
+    return out[0], out[1]
 
 
 def _against_the_others(topo: Topology) -> Bools:
     """(m,) faces to turn over so that each sheet has one side; none of a sheet that has only one."""
-    flat = topo.edge_of_face.ravel()
+    flat, m = topo.edge_of_face.ravel(), len(topo.faces)
     smooth = (topo.valence == 2) & ~topo.seam_edge
     hit = np.flatnonzero(smooth[flat])
     one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
-    # every face twice, as it is and turned over: connected copies run the same way
-    m = len(topo.faces)
-    across = topo.one_way_edge[smooth] * m
-    second = np.append(other + across, other + m - across)
-    label = components(np.stack([np.append(one, one + m), second], axis=1), 2 * m)
+    label = one_sided_copies(one, other, topo.one_way_edge[smooth], m)
     return np.asarray(label[:m] > label[m:])
-
-
-def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
-    """Cut the basis at sliding vertices down to directions along their plane, in place."""
-    first, second = perpendicular(normal[None])
-    for size in (1, 2, 3):
-        chosen = sliding[dimension[sliding] == size]
-        if not len(chosen):
-            continue
-        old = basis[chosen].copy()
-        basis[chosen] = 0.0
-        if size == 1:
-            along = old[:, 0] - (old[:, 0] @ normal)[:, None] * normal
-            length = np.linalg.norm(along, axis=1)
-            keep = length > PARALLEL
-            basis[chosen[keep], 0] = along[keep] / length[keep, None]
-            dimension[chosen] = keep
-            continue
-        across = np.cross(normal, tangent[chosen])
-        length = np.linalg.norm(across, axis=1)
-        single = (length > PARALLEL) & (size == 2)
-        basis[chosen[single], 0] = across[single] / length[single, None]
-        basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
-        dimension[chosen] = np.where(single, 1, 2)
-
-
-def _within_line(direction: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
-    """Leave the line's direction where moving along it changes the shape, and nothing elsewhere; in place."""
-    across = np.linalg.norm(basis[sliding] @ direction, axis=1) > PARALLEL
-    basis[sliding] = 0.0
-    basis[sliding[across], 0] = direction
-    dimension[sliding] = across
-
-
-def _within_circle(tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
-    """Leave the circle's tangent (k,3) where moving along it changes the shape, and nothing elsewhere."""
-    across = np.linalg.norm(np.einsum("kij,kj->ki", basis[sliding], tangent), axis=1) > PARALLEL
-    basis[sliding] = 0.0
-    basis[sliding[across], 0] = tangent[across]
-    dimension[sliding] = across
-
-
-def _beside_the_same(surface: Surface, classes: VertexClasses, circle: Circle, along: Bools) -> Ints:
-    """Vertices of a curve that lies along the circle on both sides: there they only slide along it.
-
-    The polygon's chord is not quite along the tangent where its sides differ in length.
-    """
-    near = surface.fixed & (circle.distance(surface.vertices) <= 1e-9 * surface.size)
-    return np.asarray(classes.curve[along[classes.curve] & near[classes.beside].all(axis=1)])
-
-
-@compiled
-def _along_normals(area_vector: Floats, chosen: Bools, basis: Floats, dimension: Ints) -> None:
-    for v in range(len(area_vector)):
-        a = point(area_vector, v)
-        length = norm(a)
-        if chosen[v] and length > 0.0:
-            basis[v, 0, 0], basis[v, 0, 1], basis[v, 0, 2] = divided(a, length)
-            dimension[v] = 1
 
 
 @compiled

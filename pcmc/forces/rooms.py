@@ -22,10 +22,10 @@ from ..base.compiled import compiled
 from ..base.errors import OptionError, SurfaceError
 from ..surface import Line, Surface, expect_surface
 from ..surface.geometry import accumulate, cross, point, scaled, sub, vector
-from ..surface.room import Room
+from ..surface.parts import Room
+from ..surface.supports import apply_supports
 from ..surface.topology import components
 from . import kernels
-from .functional import apply_supports
 from .motion_space import MotionSpace
 from .plane_pieces import add_plane_forces, add_plane_volumes
 

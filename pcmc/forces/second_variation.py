@@ -27,8 +27,8 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..surface import Surface, expect_surface
-from ..surface.cable import CableEdges
 from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
+from ..surface.parts import CableEdges
 from ..surface.topology import Topology
 from .flat_pieces import flat_pieces
 from .kernels import Mesh, energy_mesh

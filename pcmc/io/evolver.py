@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..forces.flat_pieces import flat_pieces
 from ..forces.plane_pieces import add_plane_volumes
@@ -53,7 +53,6 @@ DEFINE FACET ATTRIBUTE patch INTEGER
 
 def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) -> None:
     """The datafile of a surface."""
-    edges = surface.topology.edges + 1
     patches = list(enumerate(surface.patches, 1))
     weights = np.unique(surface.weights[surface.weights != 0.0]).tolist()
     face_tags = []
@@ -61,34 +60,37 @@ def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) ->
         snow = f" snow {p.snow!r}" if p.snow else ""
         weight = f" weight {p.weight!r} self_weight_{1 + weights.index(p.weight)}" if p.weight else ""
         face_tags.append(f" tension {p.tension!r} patch {k}{snow}{weight}")
-    face_tag = np.array(face_tags)
     origin = surface.origin if surface.on_planes else np.array(surface.plane.point)
-    X = surface.vertices - origin
-    sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
+    named = [("patch", k, p.name) for k, p in patches]
+    named += [("bare", k, p.name) for k, p in patches if p.name in bare]
+    named += [("wall", k, "") for k, p in patches if p.wall]
+    named += [("room", k, room.name) for k, room in enumerate(surface.rooms, 1)]
+    named += [("cable", k, cable.name) for k, cable in enumerate(surface.cables, 1)]
     header = HEADER.format(
         origin=" ".join(map(repr, origin.tolist())),
-        names="\n".join(
-            [f"// patch {k} {escaped(p.name, SPECIAL)}" for k, p in patches]
-            + [f"// bare {k} {escaped(p.name, SPECIAL)}" for k, p in patches if p.name in bare]
-            + [f"// wall {k}" for k, p in patches if p.wall]
-            + [f"// room {k} {escaped(room.name, SPECIAL)}" for k, room in enumerate(surface.rooms, 1)]
-            + [f"// cable {k} {escaped(cable.name, SPECIAL)}" for k, cable in enumerate(surface.cables, 1)]
-        ),
+        names="\n".join(f"// {kind} {k} {escaped(name, SPECIAL)}".rstrip() for kind, k, name in named),
     )
+    topo = surface.topology
+    sides = ((topo.edge_of_face + 1) * topo.sense)[:, [2, 0, 1]]
     vertex_tag, edge_tag = _tags(surface)
+    sections = {
+        "VERTICES": ("%r %r %r", surface.vertices - origin, vertex_tag),
+        "EDGES": ("%d %d", topo.edges + 1, edge_tag),
+        "FACES": ("%d %d %d", sides, np.array(face_tags)[surface.patch_of_face]),
+    }
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(header + _constraints(surface, origin) + _attributes(surface, origin, weights))
-        file.write("\nVERTICES\n")
-        file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, vertex_tag))
-        file.write("\nEDGES\n")
-        file.write(format_rows("%d %d %d%s\n", _count(edges), *edges.T, edge_tag))
-        file.write("\nFACES\n")
-        file.write(format_rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face]))
+        for name, (template, rows, tag) in sections.items():
+            file.write(f"\n{name}\n" + format_rows(f"%d {template}%s\n", _count(rows), *rows.T, tag))
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
 
 
-def _count(rows: Ints | Floats) -> Ints:
+def _count(rows: Any) -> Ints:
     return np.arange(1, len(rows) + 1)
+
+
+def _linear(coefficients: Sequence[float]) -> str:
+    return " + ".join(f"({c!r})*{axis}" for c, axis in zip(coefficients, "xyz", strict=True))
 
 
 def _constraints(surface: Surface, origin: Floats) -> str:
@@ -111,9 +113,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
                 f"CONTENT\nC1: ({y!r})*z - ({z!r})*y\nC2: ({z!r})*x - ({x!r})*z\nC3: ({x!r})*y - ({y!r})*x\n"
             )
     for k, (patch, normal) in enumerate(zip(pieces.end_patch, pieces.normal, strict=True)):
-        x, y, z = (-surface.net_pressures[patch] * normal).tolist()
-        text += f"QUANTITY corner_{k} ENERGY METHOD VERTEX_SCALAR_INTEGRAL\n"
-        text += f"SCALAR_INTEGRAND: ({x!r})*x + ({y!r})*y + ({z!r})*z\n"
+        pull = _linear((-surface.net_pressures[patch] * normal).tolist())
+        text += f"QUANTITY corner_{k} ENERGY METHOD VERTEX_SCALAR_INTEGRAL\nSCALAR_INTEGRAND: {pull}\n"
     return text
 
 
@@ -122,8 +123,7 @@ def _attributes(surface: Surface, origin: Floats, weights: Sequence[float]) -> s
     text = "DEFINE EDGE ATTRIBUTE cable INTEGER\n" if surface.cables else ""
     text += "DEFINE FACET ATTRIBUTE snow REAL\n" if surface.snows.any() else ""
     text += "DEFINE FACET ATTRIBUTE weight REAL\n" if weights else ""
-    height = "".join(f"({c!r})*{axis} + " for c, axis in zip(surface.plane.normal, "xyz", strict=True))
-    height += f"({float(surface.plane.height(origin))!r})"
+    height = f"{_linear(surface.plane.normal)} + ({float(surface.plane.height(origin))!r})"
     for k, weight in enumerate(weights, 1):
         text += f"QUANTITY self_weight_{k} ENERGY METHOD FACET_SCALAR_INTEGRAL\n"
         text += f"SCALAR_INTEGRAND: ({weight!r})*({height})\n"
@@ -131,34 +131,30 @@ def _attributes(surface: Surface, origin: Floats, weights: Sequence[float]) -> s
 
 
 def _tags(surface: Surface) -> tuple[Any, Any]:
-    """What follows the numbers of each vertex (n,) and of each edge (e,)."""
-    kinds = np.array(["", " constraint 1", " fixed"])
-    masks = [mask for _, mask in surface.on_planes]
-    vertices = _with_constraints(kinds[given_support(surface)], masks).astype(object)
+    """What follows the numbers of each vertex (n,) and of each edge (e,).
+
+    A boundary edge with held ends is held itself, for vertices that refinement puts there.
+    """
+    topo, support = surface.topology, given_support(surface)
+    of_edge = support[topo.edges].min(axis=1)
+    off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
+    of_edge[(of_edge == SLIDING) & off_plane[topo.edges].any(axis=1)] = FREE
+    of_edge[~topo.boundary_edge] = FREE
+    at_vertices, at_edges = [mask for _, mask in surface.on_planes], edges_on_planes(surface)
+    kinds, tags = np.array(["", " constraint 1", " fixed"]), []
+    for kind, masks in ((support, at_vertices), (of_edge, at_edges)):
+        tag = kinds[kind]
+        for number, mask in enumerate(masks, 2):
+            first = np.strings.find(tag, "constraint") < 0
+            more = np.where(first, f" constraint {number}", f" {number}")
+            tag = np.strings.add(tag, np.where(mask, more, ""))
+        tags.append(tag.astype(object))
+    vertices, edges = tags
     for k, vertex in enumerate(flat_pieces(surface).end):
         vertices[vertex] += f" corner_{k}"
-    edges = _with_constraints(kinds[_edge_support(surface)], edges_on_planes(surface)).astype(object)
     for k, cable in enumerate(surface.cables, 1):
-        edges[surface.topology.edge_numbers(cable.edges)] += f" tension {cable.tension!r} cable {k}"
+        edges[topo.edge_numbers(cable.edges)] += f" tension {cable.tension!r} cable {k}"
     return vertices, edges
-
-
-def _with_constraints(tags: Any, masks: Sequence[Bools]) -> Any:
-    """The tags with the numbers of the constraints 2, 3, … where each of the masks is set."""
-    for number, mask in enumerate(masks, 2):
-        first = np.strings.find(tags, "constraint") < 0
-        more = np.where(first, f" constraint {number}", f" {number}")
-        tags = np.strings.add(tags, np.where(mask, more, ""))
-    return tags
-
-
-def _edge_support(surface: Surface) -> Ints:
-    """(e,) support of the boundary edges with held ends, for vertices that refinement puts there."""
-    topo, support = surface.topology, given_support(surface)
-    along = support[topo.edges].min(axis=1)
-    off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
-    along[(along == SLIDING) & off_plane[topo.edges].any(axis=1)] = FREE
-    return np.where(topo.boundary_edge, along, FREE)
 
 
 def _bodies(surface: Surface) -> str:
@@ -166,28 +162,26 @@ def _bodies(surface: Surface) -> str:
 
     It is on the positive side of a face or, where a room is there, on the other.
     """
-    text, pressures = "", surface.net_pressures
-    side = np.where((surface.room_signs > 0.0).any(axis=0), -1, 1)[surface.patch_of_face]
+    pressures, signs = surface.net_pressures, surface.room_signs
+    side = np.where((signs > 0.0).any(axis=0), -1, 1)[surface.patch_of_face]
+    bodies: list[tuple[Ints, str]] = []
     if surface.rooms:
-        multipliers, pressures = _room_pressures(surface)
-        beyond = room_volumes(surface) - surface.room_signs @ _cones(surface)
-        for k, (room, signs) in enumerate(zip(surface.rooms, surface.room_signs, strict=True)):
-            members = signs[surface.patch_of_face].astype(int) * _count(surface.faces)
+        multipliers = room_pressures(surface)
+        pressures = _beside_rooms(surface, multipliers)
+        beyond = room_volumes(surface) - signs @ _cones(surface)
+        for k, room in enumerate(surface.rooms):
+            members = signs[k, surface.patch_of_face].astype(int) * _count(surface.faces)
             rest = f" volume {room.volume!r} volconst {float(beyond[k])!r}"
-            text += _body(
-                k + 1, members[members != 0], f"{rest} lagrange_multiplier {float(multipliers[k])!r}"
-            )
+            bodies.append((members[members != 0], f"{rest} lagrange_multiplier {float(multipliers[k])!r}"))
     of_face = side * pressures[surface.patch_of_face]
-    for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1 + len(surface.rooms)):
-        members = (side * _count(surface.faces))[of_face == pressure]
-        text += _body(body, members, f" pressure {float(pressure)!r}")
+    for pressure in np.unique(of_face[of_face != 0.0]).tolist():
+        bodies.append(((side * _count(surface.faces))[of_face == pressure], f" pressure {pressure!r}"))
+    text = ""
+    for number, (members, rest) in enumerate(bodies, 1):
+        words = members.astype(str)
+        lines = [" ".join(words[k : k + 15]) for k in range(0, len(words), 15)]
+        text += f"{number} " + " \\\n  ".join(lines) + f"{rest}\n"
     return text
-
-
-def _body(number: int, members: Ints, rest: str) -> str:
-    words = members.astype(str)
-    lines = [" ".join(words[k : k + 15]) for k in range(0, len(words), 15)]
-    return f"{number} " + " \\\n  ".join(lines) + f"{rest}\n"
 
 
 def _cones(surface: Surface) -> Floats:
@@ -198,10 +192,9 @@ def _cones(surface: Surface) -> Floats:
     return add_plane_volumes(surface, surface.vertices, of_patch)
 
 
-def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
-    """(r,) the pressures of the rooms, and (k,) the net ones of the patches beside them, as of snow."""
+def _beside_rooms(surface: Surface, multipliers: Floats) -> Floats:
+    """(k,) the net pressures of the patches, as of snow, beside the pressures (r,) of the rooms."""
     signs = surface.room_signs
-    multipliers = room_pressures(surface)
     left = surface.pressures - multipliers @ signs
     left[np.abs(left) <= ROUNDING * np.abs(surface.pressures).max(initial=0.0)] = 0.0
     left -= surface.snows
@@ -211,4 +204,4 @@ def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
         text = f"patch {name!r} has a net pressure of {left[both[0]]:g} beside that of its rooms, and a"
         text += " datafile has one body on each side of a face; give all patches of its rooms its load"
         raise FileError(text, where=name, found=float(left[both[0]]))
-    return multipliers, left
+    return left

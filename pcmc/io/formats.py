@@ -17,34 +17,20 @@ from ..surface import Surface
 
 @dataclass(frozen=True)
 class Format:
-    """What a file format can hold besides the triangles and the patches' names.
+    """What a file format can hold besides the triangles and the patches' names."""
 
-    Attributes
-    ----------
-    module : the module here that reads and writes it.
-    scalars : "" for none, "vertices", or "both" vertices and faces.
-    certificate : whether it holds the certificate.
-    colours : whether it holds colours of vertices.
-    shared : whether patches certainly share their vertices, so that reading needs no merging.
-    separate : whether it has a mesh per patch, which cannot have triangles without area.
-    own : the parts that it holds in its own way; others are among the metadata.
-    bare : whether it holds nothing but triangles and names.
-    loses : the parts of ``LOST`` that it does not hold.
-    reads : whether pcmc reads it, too.
-    unit : the unit of length that the format prescribes; empty if a file may have any, or says none.
-    """
-
-    module: str
-    scalars: str = ""
+    module: str  # the module here that reads and writes it
+    scalars: str = ""  # "" for none, "vertices", or "both" vertices and faces
+    reserved: tuple[str, ...] = ()  # names that scalars cannot have
     certificate: bool = False
-    colours: bool = False
-    shared: bool = False
-    separate: bool = False
-    own: tuple[str, ...] = ()
-    bare: bool = False
-    loses: tuple[str, ...] = ()
-    reads: bool = True
-    unit: str = ""
+    colours: bool = False  # of vertices
+    shared: bool = False  # whether patches certainly share their vertices: reading needs no merging
+    separate: bool = False  # whether it has a mesh per patch, which cannot have triangles without area
+    own: tuple[str, ...] = ()  # the parts that it holds in its own way; others are among the metadata
+    bare: bool = False  # whether it holds nothing but triangles and names
+    loses: tuple[str, ...] = ()  # the parts of ``LOST`` that it does not hold
+    reads: bool = True  # whether pcmc reads it, too
+    unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
 
     @property
     def functions(self) -> Any:
@@ -81,15 +67,16 @@ LOST = {
 }
 """The parts of a surface that a format may lose, in words."""
 
+OURS = ("support", "patch")
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
     ".fe": Format("evolver", shared=True, loses=("lines", "unit")),
     ".dmp": Format("evolver", shared=True, loses=("lines", "unit")),
     ".obj": Format("obj"),
-    ".ply": Format("ply", scalars="both"),
+    ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices")),
     ".stl": Format("stl", separate=True, bare=True, loses=tuple(LOST)),
-    ".vtp": Format("vtk", scalars="both"),
-    ".vtu": Format("vtk", scalars="both"),
+    ".vtp": Format("vtk", scalars="both", reserved=OURS),
+    ".vtu": Format("vtk", scalars="both", reserved=OURS),
     ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),
     ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),
     ".usda": Format("usd", scalars="vertices", colours=True, separate=True, reads=False),

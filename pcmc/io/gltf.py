@@ -25,12 +25,11 @@ from ..base.errors import FileError
 from ..base.files import check_regular
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
-from ..surface.origin import file_origin
-from .flat_walls import KEY
+from ..surface.geometry import file_origin
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata
-from .patch_meshes import from_scene, patch_meshes
+from .patch_meshes import WALLS, from_scene, patch_meshes
 
 SUPPORT = "_SUPPORT"
 NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does not allow
@@ -76,7 +75,7 @@ def write(
         scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
     scene.metadata["pcmc"] = metadata
     if walls is not None:
-        scene.metadata[KEY] = walls
+        scene.metadata[WALLS] = walls
     if path.suffix.lower() == ".glb":
         path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
     else:
@@ -100,7 +99,7 @@ def read(path: Path) -> MeshData:
     scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}
     support = mesh.scalars.get(SUPPORT)
     held = None if support is None else support_kinds(support)
-    return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(KEY))
+    return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))
 
 
 def _check_header(path: Path) -> None:

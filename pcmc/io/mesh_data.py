@@ -1,9 +1,14 @@
-"""The mesh of a file and its data, as every reader returns them, before they become a Surface."""
+"""The mesh of a file and its data, as every reader returns them, before they become a Surface.
+
+They can be converted to another unit of length. With the factor f, lengths become f times as large, tensions
+(force/length) 1/f, pressures, weights and snow (force/length²) 1/f², volumes f³. Forces stay, so the shape at
+rest stays the same.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +17,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, Vector
 from ..base.errors import FileError, OptionError, unknown
-from ..base.units import NO_UNITS, Units
+from ..base.units import NO_UNITS, Units, conversion_note, length_factor
 from ..base.validate import choice
-from ..surface import Cable, Guide, HeldCurve, Patch, Plane, Room, Surface, checks
+from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -28,67 +33,47 @@ ROUNDING = 1e-6  # of the size: the most that a format rounds by
 
 @dataclass(frozen=True, eq=False)
 class MeshData:
-    """A file's mesh and data, as far as its format has them.
+    """A file's mesh and data, as far as its format has them."""
 
-    Attributes
-    ----------
-    vertices, faces, patch_of_face : as in Surface.
-    patches : one per patch; tension and pressure are 1 where the file has none.
-    bare : the names of these patches. Their 1 stands for no value and is the same in any unit.
-    support : (n,) int, FREE, SLIDING or FIXED; None where the format has no supports.
-    plane : Π; None where the format has none.
-    scalars : (n,) or (m,) arrays by name.
-    certificate : the certificate's values by name, empty when the file has none.
-    notes : sentences on what the reader changed ("3 quads were cut into triangles").
-    joined : whether patches share their vertices for certain, as in files that pcmc wrote. Then two
-        vertices at one place stay two: those of a wall without height below a junction on Π.
-    walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
-        no height.
-    lines, planes, cables, rooms, curves : as ``on_line``, ``on_planes``, ``cables``, … in Surface.
-    units : of the numbers; no unit where the file has none.
-    parts : cables, rooms, lines and planes as ``metadata`` writes them, until the mesh is whole.
-    """
-
-    vertices: Floats
+    vertices: Floats  # these three as in Surface
     faces: Ints
     patch_of_face: Ints
-    patches: tuple[Patch, ...]
-    support: Ints | None = None
-    plane: Plane | None = None
-    scalars: Mapping[str, Floats] = field(default_factory=dict)
-    certificate: Mapping[str, Any] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    patches: tuple[Patch, ...]  # tension and pressure are 1 where the file has none
+    support: Ints | None = None  # (n,) FREE, SLIDING or FIXED; None where the format has no supports
+    plane: Plane | None = None  # Π; None where the format has none
+    scalars: Mapping[str, Floats] = field(default_factory=dict)  # (n,) or (m,) arrays by name
+    certificate: Mapping[str, Any] = field(default_factory=dict)  # its values by name
+    notes: tuple[str, ...] = ()  # what the reader changed ("3 quads were cut into triangles")
+    # whether patches share their vertices for certain, as in files that pcmc wrote. Then two vertices at one
+    # place stay two: those of a wall without height below a junction on Π
     joined: bool = False
-    walls: str | None = None
-    lines: tuple[tuple[Guide, Bools], ...] = ()
-    units: Units = NO_UNITS
+    walls: str | None = None  # the text of ``patch_meshes.encode_walls``
+    lines: tuple[tuple[Guide, Bools], ...] = ()  # ``on_line`` in Surface; the others as there
+    units: Units = NO_UNITS  # of the numbers; no unit where the file has none
     planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
-    parts: Mapping[str, Any] = field(default_factory=dict)
-    bare: tuple[str, ...] = ()
+    parts: Mapping[str, Any] = field(default_factory=dict)  # as in ``metadata``, until the mesh is whole
+    bare: tuple[str, ...] = ()  # the patches without tension and pressure: their 1 is the same in any unit
     curves: tuple[HeldCurve, ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
     """The same with arrays of the right type, shape and range; FileError for others.
 
-    Files may have any numbers: readers and libraries do not all check them, and indices out of range would
-    reach numpy.
+    Readers and libraries do not all check the numbers of a file, and indices out of range would reach numpy.
     """
-    X = numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64)
-    checks.positions(X)
-    n, m = len(X), len(data.faces)
+    X = checks.positions(numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64))
+    n, m, support, scalars = len(X), len(data.faces), data.support, dict(data.scalars)
     F = within(numeric(data.faces, "faces", "iu", (None, 3)), "faces", n)
     patch = numeric(data.patch_of_face, "patch_of_face", "iu", (m,))
-    support = data.support
     if support is not None:
         support = support_kinds(numeric(support, "support", "iu", (n,)))
-    for name, values in data.scalars.items():
+    for name, values in scalars.items():
         if np.shape(values) != (m,):
             numeric(values, f"scalar {name}", "fiub", (n,))
+        scalars[name] = np.asarray(values, dtype=np.float64)
     patch = within(patch, "patch_of_face", len(data.patches))
-    scalars = {name: np.asarray(values, dtype=np.float64) for name, values in data.scalars.items()}
     return replace(data, vertices=X, faces=F, patch_of_face=patch, support=support, scalars=scalars)
 
 
@@ -215,7 +200,14 @@ def to_surface(
         held = support == FIXED
     else:
         held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
-    patches = _changed(_changed(data.patches, "tension", tensions), "pressure", pressures)
+    patches, names = data.patches, [p.name for p in data.patches]
+    for key, values in (("tension", tensions), ("pressure", pressures)):
+        by_name: Any = values if isinstance(values, Mapping) else dict.fromkeys(names, values)
+        for name in by_name:
+            if name not in names:
+                raise OptionError(unknown("patch", name, names), what=f"{key}s", where=name)
+        if values is not None:
+            patches = tuple(replace(p, **{key: by_name.get(p.name, getattr(p, key))}) for p in patches)
     plane = plane or data.plane or Plane()
     height, size = plane.height(X), bounding_size(X)
     rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
@@ -229,15 +221,57 @@ def to_surface(
     return surface if drawn is held or np.array_equal(drawn, held) else surface.rebuilt(fixed=held)
 
 
-def _changed(
-    patches: tuple[Patch, ...], key: str, values: Mapping[str, float] | float | None
-) -> tuple[Patch, ...]:
-    if values is None:
-        return patches
-    names = [p.name for p in patches]
-    if not isinstance(values, Mapping):
-        values = dict.fromkeys(names, values)
-    for name in values:
-        if name not in names:
-            raise OptionError(unknown("patch", name, names), what=f"{key}s", where=name)
-    return tuple(replace(p, **{key: values.get(p.name, getattr(p, key))}) for p in patches)
+def scaled(value: Any, factor: float) -> Any:
+    """A part of a surface, or a tuple of parts, in a unit of which ``factor`` make one of the old unit.
+
+    >>> scaled(Patch("roof", tension=2.0, pressure=3.0), 10.0)
+    Patch(name='roof', tension=0.2, pressure=0.03)
+    """
+    match value:
+        case tuple():
+            return tuple(scaled(part, factor) for part in value)
+        case Patch():
+            per_area = {key: getattr(value, key) / factor**2 for key in ("pressure", "weight", "snow")}
+            return replace(value, tension=value.tension / factor, **per_area)
+        case Plane() | Line():
+            return replace(value, point=_point(value.point, factor))
+        case Circle():
+            return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
+        case HeldCurve():
+            return value.mapped(factor * np.eye(3), np.zeros(3))
+        case Room():
+            return replace(value, volume=factor**3 * value.volume)
+    return value
+
+
+def _point(point: Vector, factor: float) -> Vector:
+    x, y, z = point
+    return factor * x, factor * y, factor * z
+
+
+def scaled_surface(surface: Surface, factor: float) -> Surface:
+    """The surface in a unit of which ``factor`` make one of the old unit."""
+    if factor == 1.0:
+        return surface
+    parts = {f.name: scaled(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
+    supports = {name: scaled(part, factor) for name, part in surface.given_supports._asdict().items()}
+    moved = {"vertices": factor * surface.vertices, "curves": scaled(surface.held_curves, factor)}
+    return Surface(**parts | supports | moved)
+
+
+def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
+    """A file's data in another unit of length, if any is given, with a note if that changes them.
+
+    ``assumed`` is the unit of a file that names none. Tensions and pressures change only where the file has
+    them; scalars stay.
+    """
+    units = data.units or Units(assumed, data.units.force)
+    factor = length_factor(units.length, length)
+    if factor == 1.0:
+        return replace(data, units=units)
+    parts = {f.name: scaled(getattr(data, f.name), factor) for f in fields(data)}
+    parts["patches"] = tuple(p if p.name in data.bare else scaled(p, factor) for p in data.patches)
+    parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
+    parts["units"] = Units(length, units.force)
+    parts["notes"] = (*data.notes, conversion_note(units.length, length))
+    return replace(data, **parts)

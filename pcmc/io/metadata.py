@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..base.names import names_from_file
 from ..base.units import NO_UNITS, Units
+from ..base.validate import names_from_file
 from ..surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 from ..surface.geometry import bounding_size
 from .mesh_data import FREE, ROUNDING, SLIDING, MeshData, coincident, given_support, support_of, within

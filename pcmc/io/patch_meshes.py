@@ -1,17 +1,30 @@
-"""Meshes with vertices of their own: those of a surface's patches, and those of a trimesh scene."""
+"""A mesh per patch, as formats and trimesh have them: those of a surface, and back to one mesh.
+
+Below a junction on Π the triangles of a wall have no area, and its vertices lie on the junction. Such meshes
+cannot hold them, and a reader that joins patches by position would merge them. So the file has the meshes
+without them and a text with all walls; the reader puts these walls back.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
-from ..surface import Surface
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import FileError
+from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
-from .mesh_data import MeshData
-from .metadata import Metadata
+from ..surface.geometry import bounding_size
+from .mesh_data import ROUNDING, MeshData, checked, support_of, without_unused
+from .metadata import Metadata, row_of
+
+WALLS = "pcmc walls"  # the key of their text in a file
+CHANGED = "walls without height were left out: the surface has changed since they were written"
 
 
 def patch_meshes(surface: Surface) -> Iterator[tuple[int, Floats, Ints, Ints]]:
@@ -23,7 +36,7 @@ def patch_meshes(surface: Surface) -> Iterator[tuple[int, Floats, Ints, Ints]]:
 
 
 def from_scene(scene: Any, default: str, metadata: Metadata) -> MeshData:
-    """Every mesh of the scene, placed by its node; meshes of one name are one patch."""
+    """Every mesh of a scene of trimesh, placed by its node; meshes of one name are one patch."""
     data: dict[str, list[Any]] = {}
     meshes, order = [], list(scene.geometry)
     for node in sorted(scene.graph.nodes_geometry, key=lambda n: order.index(scene.graph[n][1])):
@@ -43,3 +56,81 @@ def from_scene(scene: Any, default: str, metadata: Metadata) -> MeshData:
     size = sum(len(points) for _, points, _ in meshes)
     scalars = {k: np.concatenate(v) for k, v in data.items() if sum(map(len, v)) == size}
     return metadata.of_meshes(meshes, scalars=scalars)
+
+
+def encode_walls(surface: Surface, shown: Surface) -> str:
+    """The walls of a surface as text; ``shown`` is the surface without the triangles that have no area."""
+    wall = surface.auxiliary[surface.patch_of_face]
+    used, local = np.unique(surface.faces[wall], return_inverse=True)
+    values = {
+        "vertices": surface.vertices[used].tolist(),
+        "support": support_of(surface)[used].tolist(),
+        "above": np.isin(used, surface.faces[~wall]).tolist(),
+        "faces": local.reshape(-1, 3).tolist(),
+        "patch": surface.patch_of_face[wall].tolist(),
+        "patches": [row_of(p) for p in surface.patches],
+        "shown": int(np.count_nonzero(shown.auxiliary[shown.patch_of_face])),
+    }
+    return json.dumps(values)
+
+
+def restore_walls(data: MeshData) -> MeshData:
+    """The same, its patches joined, with the walls of ``data.walls`` in place of those in the meshes.
+
+    If the surface has changed since, the walls are left out, with a note.
+    """
+    if data.walls is None:
+        return data
+    walls, above, shown = _parsed(data.walls)
+    names = {walls.patches[k].name for k in walls.patch_of_face}
+    is_wall = np.array([p.name in names for p in data.patches])[data.patch_of_face]
+    sheets = np.unique(data.faces[~is_wall])
+    reach = ROUNDING * bounding_size(data.vertices)
+    far, near = cKDTree(data.vertices[sheets]).query(walls.vertices[above])
+    if np.count_nonzero(is_wall) != shown or np.any(far > reach):
+        return replace(data, walls=None, notes=(*data.notes, CHANGED))
+    n, below = len(data.vertices), ~above
+    place = np.empty(len(below), dtype=np.int64)
+    place[above], place[below] = sheets[near], n + np.arange(np.count_nonzero(below))
+    X = np.concatenate([data.vertices, walls.vertices[below]])
+    X[place] = walls.vertices  # those above too: to rest on Π they must lie on it to the last digit
+    support = np.zeros(len(X), dtype=np.int8)
+    support[:n] = 0 if data.support is None else data.support
+    support[place] = np.asarray(walls.support)
+    patches = list(data.patches)
+    patches += [p for p in walls.patches if p.name in names - {q.name for q in patches}]
+    number = {p.name: k for k, p in enumerate(patches)}
+    patch = np.array([number.get(p.name, -1) for p in walls.patches])[walls.patch_of_face]
+    beside = cKDTree(data.vertices).query(walls.vertices[below])[1]
+    whole = replace(
+        data,
+        vertices=X,
+        faces=np.concatenate([data.faces[~is_wall], place[walls.faces]]),
+        patch_of_face=np.concatenate([data.patch_of_face[~is_wall], patch]),
+        patches=tuple(patches),
+        support=support,
+        scalars={k: np.concatenate([v, v[beside]]) for k, v in data.scalars.items()},
+        walls=None,
+    )
+    return replace(without_unused(whole), notes=data.notes)
+
+
+def _parsed(text: str) -> tuple[MeshData, Bools, int]:
+    """The walls, which of their vertices lie on other patches, and how many of their faces are shown."""
+    try:
+        values = json.loads(text)
+        walls = checked(
+            MeshData(
+                np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
+                np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
+                np.array(values["patch"], dtype=np.int64),
+                tuple(Patch(*p) for p in values["patches"]),
+                np.array(values["support"], dtype=np.int8),
+            )
+        )
+        above, shown = np.array(values["above"], dtype=bool), int(values["shown"])
+        if len(above) != len(walls.vertices):
+            raise ValueError
+    except (ValueError, KeyError, TypeError):
+        raise FileError(f"the description of walls in it is damaged: {text!r:.60}", where=WALLS) from None
+    return walls, above, shown

@@ -11,12 +11,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..surface import Surface
 from .mesh_data import MeshData, support_of
@@ -25,7 +26,6 @@ from .polygons import from_polygons
 from .text import numbers
 
 MARK = "comment pcmc "
-RESERVED = ("x", "y", "z", "support", "patch", "vertex_indices")
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
     "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
@@ -40,40 +40,24 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata:
     vertex["support"] = support_of(surface).astype("u1")
     face = {"patch": surface.patch_of_face.astype("<i4")}
     for name, values in scalars.items():
-        key = re.sub(r"\s+", "_", name)
-        if key in RESERVED:
-            text = f"scalars: .ply files use the name {name!r} themselves; rename the scalar"
-            raise FileError(text, where=name, found=name)
-        (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"{MARK}{metadata}",
-        f"element vertex {surface.n}",
-        *_announced(vertex),
-        f"element face {surface.m}",
-        "property list uchar int vertex_indices",
-        *_announced(face),
-        "end_header\n",
+        columns = vertex if len(values) == surface.n else face
+        columns[re.sub(r"\s+", "_", name)] = np.asarray(values, dtype="<f8")
+    announced = [
+        "".join(f"property {NAMES[column.dtype.str[1:]]} {key}\n" for key, column in columns.items())
+        for columns in (vertex, face)
     ]
-    three = {"corners": np.full(surface.m, 3, dtype="u1")}
-    corners = {f"corner {k}": surface.faces[:, k].astype("<i4") for k in range(3)}
+    header = (
+        f"ply\nformat binary_little_endian 1.0\n{MARK}{metadata}\n"
+        f"element vertex {surface.n}\n{announced[0]}element face {surface.m}\n"
+        f"property list uchar int vertex_indices\n{announced[1]}end_header\n"
+    )
+    corners = {"count": np.full(surface.m, 3, dtype="u1")}
+    corners |= {f"corner {k}": surface.faces[:, k].astype("<i4") for k in range(3)}
     with path.open("wb") as file:
-        file.write("\n".join(header).encode())
-        file.write(_table(vertex).tobytes())
-        file.write(_table({**three, **corners, **face}).tobytes())
-
-
-def _announced(columns: Mapping[str, Any]) -> list[str]:
-    return [f"property {NAMES[v.dtype.str[1:]]} {k}" for k, v in columns.items()]
-
-
-def _table(columns: Mapping[str, Any]) -> Any:
-    size = len(next(iter(columns.values())))
-    table = np.empty(size, dtype=[(k, v.dtype.str) for k, v in columns.items()])
-    for name, values in columns.items():
-        table[name] = values
-    return table
+        file.write(header.encode())
+        for columns in (vertex, corners | face):
+            dtype = [(f"{k} {name}", column.dtype) for k, (name, column) in enumerate(columns.items())]
+            file.write(np.rec.fromarrays(list(columns.values()), dtype=np.dtype(dtype)).tobytes())
 
 
 # Reading
@@ -88,9 +72,9 @@ class _Element:
     properties: list[tuple[str, ...]]
 
     @property
-    def lists(self) -> tuple[str, ...] | None:
-        """The property that is a list."""
-        return next((p for p in self.properties if len(p) == 3), None)
+    def count(self) -> str | None:
+        """The column with the number of items of each row's list."""
+        return next((f"{p[0]} count" for p in self.properties if len(p) == 3), None)
 
     def row(self, count: int) -> np.dtype[Any]:
         """dtype of a row whose list has ``count`` items."""
@@ -150,7 +134,7 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
                         raise ValueError
                     elements.append(_Element(name, int(count), []))
                 case ["property", "list", of_count, of_items, name]:
-                    if elements[-1].lists:
+                    if elements[-1].count:
                         text = f"line {number}: pcmc reads one list per element, this is a second"
                         raise FileError(text, where=number)
                     elements[-1].properties.append((name, kinds[of_count], kinds[of_items]))
@@ -178,56 +162,37 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
 
 def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], int]:
     """Columns of an element that starts at a byte, a list's items one after the other; and its end."""
-    _enough(element, data, element.size)  # a row has at least a byte
-    counts, offsets = _layout(element, data, start)
-    _enough(element, data, int(offsets[-1]))
-    kinds = np.unique(counts)
-    if len(kinds) <= 1:
-        table = np.frombuffer(data, element.row(int(kinds.sum())), element.size, start)
-        return {name: table[name].ravel() for name in table.dtype.names or ()}, int(offsets[-1])
-    columns: dict[str, Any] = {}
-    ends, octets = np.cumsum(counts), np.frombuffer(data, np.uint8)
-    for count in kinds:  # rows of one length together
-        dtype, chosen = element.row(int(count)), np.flatnonzero(counts == count)
-        table = octets[offsets[chosen][:, None] + np.arange(dtype.itemsize)].view(dtype).ravel()
-        for key in dtype.names or ():
-            listed = bool(dtype[key].shape)
-            place = (ends[chosen] - count)[:, None] + np.arange(count) if listed else chosen
-            size = ends[-1] if listed else element.size
-            columns.setdefault(key, np.zeros(size, dtype[key].base))[place] = table[key]
-    return columns, int(offsets[-1])
+    row, column = cache(element.row), element.count
 
+    def need(end: int) -> None:
+        if end > len(data):
+            text = f"cut off: the file ends before its {element.size} {element.name} elements do"
+            raise FileError(text, where=element.name)
 
-def _layout(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints]:
-    """Items in each row's list, and where each row starts and the last ends."""
-    base, rows = element.row(0), np.arange(element.size + 1)
-    if element.lists is None or not element.size:
-        return np.zeros(element.size, np.int64), start + base.itemsize * rows
-    name, item = element.lists[0], np.dtype(element.lists[2]).itemsize
-
-    def count_at(row: int, offset: int) -> int:
-        _enough(element, data, offset + base.itemsize)
-        count = np.frombuffer(data, base, 1, offset)[f"{name} count"][0]
+    def row_at(offset: int, number: int) -> Any:
+        """The row that starts at a byte, as an array of one."""
+        need(offset + row(0).itemsize)
+        found = np.frombuffer(data, row(0), 1, offset)
+        if column is None:
+            return found
+        count = found[column][0]
         if not 0 <= count <= len(data) or count != int(count):
-            text = f"{element.name} {row} lists {count} items"
-            raise FileError(text, where=row, found=count.item())
-        return int(count)
+            text = f"{element.name} {number} lists {count} items"
+            raise FileError(text, where=number, found=count.item())
+        need(offset + row(int(count)).itemsize)
+        return np.frombuffer(data, row(int(count)), 1, offset)
 
-    first = count_at(0, start)
-    size = base.itemsize + first * item
-    if start + element.size * size <= len(data):
-        table = np.frombuffer(data, element.row(first), element.size, start)
-        if (table[f"{name} count"] == first).all():
-            return np.full(element.size, first), start + size * rows
-    counts, offsets = np.empty(element.size, np.int64), np.empty(element.size + 1, np.int64)
-    for k in range(element.size):  # each row says only where the next one starts
-        offsets[k], counts[k] = start, count_at(k, start)
-        start += base.itemsize + int(counts[k]) * item
-    offsets[-1] = start
-    return counts, offsets
-
-
-def _enough(element: _Element, data: bytes, end: int) -> None:
-    if end > len(data):
-        text = f"cut off: the file ends before its {element.size} {element.name} elements do"
-        raise FileError(text, where=element.name)
+    need(element.size)  # a row has at least a byte
+    first = row_at(start, 0) if element.size else np.empty(0, row(0))
+    end = start + element.size * first.itemsize
+    if column is None:
+        need(end)
+    if end <= len(data):
+        table = np.frombuffer(data, first.dtype, element.size, start)
+        if column is None or (table[column] == first[column]).all():  # all lists of one length
+            return {name: table[name].ravel() for name in table.dtype.names or ()}, end
+    rows = []
+    for number in range(element.size):  # each row says only where the next one starts
+        rows.append(row_at(start, number))
+        start += rows[-1].nbytes
+    return {name: np.concatenate([one[name].ravel() for one in rows]) for name in first.dtype.names}, start

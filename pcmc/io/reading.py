@@ -1,4 +1,8 @@
-"""Surfaces from files."""
+"""Surfaces from files, with warnings about meshes of other programs.
+
+Open seams, patches turned against each other or a wrong axis up can be solved, but probably give another roof
+than the one drawn.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +14,29 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
+from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
 from ..base.files import as_path, check_regular, system_error
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
-from .flat_walls import restore_walls
+from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.topology import Topology, topology
 from .formats import FORMATS, READ_ONLY, Format, format_of
-from .import_warnings import import_warnings
 from .libraries import unreadable
-from .mesh_data import MeshData, checked, merged, to_surface, without_unused
+from .mesh_data import MeshData, checked, converted, merged, to_surface, without_unused
 from .metadata import with_parts
-from .scaling import converted, stated
+from .patch_meshes import restore_walls
 
-NO_SUPPORTS = "no supports in the file: its boundary is taken as fixed"
-NO_UNIT = "no unit of length in the file; name it with --units mm, say"
+GAP = 0.05  # of the boundary edges next to it: closer vertices are one, drawn twice
+FACES_ONE_WAY = 0.5  # part of the area: then it is a roof, and not a column or a ball
+FACES_UP = 1e-2  # part of the projected area: less, and another axis is up
+FLAT = 0.5  # smallest spread of the boundary over the next: below, it has a plane
+UPRIGHT = 0.9  # of the normal of that plane along x or y: more, and another axis is up
 
 
 def read(
@@ -68,8 +78,7 @@ def read(
     OptionError : for an unknown unit.
     """
     choice("units", units, tuple(MICROMETRES))
-    data = load(path)
-    return _surface(path, converted(data, units), (tensions, pressures, fixed, on_plane, plane))
+    return _surface(path, converted(load(path), units), (tensions, pressures, fixed, on_plane, plane))
 
 
 def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
@@ -77,11 +86,10 @@ def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") 
 
     Parameters
     ----------
-    path : of the file.
     units : the unit of length wanted; by default the file's own.
     assumed : of the numbers in a file without a unit; by default the one wanted.
     """
-    data = converted(stated(load(path), assumed or units), units)
+    data = converted(load(path), units, assumed or units)
     return _surface(path, data, ()), data
 
 
@@ -94,16 +102,15 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
         if isinstance(error, SurfaceError):
             raised.args = (f"{raised}; or try: pcmc repair {os.fspath(path)} -o clean.obj",)
         raise raised from None
-    notes = (*data.notes, *import_warnings(data, path))
+    notes = [*data.notes, *import_warnings(data, path)]
     if not given:
         some = f" of {', '.join(map(repr, data.bare))}" if len(data.bare) < len(data.patches) else ""
-        values = f"tensions and pressures{some} are 1 unless given"
         hints = {
-            NO_SUPPORTS: data.support is None,
-            values: data.bare,
-            NO_UNIT: data.bare and not data.units,
+            "no supports in the file: its boundary is taken as fixed": data.support is None,
+            f"tensions and pressures{some} are 1 unless given": data.bare,
+            "no unit of length in the file; name it with --units mm, say": data.bare and not data.units,
         }
-        notes = (*notes, *(text for text, true in hints.items() if true))
+        notes += [text for text, true in hints.items() if true]
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
@@ -129,10 +136,8 @@ def opened(path: Path) -> Iterator[Format]:
     check_regular(path)
     form = format_of(path, {**FORMATS, **READ_ONLY})
     if not form.reads:
-        text = (
-            f"{path}: pcmc writes {path.suffix} files and does not read them; read the surface's .pcmc file"
-        )
-        raise FileError(text, what=str(path), found=path.suffix)
+        text = f"{path}: pcmc writes {path.suffix} files and does not read them; read the surface's .pcmc"
+        raise FileError(f"{text} file", what=str(path), found=path.suffix)
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
         yield form
@@ -147,3 +152,72 @@ def opened(path: Path) -> Iterator[Format]:
         raise
     except Exception as error:  # the net under the readers: a file may be wrong in a way that none checks
         raise unreadable(path.suffix, error).in_file(path, FileError, str(path)) from error
+
+
+def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tuple[str, ...]:
+    """A sentence for each probable mistake; none where the format has supports, as pcmc's files do.
+
+    ``path`` is the file, for the command to type.
+
+    >>> from pcmc import Patch
+    >>> X = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    >>> pair = MeshData(X, np.array([[0, 1, 2], [0, 3, 2]]), np.array([0, 1]), (Patch("a", 1), Patch("b", 1)))
+    >>> import_warnings(pair)[0].split(":")[0]
+    "patches 'a' and 'b' are turned against each other"
+    """
+    if data.support is not None or not len(data.faces):
+        return ()
+    topo = topology(data.faces, data.patch_of_face, len(data.vertices))
+    outer = topo.edges[topo.boundary_edge]
+    seam, axis = _open_seam(data.vertices, outer), _up(data, outer)
+    turn = f"the surface faces {axis}, but z is up here; if {axis} was up, turn it: pcmc repair"
+    wrong_up = f"{turn} {os.fspath(path)} -o turned.obj --up {axis}" if axis else ""
+    return tuple(filter(None, (seam, _opposed_patches(data, topo), wrong_up)))
+
+
+def _open_seam(X: Floats, outer: Ints) -> str:
+    if not len(outer):
+        return ""
+    length = segment_lengths(X, outer)
+    beside = np.full(len(X), np.inf)
+    np.minimum.at(beside, outer.ravel(), np.repeat(length, 2))
+    rim = np.unique(outer)
+    distances, neighbours = map(np.asarray, cKDTree(X[rim]).query(X[rim], k=2))
+    apart, near = distances[:, 1], neighbours[:, 1]
+    close = apart < GAP * np.minimum(beside[rim], beside[rim[near]])
+    if not close.any():
+        return ""
+    place = X[rim[close][0]].round(4).tolist()
+    return (
+        f"a seam is open: {np.count_nonzero(close)} boundary vertices are within"
+        f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
+        " drew the mesh, or with pcmc repair --weld"
+    )
+
+
+def _opposed_patches(data: MeshData, topo: Topology) -> str:
+    wrong = np.flatnonzero(topo.one_way_edge & topo.seam_edge)
+    if not len(wrong):
+        return ""
+    faces = np.flatnonzero((topo.edge_of_face == wrong[0]).any(axis=1))
+    a, b = (data.patches[k].name for k in data.patch_of_face[faces])
+    return (
+        f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
+        " sides; unless you want that, reverse the faces of one"
+    )
+
+
+def _up(data: MeshData, outer: Ints) -> str:
+    """The axis that was up, "x" or "y", by the sum of area vectors and the best plane of the boundary."""
+    vector = area_vectors(data.vertices[data.faces])
+    total = np.abs(vector.sum(axis=0))
+    size = float(np.linalg.norm(total))
+    if size > FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum()) and total[2] <= FACES_UP * size:
+        return "xy"[int(total[:2].argmax())]
+    rim = data.vertices[np.unique(outer)]
+    if len(rim) < 3:
+        return ""
+    _, spread, axes = np.linalg.svd(rim - rim.mean(axis=0), full_matrices=False)
+    normal = np.abs(axes[2])
+    upright = spread[2] < FLAT * spread[1] and normal[:2].max() > UPRIGHT
+    return "xy"[int(normal[:2].argmax())] if upright else ""

@@ -1,6 +1,6 @@
 """The part of the reading process that uses MeshLab: it reads meshes, and repairs them.
 
-``reading_process`` loads this file by its path, so it imports nothing of pcmc. MeshLab's code is native, and
+``libraries`` loads this file by its path, so it imports nothing of pcmc. MeshLab's code is native, and
 a mesh that is wrong can crash it.
 """
 

@@ -1,6 +1,6 @@
 """The part of the reading process that reads surfaces, with VTK, rhino3dm and IfcOpenShell: arrays.
 
-``reading_process`` loads this file by its path, so it imports nothing of pcmc; only the library that the file
+``libraries`` loads this file by its path, so it imports nothing of pcmc; only the library that the file
 needs, and only those parts of VTK that read.
 """
 

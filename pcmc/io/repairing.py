@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,14 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
+from ..base.errors import FileError, OptionError, PcmcError
 from ..base.files import as_path
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
-from .libraries import unreadable
-from .mesh_data import MeshData, to_surface, within
+from .libraries import read_arrays, require, unreadable
+from .mesh_data import MeshData, converted, to_surface, within
 from .metadata import Metadata
 from .reading import contents, opened
-from .reading_process import read_arrays
-from .scaling import converted, stated
 
 WELD = 1e-5  # of the size
 HOLES = 8  # edges of a hole
@@ -110,9 +107,9 @@ def repair(
     if edge_length is not None:
         validate.positive("edge_length", edge_length)
     validate.choice("up", up, tuple(TURNS))
-    require_meshlab()
+    require("pymeshlab", extra="repair")
     path = as_path(path)
-    data = converted(stated(_read(path), units), units)
+    data = converted(_read(path), units, units)
     turn = np.array(TURNS[up], dtype=float)
     plane = data.plane and Plane(tuple(turn @ data.plane.point), tuple(turn @ data.plane.normal))
     data = replace(data, vertices=np.asarray(data.vertices) @ turn.T, plane=plane)
@@ -190,13 +187,7 @@ def _read(path: Path) -> MeshData:
 
 def read(path: Path) -> MeshData:
     """Every mesh of the file; meshes of one name are one patch."""
-    require_meshlab()
+    require("pymeshlab", extra="repair")
     found = enumerate(read_arrays("io/reading_meshes.py", "meshlab_arrays", path)["meshes"], 1)
     meshes = [(Path(m["name"]).stem or f"mesh {k}", m["points"], m["faces"]) for k, m in found]
     return Metadata().of_meshes(meshes, path.stem)
-
-
-def require_meshlab() -> None:
-    """MissingExtra without pymeshlab."""
-    if find_spec("pymeshlab") is None:
-        raise MissingExtra("pymeshlab", "repair")

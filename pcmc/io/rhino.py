@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,18 +18,16 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra
+from ..base.errors import FileError
 from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
 from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import bounding_size
-from . import flat_walls
-from .libraries import load_library
+from .libraries import load_library, read_arrays, require
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, parse_metadata
-from .patch_meshes import patch_meshes
+from .patch_meshes import WALLS, patch_meshes
 from .polygons import triangulate
-from .reading_process import read_arrays
 
 KEY, CABLE, NAME = "pcmc", "pcmc cable", "pcmc name"
 VERSION = 7  # of Rhino's format
@@ -56,7 +53,7 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, metadat
         mesh.Normals.ComputeNormals()
         model.Objects.AddMesh(mesh, attributes)
     if walls is not None:
-        model.Layers[0].SetUserString(flat_walls.KEY, walls)  # of the whole model, so once
+        model.Layers[0].SetUserString(WALLS, walls)  # of the whole model, so once
     support = support_of(surface)
     for name, kind in HELD.items():
         held = surface.vertices[support == kind]
@@ -104,8 +101,7 @@ def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str 
 
 def read(path: Path) -> MeshData:
     """Layers as patches; curves, surfaces and other objects are left out, with a note."""
-    if find_spec("rhino3dm") is None:
-        raise MissingExtra("rhino3dm", "files")
+    require("rhino3dm")
     arrays = read_arrays("io/reading_surfaces.py", "rhino_arrays", path)
     layers = arrays["layers"]
     X, corners, counts, named = [], [], [], []
@@ -121,7 +117,7 @@ def read(path: Path) -> MeshData:
         name = own if in_file == name else name
         if texts.get(KEY):
             metadata = parse_metadata(texts[KEY])
-            walls = texts.get(flat_walls.KEY) or walls
+            walls = texts.get(WALLS) or walls
         if "faces" in item:
             faces = item["faces"]
             X.append(item["points"])

@@ -15,8 +15,7 @@ import numpy as np
 
 from ..base.errors import FileError
 from ..surface import Surface
-from ..surface.geometry import area_vectors
-from ..surface.origin import file_origin
+from ..surface.geometry import area_vectors, file_origin
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata

@@ -20,7 +20,7 @@ from ..base.errors import MissingExtra
 from ..base.units import Units, length_factor
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
-from ..surface.origin import file_origin
+from ..surface.geometry import file_origin
 from .mesh_data import support_of
 from .patch_meshes import patch_meshes
 

@@ -8,22 +8,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra
+from ..base.errors import FileError
 from ..surface import Surface
-from .libraries import load_library
+from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import from_polygons
-from .reading_process import read_arrays
 
-RESERVED = ("support", "patch")
 FLAT = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
 ITEMS = 100  # of an array, for each byte of a file; those of one value compress so far
 FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
@@ -36,9 +33,6 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata:
     mesh.point_data["support"] = support_of(surface)
     mesh.cell_data["patch"] = surface.patch_of_face
     for name, values in scalars.items():
-        if name in RESERVED:
-            text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
-            raise FileError(text, where=name, found=name)
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
     mesh.field_data["pcmc"] = [metadata]
     if path.suffix.lower() == ".vtu":
@@ -55,8 +49,7 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata:
 
 def read(path: Path) -> MeshData:
     """Triangles, quads and polygons of either; lines and points are left out."""
-    if find_spec("vtkmodules") is None or find_spec("pyvista") is None:
-        raise MissingExtra("pyvista", "files")
+    require("vtkmodules", "pyvista")
     _check_text(path)
     arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
     corners, counts, chosen = _cells(arrays)

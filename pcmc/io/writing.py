@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -14,15 +15,14 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import as_path, atomic_write, check_name, writing
-from ..base.names import checked_name
 from ..base.units import Units, as_units, length_factor
-from ..base.validate import choice, refuse
+from ..base.validate import checked_name, choice, refuse
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
-from .flat_walls import encode_walls
-from .formats import FORMATS, Format, format_of
+from .formats import FORMATS, format_of
+from .mesh_data import scaled_surface
 from .metadata import metadata_text
-from .scaling import scaled_surface
+from .patch_meshes import encode_walls
 
 MADE = ("supports", "balance", "reactions")  # of a certificate, when they are asked for; files have them, too
 
@@ -70,14 +70,18 @@ def write(
     """
     path = as_path(path)
     check_name(path)
-    form = format_of(path, FORMATS)
-    bare = getattr(surface, "bare", ())
-    surface, certificate = _unpacked(surface, certificate, form)
+    form, solved = format_of(path, FORMATS), surface
+    surface = solved if isinstance(solved, Surface) else getattr(solved, "surface", solved)
+    expect_surface(surface)
+    assert isinstance(surface, Surface)  # for mypy
+    if surface is not solved and form.certificate and certificate is None:
+        certificate = getattr(solved, "certificate", None)
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     units = as_units("" if units is None else units)
-    lost = [name for name in scalars if name not in form.carried(surface, scalars)]
+    carried = form.carried(surface, scalars)
+    lost = [name for name in scalars if name not in carried]
     if colour:
         choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
         if not form.colours:
@@ -95,11 +99,22 @@ def write(
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
         elif shown.m < surface.m:
             walls = encode_walls(surface, shown)
-    content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": _values(certificate)}
-    text = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
-    content |= {"walls": walls, "units": units, "metadata": text, "bare": bare}
+    bare = getattr(solved, "bare", ())
+    content: dict[str, Any] = {
+        "scalars": scalars,
+        "colour": colour,
+        "certificate": _values(certificate),
+        "walls": walls,
+        "units": units,
+        "metadata": metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare),
+        "bare": bare,
+    }
     with writing(path), atomic_write(path) as temporary:
         try:
+            for name in carried:
+                if re.sub(r"\s+", "_", name) in form.reserved:
+                    text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
+                    raise FileError(text, where=name, found=name)
             note = form.functions.write(temporary, shown, **content)
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
@@ -109,15 +124,6 @@ def write(
         warnings.warn(text, LostWarning, stacklevel=2)
     if note:
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
-
-
-def _unpacked(given: Surface | Solved, certificate: object, form: Format) -> tuple[Surface, object]:
-    """The surface, and the certificate of a solver's result if the format holds it and none is given."""
-    surface: Any = given if isinstance(given, Surface) else getattr(given, "surface", given)
-    expect_surface(surface)
-    if surface is not given and form.certificate and certificate is None:
-        certificate = getattr(given, "certificate", None)
-    return surface, certificate
 
 
 def _values(certificate: Any) -> Mapping[str, Any]:

@@ -13,9 +13,9 @@ from ..surface.held_curve import EdgesOnCurves
 from .quality import edge_lengths
 from .refinement import (
     Projection,
-    edges_on_planes,
+    edge_columns,
     held_midpoints,
-    onto_round_edges,
+    onto_circles_of,
     projected,
     prolongation,
     refine,
@@ -27,7 +27,7 @@ from .sizes import SizeField, edges_between, place_between
 class CurveMesh:
     """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
 
-    ``support`` (n,2+p): whether a vertex is fixed, slides on Π, slides on each of ``Surface.on_planes``.
+    ``support`` (n,c): as ``Surface.support_columns``.
     ``source`` (n,): the number of each vertex in the mesh before MMG, or -1. ``cable`` (c,): the number of
     the cable on each of ``curves``, or -1. ``on``: where these are on curves that were drawn.
     """
@@ -55,25 +55,19 @@ def cut_curves(
         surface = _refined_round(surface)
         counts = _pieces(surface, along_curves)
     topo, stay = surface.topology, _curve_edges(surface)
-    fixed_edge, sliding_edge = held_midpoints(surface)
     X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
-    at_vertices = np.stack(
-        [*surface.given_supports.fixed_and_sliding(), *(mask for _, mask in surface.on_planes)], axis=1
-    )
     on = surface.edges_on_curves[stay]
-    mesh = CurveMesh(X, F, patch, topo.edges[stay], at_vertices, number, _cable_of_edge(surface)[stay], on)
-    support = np.stack([fixed_edge, sliding_edge, *edges_on_planes(surface)], axis=1)[stay]
+    cable, support = _cable_of_edge(surface)[stay], edge_columns(surface)[stay]
+    mesh = CurveMesh(X, F, patch, topo.edges[stay], surface.support_columns, number, cable, on)
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
     new = mesh.support[:, 0] & (np.arange(len(mesh.X)) >= first)
     new[mesh.curves[mesh.on.drawn]] = False
-    if (project is not None or surface.on_circle) and new.any():
-        X = mesh.X.copy()
-        if project is not None:
-            X[new] = projected(project, X[new])
-        X[new] = onto_round_edges(surface, X[new])
-        mesh = replace(mesh, X=X)
-    return mesh, background
+    X = mesh.X.copy()
+    if project is not None and new.any():
+        X[new] = projected(project, X[new])
+    onto_circles_of(surface, mesh.support & new[:, None], X)
+    return replace(mesh, X=X), background
 
 
 def _curve_edges(surface: Surface) -> Bools:

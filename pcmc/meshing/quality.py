@@ -9,10 +9,10 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..contact.pinching import StandingPart, place_wall_rows
-from ..forces.functional import apply_supports, onto_circles
 from ..forces.motion_space import motion_space
 from ..surface import Surface
 from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
+from ..surface.supports import apply_supports, onto_circles
 from ..surface.topology import SHEET
 
 SQRT3 = sqrt(3.0)

@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..contact.midpoints import midpoints
-from ..surface import Circle, Guide, Plane, Surface, expect_surface
+from ..surface import Surface, expect_surface
 
 CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner
 
@@ -148,14 +148,23 @@ def _last_edges(surface: Surface, inside: Bools, fixed: Bools) -> Bools:
     return more
 
 
-def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...]:
-    """The planes besides Π with their vertices, those on the edges ``cut`` (e,) last.
+def edge_columns(surface: Surface) -> Bools:
+    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``.
 
-    A new vertex is on a plane if its edge is part of the boundary there, of a curve in a mirror plane, or
-    of a triangle that lies in the plane, as those of an upright wall do.
+    A new vertex slides along a line or circle if both ends of its edge lie on it, and one of them slides.
     """
-    pairs = zip(surface.on_planes, edges_on_planes(surface), strict=True)
-    return tuple((plane, np.concatenate([mask, along[cut]])) for (plane, mask), along in pairs)
+    columns, edges = [*held_midpoints(surface), *edges_on_planes(surface)], surface.topology.edges
+    for guide, along in surface.given_supports.on_line:
+        on = surface.fixed & (guide.distance(surface.vertices) <= 1e-9 * surface.size)
+        columns.append(columns[0] & on[edges].all(axis=1) & along[edges].any(axis=1))
+    return np.stack(columns, axis=1)
+
+
+def onto_circles_of(surface: Surface, columns: Bools, points: Floats) -> None:
+    """Put new points (k,3) on edges along a circle there, in place; ``columns`` (k,c) are their supports."""
+    first = columns.shape[1] - len(surface.given_supports.on_line)
+    for (guide, _), along in zip(surface.given_supports.on_line, columns.T[first:], strict=True):
+        points[along] = guide.nearest(points[along])
 
 
 def edges_on_planes(surface: Surface) -> list[Bools]:
@@ -180,27 +189,25 @@ def projected(project: Projection, points: Floats) -> Floats:
 
 
 class NewVertices(NamedTuple):
-    """New vertices on edges: positions (k,3); which are fixed, and slide on Π, (k,); (k,) their parameters on
+    """New vertices on edges: positions (k,3), their ``support_columns`` (k,c), and their parameters (k,) on
     the curves of their edges."""
 
     middle: Floats
-    held: Bools
-    slides: Bools
+    support: Bools
     at: Floats
 
 
 def new_vertices(surface: Surface, cut: Bools, project: Projection | None = None) -> NewVertices:
     """The new vertices on the edges ``cut`` (e,)."""
-    middle = midpoints(surface, surface.topology.edges[cut])
-    held, slides = (mask[cut] for mask in held_midpoints(surface))
+    middle, support = midpoints(surface, surface.topology.edges[cut]), edge_columns(surface)[cut]
     on = surface.edges_on_curves[cut]
-    guessed = held & ~on.drawn
     if project is not None:
+        guessed = support[:, 0] & ~on.drawn
         middle[guessed] = projected(project, middle[guessed])
-    middle[guessed] = onto_round_edges(surface, middle[guessed])
+    onto_circles_of(surface, support, middle)
     at, points = on.between()
     middle[on.drawn] = points[on.drawn]
-    return NewVertices(middle, held, slides, at)
+    return NewVertices(middle, support, at)
 
 
 def _refine_once(surface: Surface, project: Projection | None) -> Surface:
@@ -215,74 +222,14 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
 
 def with_vertices_on(surface: Surface, cut: Bools, F: Ints, patch: Ints, new: NewVertices) -> Surface:
     """The surface of triangles ``F`` whose last k vertices are the new ones on the edges ``cut`` (e,)."""
-    X, ends = np.concatenate([surface.vertices, new.middle]), surface.topology.edges[cut]
-    fixed, sliding = surface.given_supports.fixed_and_sliding()
-    fixed, sliding = np.concatenate([fixed, new.held]), np.concatenate([sliding, new.slides])
-    number = surface.n + np.arange(len(new.middle))
+    ends, number = surface.topology.edges[cut], surface.n + np.arange(len(new.middle))
     halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
     curves = surface.edges_on_curves.cut(cut, new.at)
-    return surface.rebuilt(
-        vertices=X,
+    return surface.with_mesh(
+        np.concatenate([surface.support_columns, new.support]),
+        vertices=np.concatenate([surface.vertices, new.middle]),
         faces=F,
         patch_of_face=patch,
-        fixed=fixed,
-        on_plane=sliding,
-        on_line=carry_lines(surface, X, fixed, surface.n),
-        on_planes=carry_planes(surface, cut),
         cables=tuple(cable.cut(ends, number) for cable in surface.cables),
         curves=curves.joined(np.concatenate([surface.topology.edges[~cut], *halves])),
     )
-
-
-def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:
-    """The lines and circles that vertices X (n,3) of a finer mesh slide along; the first ``kept`` are old.
-
-    A new vertex slides if it is fixed, on the line, and no farther along it than the last old vertices, the
-    sliding ones and their neighbours on the boundary.
-    """
-    lines: list[tuple[Guide, Bools]] = []
-    near = 1e-9 * surface.size
-    for line, along in surface.given_supports.on_line:
-        if isinstance(line, Circle):
-            inside = fixed & (line.distance(X) <= near)
-            inside[inside] = _round_edges(surface, line, along, X[inside])[0]
-            inside[:kept] = along[:kept]
-            lines.append((line, inside))
-            continue
-        ends = surface.topology.edges[surface.topology.boundary_edge]
-        beside = np.unique(ends[along[ends].any(axis=1)])
-        beside = beside[line.distance(surface.vertices[beside]) <= near]
-        low, high = np.sort(line.place(surface.vertices[beside]))[[0, -1]]
-        place = line.place(X)
-        inside = fixed & (line.distance(X) <= near) & (place > low + near) & (place < high - near)
-        inside[:kept] = along[:kept]
-        lines.append((line, inside))
-    return tuple(lines)
-
-
-def onto_round_edges(surface: Surface, points: Floats) -> Floats:
-    """New held points (k,3), those on edges beside vertices that slide along a circle put on the circle."""
-    for circle, along in surface.on_circle:
-        between, rise = _round_edges(surface, circle, along, points)
-        between &= circle.distance(points) <= 1.01 * rise + 1e-9 * surface.size
-        points[between] = circle.nearest(points[between])
-    return points
-
-
-def _round_edges(surface: Surface, circle: Circle, along: Bools, points: Floats) -> tuple[Bools, Floats]:
-    """Which points (k,3) are at a sliding vertex, or between one and its neighbour on the circle.
-
-    And how high the circle rises there over the edge between the two, (k,) length.
-    """
-    near, X = 1e-9 * surface.size, surface.vertices
-    on_circle = surface.fixed & surface.topology.on_boundary & (circle.distance(X) <= near)
-    corners = np.flatnonzero(on_circle)
-    if not len(corners):
-        return np.zeros(len(points), dtype=bool), np.zeros(len(points))
-    corners = corners[np.argsort(circle.place(X[corners]))]
-    after = np.searchsorted(circle.place(X[corners]), circle.place(points)) % len(corners)
-    ends = corners[np.stack([after - 1, after])]
-    close = np.linalg.norm(points - X[ends], axis=2) <= near
-    slides = np.where(close.any(axis=0), (along[ends] & close).any(axis=0), along[ends].any(axis=0))
-    side = np.linalg.norm(X[ends[1]] - X[ends[0]], axis=1)
-    return slides, circle.radius - np.sqrt(np.maximum(circle.radius**2 - 0.25 * side**2, 0.0))

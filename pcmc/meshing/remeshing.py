@@ -21,10 +21,7 @@ from ..surface.geometry import angles, face_areas, segment_lengths
 from .angles import improve_angles
 from .curve_cutting import CurveMesh, cut_curves
 from .quality import edge_lengths
-from .refinement import (
-    Projection,
-    carry_lines,
-)
+from .refinement import Projection
 from .sizes import (
     SizeField,
     check_sizes,
@@ -288,38 +285,31 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
     F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)
     X = np.concatenate([mesh.X for mesh in meshes])[used]
-    fixed, sliding, *on_planes = np.concatenate([mesh.support for mesh in meshes])[used].T
-    lines = carry_lines(surface, X, fixed)
-    _onto_planes(surface, X, F, patch_of_face, used >= len(old.X), on_planes)
-    planes = tuple((plane, mask) for (plane, _), mask in zip(surface.on_planes, on_planes, strict=True))
+    support = np.concatenate([mesh.support for mesh in meshes])[used]
+    _onto_planes(surface, X, F, patch_of_face, used >= len(old.X), support)
     ends = np.searchsorted(used, old.curves)
     cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
-    return surface.rebuilt(
+    return surface.with_mesh(
+        support,
         vertices=X,
         faces=F,
         patch_of_face=patch_of_face,
-        fixed=fixed,
-        on_plane=sliding,
-        on_line=lines,
-        on_planes=planes,
         cables=cables,
         curves=old.on.joined(ends),
     )
 
 
-def _onto_planes(
-    surface: Surface, X: Floats, F: Ints, patch: Ints, new: Bools, masks: Sequence[Bools]
-) -> None:
-    """Put new vertices of patches that lie in a plane, such as upright walls, on it: X and masks change."""
+def _onto_planes(surface: Surface, X: Floats, F: Ints, patch: Ints, new: Bools, support: Bools) -> None:
+    """Put new vertices of patches that lie in a plane, such as upright walls, on it, in place."""
     count = len(surface.patches)
-    for (plane, before), mask in zip(surface.on_planes, masks, strict=True):
+    for column, (plane, before) in enumerate(surface.on_planes, start=2):
         off = ~before[surface.faces].all(axis=1)
         lies = (np.bincount(surface.patch_of_face, off, count) == 0) & np.isin(np.arange(count), patch)
         inside = np.zeros(len(X), dtype=bool)
         inside[F[lies[patch]]] = True
         inside &= new
-        X[inside] -= plane.height(X[inside])[:, None] * np.array(plane.normal)
-        mask |= inside
+        X[inside] = plane.nearest(X[inside])
+        support[inside, column] = True
 
 
 def _patch_angles(mesh: CurveMesh, count: int) -> Floats:

@@ -95,16 +95,14 @@ def add_walls(
     if edge_length is None:
         edge_length = float(edge_lengths(surface)[surface.topology.seam_edge].mean())
     walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
-    given, none = surface.given_supports, np.zeros(len(walls.vertices), dtype=bool)
-    return surface.rebuilt(
+    columns = np.zeros((len(walls.vertices), surface.support_columns.shape[1]), dtype=bool)
+    columns[:, 0], columns[:, 1] = walls.fixed, walls.sliding
+    return surface.with_mesh(
+        np.concatenate([surface.support_columns, columns]),
         vertices=np.concatenate([surface.vertices, walls.vertices]),
         faces=np.concatenate([surface.faces, walls.faces]),
         patch_of_face=np.concatenate([surface.patch_of_face, walls.label + len(names)]),
         patches=(*surface.patches, *patches),
-        fixed=np.concatenate([given.fixed, walls.fixed]),
-        on_plane=np.concatenate([given.on_plane, walls.sliding]),
-        on_line=tuple((line, np.concatenate([along, none])) for line, along in given.on_line),
-        on_planes=tuple((plane, np.concatenate([mask, none])) for plane, mask in surface.on_planes),
         curves=(*surface.held_curves, *walls.uprights),
     )
 

@@ -19,12 +19,12 @@ from scipy.sparse.linalg import splu
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import place_wall_rows, standing_part
-from ..forces.functional import onto_circles
 from ..forces.motion_space import motion_space, perpendicular
 from ..meshing.quality import compare, worst_quality
 from ..solvers import solve
 from ..surface import Surface
 from ..surface.geometry import edge_vectors
+from ..surface.supports import onto_circles
 from .distance import distances
 from .families import families
 from .schedule import Panels, panels

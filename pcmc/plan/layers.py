@@ -11,8 +11,8 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.names import checked_name
 from ..base.units import MICROMETRES, length_factor
+from ..base.validate import checked_name
 from ..curves.pieces import point_text
 from .strokes import Stroke
 

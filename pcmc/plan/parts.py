@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import OptionError, PcmcError, PlanError, unknown
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from ..curves.curves import CURVES, Curve, curve
 from ..meshing.walls import EDGES
 from ..surface import Plane

@@ -13,7 +13,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
-from ..base.names import checked_name
+from ..base.validate import checked_name
 from ..curves.curves import Curve
 from ..curves.pieces import to_local, to_space
 from ..meshing.walls import EDGES

@@ -21,7 +21,7 @@ from ..base.files import check_regular, system_error
 from ..base.units import unit_in_file
 from ..curves.curves import Curve
 from ..curves.pieces import Piece
-from ..io.reading_process import read_arrays
+from ..io.libraries import read_arrays
 
 LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
 """The suffixes of drawings, and the libraries that read them."""

@@ -9,8 +9,7 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from .. import solvers
-from ..advice.advice import Task, advice, chosen_values
-from ..advice.aims import aims_below_supports
+from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..certificate.balance import unbalanced
 from ..contact.pinching import standing_part
@@ -58,7 +57,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     outcome = replace(solved, notes=notes, **about)
     if outcome.good:
         return outcome
-    notes += aims_below_supports(project.plan, surface, project.targets, start.units)
+    notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")
     drawing = "" if project.drawing is None else project.drawing.path.name
     names = ("rises", "targets", "vary", "method", "options", "units")

@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..forces.functional import apply_supports
 from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..forces.pattern import hessian_pattern
 from ..forces.second_variation import assemble
 from ..stability.factorisation import factoriser
 from ..surface import Surface
+from ..surface.supports import apply_supports
 from ..surface.topology import SHEET
 
 FLOOR = 1e-2  # of the largest tension it is connected with: the least tension of any patch in L_α

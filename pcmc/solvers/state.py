@@ -23,7 +23,7 @@ from ..contact.pinching import (
     top_spacing,
 )
 from ..contact.pull import pull_directions
-from ..forces.functional import energy_at, onto_circles
+from ..forces.functional import energy_at
 from ..forces.loose_parts import rounding_left
 from ..forces.rooms import closing_volumes, volume_gradients_at, volumes_at, with_room_pressures
 from ..meshing.quality import compare, redistribute, worst_quality
@@ -31,6 +31,7 @@ from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
+from ..surface.supports import onto_circles
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 from ..base.arrays import Floats
 from ..contact.pinching import StandingPart, standing_part
 from ..contact.pull import excess_pull
-from ..forces.functional import apply_supports, energy_and_gradient
+from ..forces.functional import energy_and_gradient
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.loose_parts import relative_forces
 from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
@@ -30,6 +30,7 @@ from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
 from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
+from ..surface.supports import apply_supports
 from .bordered import BorderedFactor
 from .factorisation import Factor, Factoriser, SingularMatrix, factoriser
 

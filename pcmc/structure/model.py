@@ -15,12 +15,12 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
-from ..forces.functional import apply_supports
 from ..forces.weight import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.supports import apply_supports
 from .cables import THINNEST, checked_areas
 from .loads import GRAVITY, Load, SelfWeight, Step, check_loads, load_steps, standard_gravity
 

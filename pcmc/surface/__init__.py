@@ -4,29 +4,11 @@ Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Cable``, ``Room``, ``Surface
 ``mirrored`` to all other rooms. Imports ``curves`` and ``base``.
 """
 
-from ..curves.plane import Plane
-from .cable import Cable
-from .circle import Circle, Guide
-from .cutting import cut
+from ..curves.guides import Circle, Guide, Line, Plane
 from .held_curve import HeldCurve
-from .line import Line
-from .mirroring import mirrored, unfolded
-from .patch import Patch
-from .room import Room
+from .parts import Cable, Patch, Room
 from .surface import Surface, expect_surface
+from .symmetry import cut, mirrored, unfolded
 
-__all__ = [
-    "Cable",
-    "Circle",
-    "Guide",
-    "HeldCurve",
-    "Line",
-    "Patch",
-    "Plane",
-    "Room",
-    "Surface",
-    "cut",
-    "expect_surface",
-    "mirrored",
-    "unfolded",
-]
+__all__ = ["Cable", "Circle", "Guide", "HeldCurve", "Line", "Patch", "Plane", "Room", "Surface"]
+__all__ += ["cut", "expect_surface", "mirrored", "unfolded"]

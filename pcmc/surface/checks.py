@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, NoReturn
@@ -13,11 +12,9 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
-from .circle import Circle, Guide
 from .geometry import bounding_size, cross, dot, norm, point, sub
 from .topology import Topology
 
-GUIDES = "a mapping from Lines or Circles to vertices"
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
 MANY = 16  # faces at one edge
 LARGEST = validate.LARGEST
@@ -52,12 +49,13 @@ def reachable(X: Floats) -> bool:
     return True
 
 
-def large_enough(X: Floats) -> None:
-    """At least SMALLEST across: floats cannot hold the squares of areas of a smaller surface."""
+def large_enough(X: Floats) -> float:
+    """The size, which must be 0 or at least SMALLEST: floats cannot hold the squares of smaller areas."""
     size = bounding_size(X)
     if 0.0 < size < SMALLEST:
         message = f"vertices: the surface is only {size:g} across; use a smaller unit of length"
         raise SurfaceError(message, what="vertices", found=size, expected=f"≥ {SMALLEST:g}")
+    return size
 
 
 def face_array(faces: Any, n: int) -> Ints:
@@ -65,25 +63,19 @@ def face_array(faces: Any, n: int) -> Ints:
     F = _integers(faces, "faces")
     if F.ndim != 2 or F.shape[1] != 3 or not len(F):
         refuse_shape("faces", F, "(m, 3) with m > 0")
-    bad = np.flatnonzero(((F < 0) | (n <= F)).any(axis=1))
-    if len(bad):
-        refuse_rows("faces", F, bad, "names a vertex outside the range", f"0..{n - 1}")
+    _within("faces", F, n, "vertex")
     bad = np.flatnonzero((F[:, [1, 2, 0]] == F).any(axis=1))
     if len(bad):
         refuse_rows("faces", F, bad, "has a vertex twice", hint="remove the face")
     return F.astype(np.int32)
 
 
-def patch_array(patch_of_face: Any, m: int, patches: Sequence[Any]) -> Ints:
-    """(m,) int32 indices into ``patches``, every patch used, names unique."""
-    names = [p.name for p in patches]
-    unique_names("patches", names)
+def patch_array(patch_of_face: Any, m: int, names: Sequence[str]) -> Ints:
+    """(m,) int32 indices into the patches of these names, every patch used."""
     P = _integers(patch_of_face, "patch_of_face")
     if P.shape != (m,):
         refuse_shape("patch_of_face", P, f"({m},), one entry per face")
-    bad = np.flatnonzero((P < 0) | (len(names) <= P))
-    if len(bad):
-        refuse_rows("patch_of_face", P, bad, "names a patch outside the range", f"0..{len(names) - 1}")
+    _within("patch_of_face", P, len(names), "patch")
     empty = np.flatnonzero(np.bincount(P, minlength=len(names)) == 0)
     if len(empty):
         message = f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it"
@@ -101,9 +93,7 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
     result = np.zeros(n, dtype=bool)
     if given.size:
         indices = _integers(given, what).ravel()
-        bad = np.flatnonzero((indices < 0) | (indices >= n))
-        if len(bad):
-            refuse_rows(what, indices, bad, "names a vertex outside the range", f"0..{n - 1}")
+        _within(what, indices, n, "vertex")
         result[indices] = True
     return result
 
@@ -122,18 +112,13 @@ def edge_array(edges: Any, what: str) -> Ints:
     return E.astype(np.int32)
 
 
-def unique_names(what: str, names: Iterable[str]) -> None:
-    """Refuse the first name that is used twice."""
-    double = [name for name, times in Counter(names).items() if times > 1]
-    if double:
-        message = f"{what}: the name {double[0]!r} is used twice; names must be unique"
-        raise SurfaceError(message, what=what, found=double[0])
-
-
 def mesh(
     X: Floats, F: Ints, patch: Ints, topo: Topology, patches: Sequence[Any], held: Bools, height: Floats
 ) -> None:
-    """Every vertex is used, no triangle is flat or doubled, each patch is an oriented manifold."""
+    """Every vertex is used, no triangle is flat or doubled, each patch is an oriented manifold.
+
+    Within a patch an edge has at most two faces, and those run along it in opposite directions.
+    """
     names = [p.name for p in patches]
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
@@ -148,12 +133,21 @@ def mesh(
     if not _perhaps_at_fault(F, patch, topo.edge_of_face, len(topo.edges)):
         return
     pair = np.sort(topo.edge_of_face, axis=1).astype(np.int64)  # two edges make a triangle
-    same = _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1])
-    if same is not None:
-        first, second = same
+    for first, second in _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1]):
         message = f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one"
         raise SurfaceError(message, what="faces", where=second, found=F[second].tolist())
-    _oriented(F, patch, topo, names)
+    start, end = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
+    within = np.repeat(patch, 3).astype(np.int64)
+    key = (topo.edge_of_face.ravel().astype(np.int64) * len(names) + within) * 2 + (start < end)
+    for one, two in _first_double(key):
+        ends = sorted((int(start[one]), int(end[one])))
+        many, faces = np.count_nonzero(key // 2 == key[one] // 2), f"faces {one // 3} and {two // 3}"
+        fault = f" is not consistently oriented: {faces} run along edge {ends} the same way;"
+        fault += " reverse one of them"
+        if many > 2:
+            fault = f": {many} of its faces share edge {ends} ({faces} among them);"
+            fault += " split it into patches that each have at most two faces at an edge"
+        raise SurfaceError(f"patch {names[within[one]]!r}{fault}", what="faces", where=two // 3)
 
 
 @compiled
@@ -212,80 +206,12 @@ def lying(height: Floats, X: Floats) -> Bools:
     return np.abs(height) <= max(RESTING * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
 
 
-def on_plane(height: Floats, sliding: Bools, X: Floats, size: float, name: str = "plane") -> None:
-    """Sliding vertices must lie on their plane to 1e-9 of the size, or to rounding of their coordinates."""
-    near = max(1e-9 * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
-    bad = np.flatnonzero(sliding & (np.abs(height) > near))
-    if len(bad):
-        fault = f"slides on the {name}, but is {height[bad[0]]:.3g} away from it"
-        hint = "move it onto the plane or hold it with fixed="
-        refuse_rows("vertices", X, bad, fault, hint=hint)
-
-
-def on_line(given: Any, X: Floats) -> list[tuple[Guide, Bools]]:
-    """The lines and circles that vertices slide along, each with their (n,) mask; no vertex on two."""
-    pairs = given.items() if isinstance(given, Mapping) else given
-    lines, taken = [], np.zeros(len(X), dtype=bool)
-    if not isinstance(pairs, Iterable):
-        validate.refuse("on_line", given, GUIDES, error=SurfaceError)
-    for pair in pairs:
-        if not (isinstance(pair, Sequence) and len(pair) == 2 and isinstance(pair[0], Guide)):
-            validate.refuse("on_line", given, GUIDES, error=SurfaceError)
-        along = mask(pair[1], len(X), "on_line")
-        bad = np.flatnonzero(along & taken)
-        if len(bad):
-            refuse_rows("vertices", X, bad, "slides along two lines", hint="hold it with fixed= instead")
-        taken |= along
-        lines.append((pair[0], along))
-    on_lines(lines, X)
-    return lines
-
-
-def on_lines(lines: Iterable[tuple[Guide, Bools]], X: Floats) -> None:
-    """Vertices must lie on the lines and circles they slide along to 1e-9 of the size, or to rounding."""
-    for line, along in lines:
-        near = max(1e-9 * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
-        distance = line.distance(X)
-        bad = np.flatnonzero(along & (distance > near))
-        if len(bad):
-            name = "circle" if isinstance(line, Circle) else "line"
-            place = f"around {line.centre}" if isinstance(line, Circle) else f"through {line.point}"
-            fault = f"slides along the {name} {place}, but is {distance[bad[0]]:.3g} away from it"
-            hint = f"move it onto the {name} or hold it with fixed="
-            refuse_rows("vertices", X, bad, fault, hint=hint)
-
-
-def _oriented(F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> None:
-    """Within a patch an edge has at most two faces, and those run along it in opposite directions."""
-    edge = topo.edge_of_face.ravel().astype(np.int64)
-    start, end = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
-    within = np.repeat(patch, 3).astype(np.int64)
-    key = (edge * len(names) + within) * 2 + (start < end)
-    double = _first_double(key)
-    if double is None:
-        return
-    one, two = double
-    ends = sorted((int(start[one]), int(end[one])))
-    many = np.count_nonzero(key // 2 == key[one] // 2)
-    fault = (
-        f": {many} of its faces share edge {ends} (faces {one // 3} and {two // 3} among them);"
-        " split it into patches that each have at most two faces at an edge"
-        if many > 2
-        else f" is not consistently oriented: faces {one // 3} and {two // 3} run along edge {ends}"
-        " the same way; reverse one of them"
-    )
-    raise SurfaceError(f"patch {names[within[one]]!r}{fault}", what="faces", where=two // 3)
-
-
-def _first_double(key: Ints) -> tuple[int, int] | None:
-    """Places of the first value that comes twice (by place of the second), or None."""
+def _first_double(key: Ints) -> list[tuple[int, int]]:
+    """Places of the first value that comes twice (by place of the second), if there is one."""
     order = np.argsort(key, kind="stable")
-    ranked = key[order]
-    again = np.flatnonzero(ranked[1:] == ranked[:-1])
-    if not len(again):
-        return None
-    nearest = again[np.argmin(order[again + 1])]
-    return int(order[nearest]), int(order[nearest + 1])
+    again = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    nearest = again[np.argsort(order[again + 1])[:1]]
+    return [(int(order[k]), int(order[k + 1])) for k in nearest]
 
 
 def _plain(values: Any, what: str) -> Any:
@@ -319,6 +245,14 @@ def _integers(values: Any, what: str) -> Ints:
     return np.asarray(given.astype(np.int64))
 
 
+def _within(what: str, rows: Ints, count: int, kind: str) -> None:
+    """Refuse the first row (k,) or (k,d) with a number outside 0..count - 1."""
+    bad = np.flatnonzero(((rows < 0) | (rows >= count)).reshape(len(rows), -1).any(axis=1))
+    if len(bad):
+        span = f"0..{count - 1}"
+        refuse_rows(what, rows, bad, f"names a {kind} outside the range {span}", expected=span)
+
+
 def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
     """Refuse an array of another shape than expected."""
     message = f"{what}: expected shape {expected}, found {array.shape}"
@@ -326,13 +260,12 @@ def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
 
 
 def refuse_rows(
-    what: str, rows: Any, bad: Ints, fault: str, expected: str | None = None, hint: str = ""
+    what: str, rows: Any, bad: Ints, fault: str, hint: str = "", expected: str | None = None
 ) -> NoReturn:
     """Refuse the first of the bad rows, with their number."""
     first = int(bad[0])
-    limits = "" if expected is None else f" {expected}"
     count = f" ({len(bad)} such entries)" if len(bad) > 1 else ""
-    message = f"{what}[{first}] = {rows[first].tolist()} {fault}{limits}{count}{hint and f'; {hint}'}"
+    message = f"{what}[{first}] = {rows[first].tolist()} {fault}{count}{hint and f'; {hint}'}"
     raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)
 
 
@@ -347,9 +280,8 @@ def refuse_snow(snow: float, patch: str, free: int, edge: Ints, other: str = "")
         text += f" {other!r} = {{snow = {snow:g}}} under patches in a project, or --snow {other!r}={snow:g},"
         text += f" or retensioned(snows={{{other!r}: {snow:g}}})"
         raise SurfaceError(text, what="snow", where=(i, j))
-    text = (
-        f"snow: {free} edges are free or the end of it, the first from vertex {i} to {j}, and there a change"
-    )
+    text = f"snow: {free} edges are free or the end of it, the first from vertex {i} to {j},"
+    text += " and there a change"
     text += f" of pressure is not the same as snow; give a weight instead (--weight {patch!r}={snow:g}, or"
     text += f" retensioned(weights={{{patch!r}: {snow:g}}}))"
     raise SurfaceError(text, what="snow", where=(i, j))

@@ -20,6 +20,8 @@ import numpy as np
 from ..base.arrays import Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
 
+FAR = 30.0  # sizes of the surface: farther away, differences of coordinates and volumes lose three digits
+
 
 @inlined
 def point(X: Floats, i: int) -> Vector:
@@ -126,6 +128,16 @@ def bounding_size(X: Floats) -> float:
             low, high = min(low, X[v, d]), max(high, X[v, d])
         total += (high - low) ** 2
     return sqrt(total)
+
+
+def file_origin(X: Floats, size: float) -> Floats:
+    """(3,) the point that coordinates with seven digits are measured from: zero, or whole numbers near.
+
+    >>> file_origin(np.array([[1000.0, 0, 0], [1001, 0, 0], [1000, 1, 1]]), 1.7).tolist()
+    [1000.0, 0.0, 0.0]
+    """
+    middle = X.mean(axis=0)
+    return np.round(middle) if np.linalg.norm(middle) > FAR * size else np.zeros(3)
 
 
 def segment_lengths(X: Floats, ends: Ints) -> Floats:

@@ -28,22 +28,15 @@ SPAN = 1e-9  # of the size of a curve: points this near to a plane or line span 
 class HeldCurve:
     """A drawn curve in space, and the vertices that are held on it.
 
-    Attributes
-    ----------
-    curve : with points (x, y, z).
-    vertices : (k,) int, k ≥ 2, in order along the curve; an edge of the mesh leads from each to the next. On
-        a closed curve the last is the first again.
-    at : (k,) ascending, the parameter of each vertex on the curve.
-
     >>> from ..curves import polyline
     >>> ridge = HeldCurve(polyline([[0, 0, 1], [4, 0, 1]]), np.array([7, 3, 9]), np.array([0.0, 0.5, 1.0]))
     >>> ridge.edges.tolist()
     [[7, 3], [3, 9]]
     """
 
-    curve: Curve
-    vertices: Ints
-    at: Floats
+    curve: Curve  # with points (x, y, z)
+    vertices: Ints  # (k,) k ≥ 2, each joined to the next by an edge; closed: the last is the first again
+    at: Floats  # (k,) ascending, the parameter of each vertex on the curve
 
     @property
     def edges(self) -> Ints:
@@ -72,18 +65,11 @@ class HeldCurve:
 
 @dataclass(frozen=True, eq=False)
 class EdgesOnCurves:
-    """Edges, and where their ends are on curves.
-
-    Attributes
-    ----------
-    curves : the curves.
-    own : (e,) the number of each edge's curve, -1 for an edge of no curve.
-    at : (e,2) the parameters of its ends there.
-    """
+    """Edges, and where their ends are on curves."""
 
     curves: Sequence[Curve]
-    own: Ints
-    at: Floats
+    own: Ints  # (e,) the number of each edge's curve, -1 for an edge of no curve
+    at: Floats  # (e,2) the parameters of its ends there
 
     @classmethod
     def of(cls, held: Sequence[HeldCurve], topo: Topology) -> EdgesOnCurves:
@@ -151,35 +137,43 @@ def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: fl
         validate.refuse("curves", given, "a sequence of HeldCurve", error=SurfaceError)
     checked, taken = list[HeldCurve](), np.zeros(len(topo.edges), dtype=bool)
     for number, part in enumerate(parts):
-        V, t = np.asarray(part.vertices), np.asarray(part.at)
-        shaped = (
-            V.ndim == 1 and len(V) > 1 and V.dtype.kind in "iu" and t.shape == V.shape and t.dtype.kind == "f"
-        )
-        if not shaped or not isinstance(part.curve, Curve) or part.curve.pieces[0].points.shape[1] != 3:
-            _refuse(number, "needs a curve in space, and two or more vertices with a parameter each")
-        if V.min() < 0 or V.max() >= len(X):
-            _refuse(number, f"has vertices outside 0..{len(X) - 1}")
-        if not (t[0] >= 0.0 and t[-1] <= len(part.curve.pieces) and (np.diff(t) > 0.0).all()):
-            _refuse(number, f"needs ascending parameters in 0..{len(part.curve.pieces)}")
-        edges = topo.edge_numbers(part.edges)
-        if (edges < 0).any():
-            ends = part.edges[np.argmax(edges < 0)].tolist()
-            _refuse(number, f"joins the vertices {ends}, which no edge of the mesh joins")
-        if taken[edges].any() or len(np.unique(edges)) < len(edges):
-            _refuse(number, "runs along an edge that is on a curve already")
-        taken[edges] = True
-        if not fixed[V].all():
-            _refuse(number, f"has the vertex {V[np.argmin(fixed[V])]}, which is not fixed")
-        away = np.linalg.norm(part.points - X[V], axis=1)
-        if not away.max() <= NEAR * size:
-            vertex = V[np.argmax(away)]
-            _refuse(number, f"does not pass through vertex {vertex}, which is {away.max():.3g} away from it")
-        checked.append(HeldCurve(part.curve, read_only(V.astype(np.int64)), read_only(t.astype(np.float64))))
+        fault = _fault(part, X, topo, fixed, taken, NEAR * size)
+        if fault:
+            raise SurfaceError(f"curves: curve {number} {fault}", what="curves", where=number)
+        taken[topo.edge_numbers(part.edges)] = True
+        V, t = np.asarray(part.vertices, dtype=np.int64), np.asarray(part.at, dtype=np.float64)
+        checked.append(HeldCurve(part.curve, read_only(V), read_only(t)))
     return tuple(checked)
 
 
-def _refuse(number: int, fault: str) -> None:
-    raise SurfaceError(f"curves: curve {number} {fault}", what="curves", where=number)
+def _fault(part: HeldCurve, X: Floats, topo: Topology, fixed: Bools, taken: Bools, near: float) -> str:
+    """What is wrong with a curve, or nothing; ``taken`` (e,) are the edges of those before."""
+    V, t = np.asarray(part.vertices), np.asarray(part.at)
+    shaped = V.ndim == 1 and len(V) > 1 and t.shape == V.shape
+    typed = V.dtype.kind in "iu" and t.dtype.kind == "f"
+    if (
+        not shaped
+        or not typed
+        or not isinstance(part.curve, Curve)
+        or part.curve.pieces[0].points.shape[1] != 3
+    ):
+        return "needs a curve in space, and two or more vertices with a parameter each"
+    if V.min() < 0 or V.max() >= len(X):
+        return f"has vertices outside 0..{len(X) - 1}"
+    if not (t[0] >= 0.0 and t[-1] <= len(part.curve.pieces) and (np.diff(t) > 0.0).all()):
+        return f"needs ascending parameters in 0..{len(part.curve.pieces)}"
+    edges = topo.edge_numbers(part.edges)
+    if (edges < 0).any():
+        ends = part.edges[np.argmax(edges < 0)].tolist()
+        return f"joins the vertices {ends}, which no edge of the mesh joins"
+    if taken[edges].any() or len(np.unique(edges)) < len(edges):
+        return "runs along an edge that is on a curve already"
+    if not fixed[V].all():
+        return f"has the vertex {V[np.argmin(fixed[V])]}, which is not fixed"
+    away = np.linalg.norm(part.points - X[V], axis=1)
+    if not away.max() <= near:
+        return f"does not pass through vertex {V[np.argmax(away)]}, which is {away.max():.3g} away from it"
+    return ""
 
 
 def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCurve, ...]:
@@ -193,21 +187,17 @@ def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCur
     CurveWarning
         Where the motion is no such map: then the curve is left out.
     """
-    if not held:
-        return ()
-    kept, everywhere = list[HeldCurve](), np.concatenate([one.vertices for one in held])
-    before = np.concatenate([one.points for one in held])
+    kept, every = list[HeldCurve](), np.concatenate([np.empty(0, int), *(one.vertices for one in held)])
+    before = np.concatenate([np.empty((0, 3)), *(one.points for one in held)])
     for one in held:
         P, Q = one.points, X[one.vertices]
         if np.linalg.norm(P - Q, axis=1).max() <= NEAR * size:
             kept.append(one)
             continue
-        for start, end in ((P, Q), (before, X[everywhere])):
+        for start, end in ((P, Q), (before, X[every])):
             matrix, shift = _affine(start, end)
-            if (
-                _spanned(one.curve.controls, start)
-                and np.linalg.norm(start @ matrix.T + shift - end, axis=1).max() <= NEAR * size
-            ):
+            away = np.linalg.norm(start @ matrix.T + shift - end, axis=1).max()
+            if away <= NEAR * size and _spanned(one.curve.controls, start):
                 kept.append(one.mapped(matrix, shift))
                 break
     if len(kept) < len(held):

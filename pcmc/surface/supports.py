@@ -1,112 +1,202 @@
-"""What vertices may do that slide on several planes, or on planes and lines: the common directions."""
+"""Supports: what lets a vertex move in no, one, two or all directions, from points, curves and planes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.compiled import compiled
 from ..base.errors import SurfaceError
-from ..curves.plane import Plane
+from ..curves.guides import Circle, Guide, Line, Plane
 from . import checks
-from .circle import Circle, Guide
-from .line import Line
+from .geometry import accumulate, bounding_size, dot, point, scaled
 from .topology import Topology
 
 FLAT = 1e-9  # sine of an angle up to which two directions count as parallel
-NEAR = 1e-9  # of the size: a vertex this near to a plane lies on it
+NEAR = 1e-9  # of the size: a vertex this near to a plane, line or circle lies on it
+Support = TypeVar("Support", bound=Plane | Guide)
 
 
 class Supports(NamedTuple):
-    """The supports as they were given, before vertices on several planes became those of lines and points.
+    """The supports as they were given, before vertices on several planes became those of lines and points."""
 
-    Attributes
-    ----------
-    fixed, on_plane : (n,) masks, on_plane also of vertices that are fixed.
-    on_line : as in Surface, without the lines that two planes have in common.
-    """
+    fixed: Bools  # (n,)
+    on_plane: Bools  # (n,) also of vertices that are fixed
+    on_line: tuple[tuple[Guide, Bools], ...]  # as in Surface, without the common lines of two planes
 
-    fixed: Bools
-    on_plane: Bools
-    on_line: tuple[tuple[Guide, Bools], ...]
+    @property
+    def guided(self) -> Bools:
+        """(n,) vertices that slide along a line or circle."""
+        return members(self.on_line, len(self.fixed))
 
     def fixed_and_sliding(self) -> tuple[Bools, Bools]:
         """(n,) masks of vertices that are fixed or slide along a line, and of the others that slide on Π."""
-        fixed = np.any([self.fixed, *(along for _, along in self.on_line)], axis=0)
+        fixed = self.fixed | self.guided
         return fixed, self.on_plane & ~fixed
-
-    @property
-    def stays(self) -> Bools:
-        """(n,) vertices that are fixed, and on no line."""
-        return self.fixed & ~np.any(
-            [np.zeros_like(self.fixed), *(along for _, along in self.on_line)], axis=0
-        )
 
     def frozen(self) -> Supports:
         """The same with arrays that cannot be written to."""
         lines = tuple((line, read_only(along)) for line, along in self.on_line)
         return Supports(read_only(self.fixed), read_only(self.on_plane), lines)
 
-    @property
-    def bound(self) -> Bools:
-        """(n,) vertices that are fixed, on Π, or on a line."""
-        held = self.fixed | self.on_plane
-        for _, along in self.on_line:
-            held = held | along
-        return held
+    def resolved(self, plane: Plane, on_planes: Sequence[tuple[Plane, Bools]]) -> dict[str, Any]:
+        """``fixed``, ``on_plane`` and ``on_line`` of a Surface with Π and these other planes.
+
+        Vertices on two planes slide along their common line; those on three that meet in a point cannot
+        move. A vertex that slides along a given line keeps it where it lies in all of the vertex' planes, and
+        cannot move otherwise.
+        """
+        lines, fixed = list(self.on_line), self.fixed.copy()
+        if on_planes:
+            planes = [(plane, self.on_plane), *on_planes]
+            for number, (guide, along) in enumerate(lines):
+                crossing = [mask for other, mask in planes if not _lies_in(guide, other)]
+                leaves = along & np.any([np.zeros_like(along), *crossing], axis=0)
+                fixed |= leaves
+                lines[number] = guide, along & ~leaves
+            several = (np.sum([mask for _, mask in planes], axis=0) > 1) & ~self.fixed & ~self.guided
+            for meeting, rows in _by_planes(planes, several):
+                direction = _common_direction(meeting, int(rows[0]))
+                along = np.isin(np.arange(len(fixed)), rows)
+                if direction is None:
+                    fixed |= along
+                elif direction.any():
+                    lines.append((Line(_common_point(meeting), tuple(direction.tolist())), along))
+        fixed |= members(lines, len(fixed))
+        on_line = tuple((guide, read_only(along)) for guide, along in lines)
+        return {"fixed": read_only(fixed), "on_plane": read_only(self.on_plane & ~fixed), "on_line": on_line}
 
 
-def plane_masks(given: Any, n: int) -> tuple[tuple[Plane, Bools], ...]:
-    """The planes besides Π, each with the (n,) mask of its vertices."""
+def members(pairs: Iterable[tuple[object, Bools]], n: int) -> Bools:
+    """(n,) the vertices of any of the supports."""
+    return np.asarray(np.any([np.zeros(n, dtype=bool), *(mask for _, mask in pairs)], axis=0))
+
+
+class Admissible(NamedTuple):
+    """The directions in which the supports let each vertex move."""
+
+    freedom: Ints  # (n,) how many: 0 fixed, 1 along a line or circle, 2 on a plane, 3 free
+    axis: Floats  # (n,3) the unit tangent of the line or circle, or the plane's unit normal; else zero
+
+    @classmethod
+    def of(cls, fixed: Bools, planes: Iterable[Any], lines: Iterable[Any], X: Floats) -> Admissible:
+        """That of vertices at X (n,3) on ``planes`` and ``lines``, each with its (n,) mask."""
+        freedom, axis = np.where(fixed, np.int8(0), np.int8(3)), np.zeros(X.shape)
+        for plane, mask in planes:
+            freedom[mask], axis[mask] = 2, plane.normal
+        for guide, mask in lines:
+            freedom[mask], axis[mask] = 1, guide.directions(X[mask])
+        return cls(read_only(freedom), read_only(axis))
+
+
+def apply_supports(surface: Any, vectors: Floats, X: Floats | None = None) -> Floats:
+    """Leave of vectors (n,3) what the supports of a Surface allow, in place.
+
+    Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
+    along their plane at those that slide there, Eq. (19); at X (n,3) or where the surface has its vertices.
+    """
+    _project(surface.admissible_at(surface.vertices if X is None else X), vectors)
+    return vectors
+
+
+@compiled
+def _project(admissible: Admissible, vectors: Floats) -> None:
+    for v in range(len(vectors)):
+        freedom, axis = admissible.freedom[v], point(admissible.axis, v)
+        if freedom == 2:
+            accumulate(vectors, v, scaled(-dot(point(vectors, v), axis), axis))
+        elif freedom < 2:
+            along = dot(point(vectors, v), axis) if freedom == 1 else 0.0
+            vectors[v, 0], vectors[v, 1], vectors[v, 2] = scaled(along, axis)
+
+
+def onto_circles(surface: Any, X: Floats) -> Floats:
+    """X (n,3) with the vertices that slide along a circle put back on it; X itself without any."""
+    if surface.on_circle:
+        X = X.copy()
+    for circle, along in surface.on_circle:
+        X[along] = circle.nearest(X[along])
+    return X
+
+
+def guide_masks(what: str, given: Any, n: int, kind: Any, expected: str) -> tuple[tuple[Support, Bools], ...]:
+    """The supports of a mapping or of pairs, each with the (n,) mask of its vertices."""
     pairs = given.items() if isinstance(given, Mapping) else given
-    expected = "a mapping from Planes to vertices"
     if not isinstance(pairs, Iterable):
-        validate.refuse("on_planes", given, expected, error=SurfaceError)
+        validate.refuse(what, given, expected, error=SurfaceError)
     masks = []
     for pair in pairs:
-        if not (isinstance(pair, Sequence) and len(pair) == 2 and isinstance(pair[0], Plane)):
-            validate.refuse("on_planes", given, expected, error=SurfaceError)
-        masks.append((pair[0], checks.mask(pair[1], n, "on_planes")))
+        if not (isinstance(pair, Sequence) and len(pair) == 2 and isinstance(pair[0], kind)):
+            validate.refuse(what, given, expected, error=SurfaceError)
+        masks.append((pair[0], checks.mask(pair[1], n, what)))
     return tuple(masks)
 
 
-def completed(
-    planes: Sequence[tuple[Plane, Bools]], X: Floats, at_end: Bools, fixed: Bools
-) -> tuple[tuple[Plane, Bools], ...]:
-    """The planes with the vertices that lie on them, and belong to them, although not given.
+def checked_lines(given: Any, X: Floats) -> tuple[tuple[Guide, Bools], ...]:
+    """The lines and circles that vertices X (n,3) slide along, each with their mask; no vertex on two."""
+    expected = "a mapping from Lines or Circles to vertices"
+    lines: tuple[tuple[Guide, Bools], ...] = guide_masks("on_line", given, len(X), Guide, expected)
+    double = np.flatnonzero(np.sum([along for _, along in lines], axis=0) > 1)
+    if len(double):
+        hint = "hold it with fixed= instead"
+        checks.refuse_rows("vertices", X, double, "slides along two lines", hint=hint)
+    check_on(lines, X, bounding_size(X))
+    return lines
 
-    These are fixed vertices of the boundary (``at_end``) and, of a mirror plane, all those of the boundary.
+
+def check_on(guides: Iterable[tuple[Plane | Guide, Bools]], X: Floats, size: float) -> None:
+    """Vertices (n,3) must lie on their plane, line or circle to 1e-9 of the size, or to rounding.
+
+    The first plane is Π.
     """
-    near = NEAR * max(checks.bounding_size(X), 1e-300)
-    parts = []
-    for plane, mask in planes:
-        there = at_end & (np.abs(plane.height(X)) <= near)
-        parts.append((plane, mask | (there if plane.mirror else there & fixed)))
-    return tuple(parts)
+    near = max(NEAR * size, checks.ROUNDED * float(np.abs(X).max(initial=0.0)))
+    for number, (guide, mask) in enumerate(guides):
+        away = guide.distance(X)
+        bad = np.flatnonzero(mask & (np.abs(away) > near))
+        if not len(bad):
+            continue
+        kind = type(guide).__name__.lower()
+        if isinstance(guide, Plane):
+            place = f"on the {guide if number else kind}"
+        else:
+            where = f"around {guide.centre}" if isinstance(guide, Circle) else f"through {guide.point}"
+            place = f"along the {kind} {where}"
+        fault = f"slides {place}, but is {away[bad[0]]:.3g} away from it"
+        hint = f"move it onto the {kind} or hold it with fixed="
+        checks.refuse_rows("vertices", X, bad, fault, hint=hint)
 
 
-def check_mirrors(
-    planes: Sequence[tuple[Plane, Bools]], X: Floats, F: Ints, patch: Ints, names: Sequence[str]
-) -> None:
-    """Refuse a mirror plane that the surface crosses, or that one of its triangles lies in."""
-    near = NEAR * checks.bounding_size(X)
-    for plane, mask in planes:
+def checked_planes(
+    given: Any, X: Floats, F: Ints, patch: Ints, names: Sequence[str], topo: Topology, fixed: Bools
+) -> tuple[tuple[Plane, Bools], ...]:
+    """The planes besides Π, each with the (n,) mask of the vertices that are given, or belong to it, too.
+
+    These are fixed vertices of the boundary on the plane and, of a mirror plane, all those of the boundary.
+    A mirror plane that the surface crosses, or that one of its triangles lies in, is refused.
+    """
+    near, planes = NEAR * bounding_size(X), list[tuple[Plane, Bools]]()
+    expected = "a mapping from Planes to vertices"
+    pairs: tuple[tuple[Plane, Bools], ...] = guide_masks("on_planes", given, len(X), Plane, expected)
+    for plane, mask in pairs:
+        height = plane.height(X)
+        there = topo.on_boundary & (np.abs(height) <= max(near, 1e-309))
+        mask |= there if plane.mirror else there & fixed
+        planes.append((plane, read_only(mask)))
         if not plane.mirror:
             continue
-        height = plane.height(X)
         sides = before, behind = int((height > near).sum()), int((height < -near).sum())
         if before and behind:
-            raise SurfaceError(
+            text = (
                 f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind;"
-                " keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out",
-                what="on_planes",
-                where=str(plane),
-                found=sides,
             )
+            text += " keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
+            raise SurfaceError(text, what="on_planes", where=str(plane), found=sides)
         refuse_in_mirror(plane, mask, F, patch, names)
+    return tuple(planes)
 
 
 def refuse_in_mirror(plane: Plane, mask: Bools, F: Ints, patch: Ints, names: Sequence[str]) -> None:
@@ -114,13 +204,41 @@ def refuse_in_mirror(plane: Plane, mask: Bools, F: Ints, patch: Ints, names: Seq
     flat = np.flatnonzero(mask[F].all(axis=1))
     if len(flat):
         name = names[patch[flat[0]]]
-        raise SurfaceError(
-            f"patch {name!r} lies in the {plane} (triangle {flat[0]}), so it is its own mirror image;"
-            " use a mirror plane that it does not lie in, or model the whole",
-            what="on_planes",
-            where=name,
-            found=int(flat[0]),
-        )
+        text = f"patch {name!r} lies in the {plane} (triangle {flat[0]}), so it is its own mirror image;"
+        text += " use a mirror plane that it does not lie in, or model the whole"
+        raise SurfaceError(text, what="on_planes", where=name, found=int(flat[0]))
+
+
+def mirror_edges(planes: Sequence[tuple[Plane, Bools]], topo: Topology) -> Bools:
+    """(e,) edges of one triangle that lie in a mirror plane."""
+    inside = [mask[topo.edges].all(axis=1) for plane, mask in planes if plane.mirror]
+    return topo.boundary_edge & np.any([np.zeros(len(topo.edges), dtype=bool), *inside], axis=0)
+
+
+def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Floats:
+    """Leave of vectors (n,3) at vertices in mirror planes the part along all of these, in place.
+
+    Of the whole surface the sum over the images of a vector is this part, times their number.
+    """
+    mirrors = [(plane, mask) for plane, mask in planes if plane.mirror]
+    for inside, rows in _by_planes(mirrors, members(mirrors, len(vectors))):
+        _, sizes, directions = np.linalg.svd([plane.normal for plane in inside], full_matrices=False)
+        across = directions[sizes > FLAT]
+        vectors[rows] -= vectors[rows] @ across.T @ across
+    return vectors
+
+
+def uncancelled_pressures(topo: Topology, pressure: Floats, masks: Sequence[Bools]) -> Floats:
+    """(e,) the sum of the pressures at each edge that is not held, force/area.
+
+    A triangle's pressure (m,) counts with the sense in which the triangle runs along the edge. An edge is
+    held if one of the (n,) ``masks`` has both its ends. Where all sums are zero, no force depends on the
+    point that volumes are seen from.
+    """
+    left = np.bincount(topo.edge_of_face.ravel(), (pressure[:, None] * topo.sense).ravel(), len(topo.edges))
+    held = np.any([mask[topo.edges].all(axis=1) for mask in masks], axis=0)
+    rounding = 1e-12 * np.abs(pressure).max(initial=0.0)
+    return np.where(held | (np.abs(left) <= rounding), 0.0, left)
 
 
 def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
@@ -141,85 +259,31 @@ def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
     return point
 
 
-def mirror_edges(planes: Sequence[tuple[Plane, Bools]], topo: Topology) -> Bools:
-    """(e,) edges of one triangle that lie in a mirror plane."""
-    inside = np.zeros(len(topo.edges), dtype=bool)
-    for plane, mask in planes:
-        if plane.mirror:
-            inside |= mask[topo.edges].all(axis=1)
-    return topo.boundary_edge & inside
-
-
-def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Floats:
-    """Leave of vectors (n,3) at vertices in mirror planes the part along all of these, in place.
-
-    Of the whole surface the sum over the images of a vector is this part, times their number.
-    """
-    mirrors = [(plane, mask) for plane, mask in planes if plane.mirror]
-    if not mirrors:
-        return vectors
-    on = np.array([mask for _, mask in mirrors])
-    some = np.flatnonzero(on.any(axis=0))
-    for pattern in np.unique(on[:, some], axis=1).T:
-        here = some[(on[:, some] == pattern[:, None]).all(axis=0)]
-        normals = np.array([plane.normal for (plane, _), used in zip(mirrors, pattern, strict=True) if used])
-        _, sizes, directions = np.linalg.svd(normals, full_matrices=False)
-        across = directions[sizes > FLAT]
-        vectors[here] -= vectors[here] @ across.T @ across
-    return vectors
-
-
-def guides_and_points(
-    planes: Sequence[tuple[Plane, Bools]], fixed: Bools, lines: Sequence[tuple[Guide, Bools]]
-) -> tuple[list[tuple[Guide, Bools]], Bools]:
-    """Lines that vertices on two planes slide along, and (n,) the vertices that cannot move at all.
-
-    ``lines`` are those given, each with its vertices; those of them that also lie on a plane keep their line
-    if it lies in the plane, and cannot move otherwise. The vertices of three planes that meet in a point
-    cannot move. Returned are all lines, the given ones first.
-    """
-    on = np.array([mask for _, mask in planes]).reshape(len(planes), len(fixed))
-    guided = np.zeros(len(fixed), dtype=bool)
-    held = np.zeros(len(fixed), dtype=bool)
-    kept: list[tuple[Guide, Bools]] = []
-    for guide, along in lines:
-        guided |= along
-        leaves = np.zeros(len(fixed), dtype=bool)
-        for (plane, _), mask in zip(planes, on, strict=True):
-            if not _lies_in(guide, plane):
-                leaves |= along & mask
-        held |= leaves
-        kept.append((guide, along & ~leaves))
-    several = np.flatnonzero((on.sum(axis=0) > 1) & ~fixed & ~guided)
-    for pattern in np.unique(on[:, several], axis=1).T:
-        chosen = several[(on[:, several] == pattern[:, None]).all(axis=0)]
-        meeting = [plane for (plane, _), used in zip(planes, pattern, strict=True) if used]
-        direction = _common_direction(meeting, int(chosen[0]))
-        along = np.zeros(len(fixed), dtype=bool)
-        along[chosen] = True
-        if direction is None:
-            held |= along
-        elif direction.any():
-            kept.append((Line(_common_point(meeting), tuple(direction.tolist())), along))
-    return kept, held
+def _by_planes(planes: Sequence[tuple[Plane, Bools]], chosen: Bools) -> Iterator[tuple[list[Plane], Ints]]:
+    """The chosen vertices (n,) by the planes that they lie on."""
+    rows = np.flatnonzero(chosen)
+    if not len(rows):
+        return
+    on = np.array([mask[rows] for _, mask in planes])
+    for pattern in np.unique(on, axis=1).T:
+        used = [plane for (plane, _), there in zip(planes, pattern, strict=True) if there]
+        yield used, rows[(on == pattern[:, None]).all(axis=0)]
 
 
 def _lies_in(guide: Guide, plane: Plane) -> bool:
     """Whether a line or circle through a point of the plane stays in it."""
-    normal = np.array(plane.normal)
     if isinstance(guide, Circle):
-        return bool(np.linalg.norm(np.cross(guide.normal, normal)) <= FLAT)
-    return bool(abs(np.array(guide.direction) @ normal) <= FLAT)
+        return bool(np.linalg.norm(np.cross(guide.normal, plane.normal)) <= FLAT)
+    return bool(abs(np.dot(guide.direction, plane.normal)) <= FLAT)
 
 
 def _common_direction(planes: Sequence[Plane], vertex: int) -> Floats | None:
     """(3,) the direction within all planes; zero for one plane given several times, None for a point."""
-    normals = np.array([plane.normal for plane in planes])
-    _, sizes, directions = np.linalg.svd(normals)
+    _, sizes, directions = np.linalg.svd([plane.normal for plane in planes])
     rank = int((sizes > FLAT).sum())
-    gap = normals @ np.array(_common_point(planes)) - _offsets(planes)
+    gaps = [float(plane.height(_common_point(planes))) for plane in planes]
     scale = 1.0 + float(np.abs([plane.point for plane in planes]).max())
-    if np.abs(gap).max() > FLAT * scale:
+    if np.abs(gaps).max() > FLAT * scale:
         names = ", ".join(map(str, planes))
         message = f"on_planes: vertex {vertex} slides on planes that do not meet: {names}; remove it from one"
         raise SurfaceError(message, what="on_planes", where=vertex, found=names)
@@ -230,10 +294,6 @@ def _common_direction(planes: Sequence[Plane], vertex: int) -> Floats | None:
 
 def _common_point(planes: Sequence[Plane]) -> tuple[float, float, float]:
     """The point of all planes that is nearest to the origin, in the least squares."""
-    normals = np.array([plane.normal for plane in planes])
-    x, y, z = np.linalg.lstsq(normals, _offsets(planes), rcond=FLAT)[0].tolist()
+    offsets = [np.dot(plane.normal, plane.point) for plane in planes]
+    x, y, z = np.linalg.lstsq([plane.normal for plane in planes], offsets, rcond=FLAT)[0].tolist()
     return x, y, z
-
-
-def _offsets(planes: Sequence[Plane]) -> Floats:
-    return np.array([np.dot(plane.normal, plane.point) for plane in planes])

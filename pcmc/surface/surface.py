@@ -14,33 +14,31 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
-from ..curves.plane import Plane
-from . import checks, supports
-from .cable import Cable, CableEdges, cable_edges
-from .checked import check_planes, checked_parts
-from .circle import Circle, Guide
-from .geometry import bounding_size
+from ..curves.guides import Circle, Guide, Plane
+from . import checks
+from .checked import checked_parts
+from .geometry import FAR, bounding_size
 from .held_curve import EdgesOnCurves, HeldCurve, followed
-from .origin import uncancelled_pressures, volume_origin
-from .patch import Patch
-from .room import Room, room_signs
+from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
 from .summary import summary
+from .supports import (
+    Admissible,
+    Supports,
+    check_on,
+    checked_lines,
+    common_point,
+    members,
+    mirror_edges,
+    uncancelled_pressures,
+)
 from .topology import Topology, topology
 from .values import wall_changes, with_values
 from .walls import wall_patches
 
-MESH = ("vertices", "faces", "patch_of_face", "patches")
 PARTS = (
-    *MESH,
-    "fixed",
-    "on_plane",
-    "plane",
-    "on_line",
-    "on_planes",
-    "cables",
-    "rooms",
-    "curves",
-)  # that are given
+    *("vertices", "faces", "patch_of_face", "patches"),
+    *("fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "curves"),
+)
 FIELDS = (*PARTS, "given_supports")
 GROUND = Plane()
 
@@ -85,7 +83,8 @@ class Surface:
     Attributes
     ----------
     given_supports : ``fixed``, ``on_plane`` and ``on_line`` as given. Those of the surface also count the
-        vertices that cannot move, or along a line only, because they slide on several planes.
+        vertices that cannot move, or along a line only, because they slide on several planes; and ``fixed``
+        those on lines.
 
     Raises
     ------
@@ -112,10 +111,10 @@ class Surface:
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
     curves: tuple[HeldCurve, ...] = ()
-    given_supports: supports.Supports = field(init=False, repr=False)
+    given_supports: Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        vars(self).update(checked_parts(**{name: getattr(self, name) for name in PARTS}))
+        vars(self).update(checked_parts({name: getattr(self, name) for name in PARTS}))
         self._warn_if_free(stacklevel=4)
 
     def _warn_if_free(self, stacklevel: int) -> None:
@@ -158,12 +157,19 @@ class Surface:
         """(3,) the point that volumes are seen from: that of Π, or one near a surface far from it.
 
         Forces do not change with it as long as the pressures cancel along all edges that are not held; where
-        they do not cancel, the origin stays the point of Π.
+        they do not cancel, the origin stays the point of Π. Far from that point, as in survey coordinates,
+        volumes would lose their digits. There the origin is the point of Π below the middle of the surface;
+        or the middle itself, if that is far above Π and nothing slides there. It is moved along Π to lie on
+        as many of the other planes as possible: these then add nothing to volumes (``flat_pieces``).
         """
+        point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
         if self.uncancelled.any():
-            return np.array(self.plane.point)
+            return point
+        if np.linalg.norm(middle - point) > FAR * self.size:
+            low = abs(self.plane.height(middle)) <= FAR * self.size
+            point = self.plane.nearest(middle) if low or self.given_supports.on_plane.any() else middle
         planes = [self.plane, *(plane for plane, _ in self.on_planes)]
-        return volume_origin(self.vertices, self.size, planes, bool(self.given_supports.on_plane.any()))
+        return common_point(point, planes) if self.on_planes else point
 
     @cached_property
     def edges_on_curves(self) -> EdgesOnCurves:
@@ -184,7 +190,12 @@ class Surface:
     @cached_array
     def mirror_edge(self) -> Bools:
         """(e,) edges of the boundary in a mirror plane, where the surface goes on behind it."""
-        return supports.mirror_edges(self.on_planes, self.topology)
+        return mirror_edges(self.on_planes, self.topology)
+
+    @cached_property
+    def meeting_lines(self) -> tuple[tuple[Guide, Bools], ...]:
+        """The lines of ``on_line`` that were not given: there two planes meet."""
+        return self.on_line[len(self.given_supports.on_line) :]
 
     @cached_array
     def pinned(self) -> Bools:
@@ -192,24 +203,56 @@ class Surface:
 
         These are the ``fixed`` ones but for those that slide along the line where two planes meet.
         """
-        pinned = self.fixed.copy()
-        for _, along in self.meeting_lines:
-            pinned &= ~along
-        return pinned
+        return self.fixed & ~members(self.meeting_lines, self.n)
 
     @cached_array
     def on_ground(self) -> Bools:
         """(n,) vertices that slide on Π, also those on another plane, which slide along the common line."""
-        sliding = self.on_plane.copy()
-        for _, along in self.meeting_lines:
-            sliding |= along & self.given_supports.on_plane
-        return sliding
+        return self.on_plane | (members(self.meeting_lines, self.n) & self.given_supports.on_plane)
 
     @cached_property
-    def meeting_lines(self) -> tuple[tuple[Guide, Bools], ...]:
-        """The lines of ``on_line`` that were not given: there two planes meet."""
-        given = [line for line, _ in self.given_supports.on_line]
-        return tuple(pair for pair in self.on_line if all(pair[0] is not line for line in given))
+    def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
+        """The planes that vertices slide on, Π first, each with the (n,) mask of those on it alone."""
+        others = ((plane, read_only(mask & ~self.fixed)) for plane, mask in self.on_planes)
+        return tuple((p, mask) for p, mask in ((self.plane, self.on_plane), *others) if mask.any())
+
+    @cached_array
+    def held(self) -> Bools:
+        """(n,) vertices that some support holds: fixed, or sliding on a plane, line or circle."""
+        return self.fixed | self.on_plane | members(self.on_planes, self.n)
+
+    @property
+    def free(self) -> Bools:
+        """(n,) vertices that no support holds at all."""
+        return ~self.held
+
+    @property
+    def on_circle(self) -> tuple[tuple[Circle, Bools], ...]:
+        """The part of ``on_line`` that is round."""
+        return tuple((line, along) for line, along in self.on_line if isinstance(line, Circle))
+
+    @cached_property
+    def admissible(self) -> Admissible:
+        """The directions in which the supports let each vertex move, where it is now."""
+        return Admissible.of(self.fixed, self.sliding, self.on_line, self.vertices)
+
+    def admissible_at(self, X: Floats) -> Admissible:
+        """The same with the vertices at X (n,3): only along circles do the directions change."""
+        return Admissible.of(self.fixed, self.sliding, self.on_line, X) if self.on_circle else self.admissible
+
+    @cached_array
+    def support_columns(self) -> Bools:
+        """(n,c) whether a vertex is fixed, slides on Π, on each of ``on_planes``, along each given line."""
+        given, others = self.given_supports, (*self.on_planes, *self.given_supports.on_line)
+        return np.stack([*given.fixed_and_sliding(), *(mask for _, mask in others)], axis=1)
+
+    def with_mesh(self, columns: Bools, **changes: Any) -> Surface:
+        """``rebuilt`` on another mesh, with its ``support_columns`` (n,c)."""
+        fixed, sliding, *others = np.ascontiguousarray(columns.T)
+        lines, split = self.given_supports.on_line, len(self.on_planes)
+        on_planes = [(plane, mask) for (plane, _), mask in zip(self.on_planes, others[:split], strict=True)]
+        on_line = [(line, mask) for (line, _), mask in zip(lines, others[split:], strict=True)]
+        return self.rebuilt(fixed=fixed, on_plane=sliding, on_planes=on_planes, on_line=on_line, **changes)
 
     @cached_array
     def auxiliary(self) -> Bools:
@@ -256,34 +299,10 @@ class Surface:
         """The edges that carry a line tension, and how much."""
         return cable_edges(self.cables)
 
-    @cached_property
-    def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
-        """The planes that vertices slide on, Π first, each with the (n,) mask of those on it alone."""
-        others = ((plane, read_only(mask & ~self.fixed)) for plane, mask in self.on_planes)
-        return tuple((p, mask) for p, mask in ((self.plane, self.on_plane), *others) if mask.any())
-
-    @cached_array
-    def held(self) -> Bools:
-        """(n,) vertices that some support holds: fixed, or sliding on a plane, line or circle."""
-        held = self.fixed | self.on_plane
-        for _, mask in self.on_planes:
-            held = held | mask
-        return held
-
-    @property
-    def free(self) -> Bools:
-        """(n,) vertices that no support holds at all."""
-        return ~self.held
-
     @cached_array
     def room_signs(self) -> Floats:
         """(r,k) 1 or -1 where a patch bounds a room, by the sense of its normal; 0 elsewhere."""
         return room_signs(self.rooms, [patch.name for patch in self.patches])
-
-    @property
-    def on_circle(self) -> tuple[tuple[Circle, Bools], ...]:
-        """The part of ``on_line`` that is round."""
-        return tuple((line, along) for line, along in self.on_line if isinstance(line, Circle))
 
     def patch_index(self, name: str) -> int:
         """Index of the patch called ``name``."""
@@ -304,20 +323,8 @@ class Surface:
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
-        check_planes(X, self.plane, self.on_plane, self.on_planes, self.size)
-        checks.on_lines(self.on_line, X)
+        check_on(((self.plane, self.on_plane), *self.on_planes, *self.on_line), X, self.size)
         return self._with(vertices=read_only(X))
-
-    def _curves_of(self, given: Mapping[str, Any]) -> tuple[HeldCurve, ...]:
-        """The curves with other vertices and supports, along the edges that stay fixed."""
-        X = checks.positions(given["vertices"])
-        if len(X) != self.n:
-            text = "curves: the vertices are others; give their curves, too, or curves=() to drop them"
-            raise SurfaceError(text, what="curves", found=len(X), expected=self.n)
-        held, edges = followed(self.curves, X, bounding_size(X)), self.topology.edges
-        fixed, lines = checks.mask(given["fixed"], self.n, "fixed"), checks.on_line(given["on_line"], X)
-        stay = np.all(supports.Supports(fixed, fixed, tuple(lines)).stays[edges], axis=1)
-        return EdgesOnCurves.of(held, self.topology)[stay].joined(edges[stay])
 
     def onto_supports(self, X: Floats) -> Floats:
         """X (n,3) with fixed vertices where they are, and sliding ones put on their plane, line or circle.
@@ -353,10 +360,18 @@ class Surface:
         ([[0, 2, 1]], np.True_)
         """
         given = {name: getattr(self, name) for name in PARTS} | self.given_supports._asdict() | changes
-        if self.curves and "curves" not in changes:
-            given["curves"] = self._curves_of(given)
+        if self.curves and "curves" not in changes:  # along the edges that stay fixed
+            X = checks.positions(given["vertices"])
+            if len(X) != self.n:
+                text = "curves: the vertices are others; give their curves, too, or curves=() to drop them"
+                raise SurfaceError(text, what="curves", found=len(X), expected=self.n)
+            held, edges = followed(self.curves, X, bounding_size(X)), self.topology.edges
+            fixed = checks.mask(given["fixed"], self.n, "fixed")
+            fixed &= ~members(checked_lines(given["on_line"], X), self.n)
+            stay = np.all(fixed[edges], axis=1)
+            given["curves"] = EdgesOnCurves.of(held, self.topology)[stay].joined(edges[stay])
         made = object.__new__(Surface)
-        vars(made).update(given | checked_parts(**given))
+        vars(made).update(given | checked_parts(given))
         if self.held.any() or self.rooms:
             made._warn_if_free(stacklevel=3)
         return made

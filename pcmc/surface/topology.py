@@ -10,34 +10,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.arrays import Bools, Ints, cached_array, read_only
 from ..base.compiled import compiled
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array  # at run time where it is needed: many surfaces never ask
-
 SHEET, CURVE, POINT = 0, 1, 2
+SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle's sides, in the order of the corners opposite
 FEW = 32  # sides in a bucket up to which sorting by insertion is fastest
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A chain of curve edges between two points, or a closed loop.
+    """A chain of curve edges between two points, or a closed loop."""
 
-    Attributes
-    ----------
-    vertices : (k,) int array, in order along the curve (first is not repeated when closed).
-    closed : whether the last vertex is joined to the first.
-    sheets : names' indices of the patches that meet along the curve, ascending.
-    """
-
-    vertices: Ints
-    closed: bool
-    sheets: tuple[int, ...]
+    vertices: Ints  # (k,) in order along the curve; the first is not repeated when closed
+    closed: bool  # whether the last vertex is joined to the first
+    sheets: tuple[int, ...]  # the patches that meet along the curve, ascending
 
     @property
     def pairs(self) -> Ints:
@@ -48,21 +38,14 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Edges of a triangle mesh that may branch.
-
-    Attributes
-    ----------
-    edges : (e,2) int array, each row ascending, rows in lexicographic order.
-    edge_of_face : (m,3) int array; entry (f,k) is the edge opposite corner k of face f.
-    valence : (e,) int array, the number of triangles at each edge.
-    """
+    """Edges of a triangle mesh that may branch."""
 
     faces: Ints
     patch_of_face: Ints
     vertex_count: int
-    edges: Ints
-    edge_of_face: Ints
-    valence: Ints
+    edges: Ints  # (e,2) each row ascending, rows in lexicographic order
+    edge_of_face: Ints  # (m,3) entry (f,k) is the edge opposite corner k of face f
+    valence: Ints  # (e,) the number of triangles at each edge
 
     def __post_init__(self) -> None:
         for array in (self.edges, self.edge_of_face, self.valence):
@@ -86,7 +69,7 @@ class Topology:
 
         1 within a sheet and along curves, 2 where two sheets only touch, 0 for a vertex without triangles.
         """
-        count: Ints = fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
+        count: Ints = _fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
         return count
 
     @cached_array
@@ -119,15 +102,21 @@ class Topology:
         """(n,) int: SHEET, CURVE or POINT."""
         return vertex_kind(self.edges[self.curve_edge], self.vertex_count)
 
+    def _ends_of(self, edges: Bools) -> Bools:
+        """(n,) the vertices of edges (e,)."""
+        mask = np.zeros(self.vertex_count, dtype=bool)
+        mask[self.edges[edges]] = True
+        return mask
+
     @cached_array
     def on_boundary(self) -> Bools:
         """(n,) bool: vertices of a boundary edge."""
-        return _touched(self.edges[self.boundary_edge], self.vertex_count)
+        return self._ends_of(self.boundary_edge)
 
     @cached_array
     def on_junction(self) -> Bools:
         """(n,) bool: vertices of a junction or seam edge."""
-        return _touched(self.edges[self.junction_edge | self.seam_edge], self.vertex_count)
+        return self._ends_of(self.junction_edge | self.seam_edge)
 
     @cached_array
     def interior(self) -> Bools:
@@ -150,13 +139,7 @@ class Topology:
 
     def edge_numbers(self, ends: Ints) -> Ints:
         """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
-        if not len(self.edges):
-            return np.full(len(ends), -1)
-        weights = np.array([self.vertex_count, 1])
-        keys = self.edges.astype(np.int64) @ weights
-        wanted = np.sort(ends, axis=1).astype(np.int64) @ weights
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        return np.asarray(np.where(keys[place] == wanted, place, -1))
+        return edge_places(ends, self.edges)
 
     def chains(self, ends: Ints, stop: Bools) -> tuple[Curve, ...]:
         """The curves that edges (k,2) form, cut where they branch and at the vertices ``stop`` (n,)."""
@@ -170,22 +153,13 @@ class Topology:
         return components(self.edges, self.vertex_count)
 
     def _curves(self, mask: Bools, stop: Bools) -> tuple[Curve, ...]:
-        chosen = np.flatnonzero(mask)
-        sheets = self._sheets_of_edges(chosen)
+        sides = np.flatnonzero(mask[self.edge_of_face.ravel()])
+        sides = sides[np.argsort(self.edge_of_face.ravel()[sides], kind="stable")]
+        parts = np.split(self.patch_of_face[sides // 3], np.cumsum(self.valence[mask])[:-1])
         return tuple(
-            Curve(vertices, closed, sheets[edge])
-            for vertices, closed, edge in joined(self.edges[chosen], stop, self.vertex_count)
+            Curve(vertices, closed, tuple(sorted(parts[edge].tolist())))
+            for vertices, closed, edge in joined(self.edges[mask], stop, self.vertex_count)
         )
-
-    def _sheets_of_edges(self, chosen: Ints) -> list[tuple[int, ...]]:
-        wanted = np.zeros(len(self.edges), dtype=bool)
-        wanted[chosen] = True
-        flat = self.edge_of_face.ravel()
-        hit = np.flatnonzero(wanted[flat])
-        order = np.argsort(flat[hit], kind="stable")
-        patch = self.patch_of_face[hit[order] // 3]
-        starts = np.cumsum(self.valence[chosen])[:-1]
-        return [tuple(sorted(map(int, part))) for part in np.split(patch, starts)]
 
 
 def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
@@ -201,6 +175,25 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence)
 
 
+def edge_places(wanted: Ints, edges: Ints) -> Ints:
+    """(…) the row of ``edges`` (e,2) that joins the vertices of each pair ``wanted`` (…,2); -1 for none.
+
+    >>> edge_places(np.array([[7, 3], [3, 4]]), np.array([[5, 3], [3, 7]])).tolist()
+    [1, -1]
+    """
+    if not len(edges):
+        return np.full(wanted.shape[:-1], -1)
+    width = 1 + max(int(wanted.max(initial=0)), int(edges.max()))
+    keys, sought = (
+        np.minimum(pair[..., 0], pair[..., 1]).astype(np.int64) * width
+        + np.maximum(pair[..., 0], pair[..., 1])
+        for pair in (edges, wanted)
+    )
+    order = np.argsort(keys, kind="stable")
+    place = order[np.minimum(np.searchsorted(keys, sought, sorter=order), len(keys) - 1)]
+    return np.asarray(np.where(keys[place] == sought, place, -1))
+
+
 def joined(pairs: Ints, stop: Bools, vertex_count: int) -> Iterator[tuple[Ints, bool, int]]:
     """Pairs (k,2) of vertices joined to curves that end at the vertices ``stop`` (n,).
 
@@ -211,21 +204,27 @@ def joined(pairs: Ints, stop: Bools, vertex_count: int) -> Iterator[tuple[Ints, 
     >>> [(vertices.tolist(), closed) for vertices, closed, _ in curves]
     [([1, 2], False), ([5, 3, 9], False)]
     """
+    from scipy.sparse import coo_array  # here, as many surfaces never ask
     from scipy.sparse.csgraph import depth_first_order
 
     if not len(pairs):
         return
-    split, original = _split_at(pairs, stop, vertex_count)
+    # each edge end at a stopping vertex gets a vertex of its own, so that chains end there
+    split = pairs.astype(np.int64)
+    ends = stop[split]
+    original = np.concatenate([np.arange(vertex_count), split[ends]])
     count = len(original)
+    split[ends] = np.arange(vertex_count, count)
     label = components(split, count)
     degree = np.bincount(split.ravel(), minlength=count)
     members = np.flatnonzero(degree)
     members = members[np.lexsort((degree[members] != 1, label[members]))]  # part by part, its ends first
     starts = members[np.unique(label[members], return_index=True)[1]]
     # one search for all parts, from a vertex more that leads to the start of each
-    links = np.stack([np.full(len(starts), count), starts], axis=1)
-    graph = _adjacency(np.concatenate([split, links]), count + 1)
-    order = depth_first_order(graph, count, directed=False)[0][1:]
+    links = np.concatenate([split, np.stack([np.full(len(starts), count), starts], axis=1)])
+    weights = np.arange(1, len(links) + 1)
+    half = coo_array((weights, links.T), shape=(count + 1, count + 1))
+    order = depth_first_order(half + half.T, count, directed=False)[0][1:]
     order = order[np.argsort(label[order], kind="stable")]
     parts, first_edge = np.unique(label[split[:, 0]], return_index=True)
     pieces = np.split(original[order], np.searchsorted(label[order], parts)[1:])
@@ -249,6 +248,16 @@ def components(edges: Ints, vertex_count: int) -> Ints:
     return label
 
 
+def one_sided_copies(one: Ints, other: Ints, turned: Bools, count: int) -> Ints:
+    """(2 count,) labels of the sides of faces, where pairs of neighbours (k,) share theirs.
+
+    Face f has the sides f, as it is, and f + ``count``, turned over. Those of two neighbours are one, or
+    the opposite ones where they are ``turned`` (k,) against each other.
+    """
+    second = np.append(other + turned * count, other + ~turned * count)
+    return components(np.stack([np.append(one, one + count), second], axis=1), 2 * count)
+
+
 def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
     """The vertices (c,) with exactly two links, and their two neighbours (c,2).
 
@@ -264,30 +273,6 @@ def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
     curve = np.flatnonzero(vertex_kind(here, vertex_count) == CURVE)
     first = np.searchsorted(here, curve)
     return curve, np.stack([there[first], there[first + 1]], axis=1)
-
-
-def _touched(edges: Ints, vertex_count: int) -> Bools:
-    mask = np.zeros(vertex_count, dtype=bool)
-    mask[edges.ravel()] = True
-    return mask
-
-
-def _adjacency(edges: Ints, vertex_count: int) -> csr_array:
-    from scipy.sparse import coo_array, csr_array
-
-    rows, columns = edges[:, 0], edges[:, 1]
-    index = np.arange(1, len(edges) + 1)
-    half = coo_array((index, (rows, columns)), shape=(vertex_count, vertex_count))
-    return csr_array(half + half.T)
-
-
-def _split_at(pairs: Ints, stop: Bools, vertex_count: int) -> tuple[Ints, Ints]:
-    """Give each edge end at a stopping vertex a vertex of its own, so that chains end there."""
-    flat = pairs.astype(np.int64).ravel()
-    ends = np.flatnonzero(stop[flat])
-    original = np.concatenate([np.arange(vertex_count), flat[ends]])
-    flat[ends] = vertex_count + np.arange(len(ends))
-    return flat.reshape(-1, 2), original
 
 
 @compiled
@@ -327,8 +312,7 @@ def _one_way(F: Ints, edge_of_face: Ints, valence: Ints) -> Bools:
 
 
 @compiled
-def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
-    """(n,) the number of fans of triangles around each vertex that share no edge there."""
+def _fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
     parent = np.arange(2 * len(edges)).astype(np.int32)  # node 2 e + s is the end edges[e, s] of edge e
     for f in range(len(F)):
         for c in range(3):
@@ -361,7 +345,7 @@ def _number_edges(F: Ints, n: int) -> tuple[Ints, Ints, Ints]:
             low, high = min(F[f, k - 1], F[f, k - 2]), max(F[f, k - 1], F[f, k - 2])
             at = first[low + 1]
             higher[at], place[at] = high, 3 * f + k
-            first[low + 1] = at + 1  # in the end the buckets of vertex v start at first[v]
+            first[low + 1] = at + 1  # in the end the bucket of vertex v starts at first[v]
     edges, valence = np.empty((3 * len(F), 2), dtype=np.int32), np.zeros(3 * len(F), dtype=np.int32)
     edge_of_face = np.empty(3 * len(F), dtype=np.int32)
     count = 0

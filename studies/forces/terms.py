@@ -12,9 +12,10 @@ import pcmc
 from generators import hypar_roof, schwarz_p
 from pcmc import Surface, room_volumes
 from pcmc.base.arrays import Floats
-from pcmc.forces.functional import apply_supports, energy_and_gradient, energy_at
+from pcmc.forces.functional import energy_and_gradient, energy_at
 from pcmc.forces.rooms import room_pressures, with_room_pressures
 from pcmc.forces.second_variation import hessian
+from pcmc.surface.supports import apply_supports
 
 from ..gallery.surfaces import bound
 from ..reference import evolver

@@ -16,7 +16,7 @@ import numpy as np
 
 import pcmc
 from pcmc.base.arrays import Floats
-from pcmc.forces.functional import apply_supports
+from pcmc.surface.supports import apply_supports
 
 PROGRAM = "evolver"
 

@@ -10,7 +10,7 @@ import tomlkit
 from drawn import drawing
 
 from pcmc import cli, project
-from pcmc.advice.masts import point_masts, with_rings
+from pcmc.advice.supports import point_masts, with_rings
 from pcmc.base.errors import FileWarning, PlanWarning
 from pcmc.plan import Plan
 
@@ -75,7 +75,7 @@ def test_supports_on_lines_are_no_point_masts():
         edge_length=1,
     )
     (mast,) = point_masts(plan)
-    assert (mast.number, mast.room) == (3, 2.0)
+    assert (mast.number, mast.clearance) == (3, 2.0)
     ringed = with_rings(plan, [mast], 0.25)
     assert len(ringed.supports) == 4
     assert ringed.holes[-1].curve.length == pytest.approx(3.14159, rel=1e-3)

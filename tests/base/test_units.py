@@ -16,7 +16,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning, LostWarning, OptionError
 from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor
-from pcmc.io.scaling import scaled, scaled_surface
+from pcmc.io.mesh_data import scaled, scaled_surface
 from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
 from pcmc.surface import Room

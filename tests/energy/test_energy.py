@@ -7,14 +7,8 @@ import pytest
 from shapes import cap, generic, octahedron, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, hessian
-from pcmc.forces.functional import (
-    apply_supports,
-    energy_and_gradient,
-    energy_at,
-    patch_areas,
-    patch_volumes,
-    volume,
-)
+from pcmc.forces.functional import energy_and_gradient, energy_at, patch_areas, patch_volumes, volume
+from pcmc.surface.supports import apply_supports
 from pcmc.surface.topology import POINT
 
 

@@ -6,7 +6,7 @@ from tents import tent
 
 import pcmc
 from generators import four_fans, two_caps, two_squares
-from pcmc.forces.functional import apply_supports
+from pcmc.surface.supports import apply_supports
 from studies.reference import evolver
 
 pytestmark = pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")

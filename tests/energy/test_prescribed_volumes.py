@@ -23,7 +23,7 @@ from pcmc.forces.rooms import (
     with_room_pressures,
 )
 from pcmc.stability.equilibrium import morse_index
-from pcmc.surface.mirroring import mirrored
+from pcmc.surface.symmetry import mirrored
 
 
 def arch() -> Surface:

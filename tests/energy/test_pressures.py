@@ -7,7 +7,8 @@ import pytest
 
 from generators import two_caps, two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, hessian
-from pcmc.forces.functional import apply_supports, energy_at, patch_areas, patch_volumes, volume
+from pcmc.forces.functional import energy_at, patch_areas, patch_volumes, volume
+from pcmc.surface.supports import apply_supports
 
 
 def rooms(wall: float) -> Surface:

@@ -17,7 +17,7 @@ from pcmc.existence.homotopy import Solves, attempt, raise_loads
 from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
 from pcmc.forces.rooms import room_pressures
-from pcmc.io.scaling import scaled_surface
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import PatchSpec, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of

@@ -17,7 +17,7 @@ import pcmc
 from pcmc import cli
 from pcmc.base import child_script
 from pcmc.base.errors import FileError, FileWarning
-from pcmc.io import reading_process
+from pcmc.io import libraries
 from tests.io.test_io_foreign import X, expected
 
 pytest.importorskip("pyvista")
@@ -326,21 +326,21 @@ def test_a_reader_that_dies_is_an_error_and_the_next_file_is_read(tmp_path, monk
     pcmc.write(tmp_path / "a.vtp", expected())
     dying = "import sys; sys.stdin.buffer.read(100); sys.exit(3)"
     real = child_script.__file__
-    monkeypatch.setattr(reading_process, "_processes", {})
+    monkeypatch.setattr(libraries, "_processes", {})
     (tmp_path / "dying.py").write_text(dying, encoding="utf-8")
     monkeypatch.setattr(child_script, "__file__", str(tmp_path / "dying.py"))
     with pytest.raises(FileError, match=r"it ends its reader, code"):
         pcmc.read(tmp_path / "a.vtp")
     monkeypatch.setattr(child_script, "__file__", real)
     assert pcmc.read(tmp_path / "a.vtp").m == 4
-    for process in reading_process._processes.values():
+    for process in libraries._processes.values():
         process.close()
 
 
 def test_a_reader_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
     pcmc.write(tmp_path / "a.3dm", expected())
-    monkeypatch.setattr(reading_process, "_processes", {})
-    monkeypatch.setattr(reading_process, "SECONDS", 0.2)
+    monkeypatch.setattr(libraries, "_processes", {})
+    monkeypatch.setattr(libraries, "SECONDS", 0.2)
     (tmp_path / "slow.py").write_text("import time; time.sleep(600)", encoding="utf-8")
     monkeypatch.setattr(child_script, "__file__", str(tmp_path / "slow.py"))
     with pytest.raises(FileError, match="stopped after"):

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import pcmc
 from pcmc.base.errors import CurveWarning, FileError, SurfaceError
-from pcmc.curves.plane import Plane
+from pcmc.curves.guides import Plane
 from pcmc.meshing.held_curves import doubted_midpoints
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine

@@ -15,7 +15,7 @@ import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError
 from pcmc.curves.curve_data import curve_data
-from pcmc.io.reading_process import read_arrays
+from pcmc.io.libraries import read_arrays
 from pcmc.plan import plan_from
 from pcmc.plan.drawing import read_drawing
 from pcmc.plan.proposal import ROOM, least_tension, proposed

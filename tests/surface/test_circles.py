@@ -14,7 +14,7 @@ import pcmc
 from generators import three_patches
 from pcmc import Circle, Patch, Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.forces.functional import apply_supports, energy_and_gradient, energy_at, onto_circles
+from pcmc.forces.functional import energy_and_gradient, energy_at
 from pcmc.forces.jacobian import linearise
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pattern import hessian_pattern
@@ -23,6 +23,7 @@ from pcmc.forces.second_variation import assemble, hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
+from pcmc.surface.supports import apply_supports, onto_circles
 
 NEAR, FAR = 3.0, 2.0  # distances of the two held edges from the axis
 FLIP = NEAR / (NEAR - 1.0) * (FAR + 1.0) / FAR  # tension of the second film at which the first gives way

@@ -13,12 +13,13 @@ import pcmc
 from generators import two_squares
 from pcmc import Line, Patch, Surface, certify, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.forces.functional import apply_supports, energy_and_gradient, energy_at
+from pcmc.forces.functional import energy_and_gradient, energy_at
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
+from pcmc.surface.supports import apply_supports
 from tests.energy.test_linearise import slope
 
 DEEP, BESIDE = 0.7, 0.2

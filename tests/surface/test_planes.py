@@ -14,13 +14,7 @@ from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import SurfaceError
 from pcmc.certificate.balance import unheld
 from pcmc.forces.flat_pieces import flat_pieces
-from pcmc.forces.functional import (
-    apply_supports,
-    energy_and_gradient,
-    energy_at,
-    patch_volumes,
-    weighted,
-)
+from pcmc.forces.functional import energy_and_gradient, energy_at, patch_volumes, weighted
 from pcmc.forces.jacobian import linearise
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pattern import hessian_pattern
@@ -29,6 +23,7 @@ from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
 from pcmc.surface.geometry import vertex_area_vectors
+from pcmc.surface.supports import apply_supports
 from studies.reference import evolver
 
 TOP = Plane((0, 0, 2), (0, 0, 1), name="top")

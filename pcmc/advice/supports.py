@@ -1,4 +1,4 @@
-"""Single points that hold a roof inside its plan, and the rings that can stand for them.
+"""What holds a roof badly, and what does instead: rings for single points, cables for free edges.
 
 A membrane held at one point has a peak there that is as thin as its triangles: how high the forces are
 depends on the mesh, and on some meshes it comes to rest, on others not. A ring carries it on any mesh.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,30 +16,29 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats
 from ..curves.curves import Curve
 from ..plan import Divider, Hole, Plan
+from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, Line
+from .rises import Rise
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class Mast:
-    """A point inside the plan that holds the roof.
+    """A point inside the plan that holds the roof."""
 
-    Attributes
-    ----------
-    number : its place among the plan's supports.
-    point : (3,) in the coordinates of Π.
-    room : distance in plan to the nearest line or other point that is held.
-    """
-
-    number: int
-    point: Floats
-    room: float
+    number: int  # its place among the plan's supports
+    point: Floats  # (3,) in the coordinates of Π
+    clearance: float  # distance in plan to the nearest line or other point that is held
 
     @property
     def text(self) -> str:
         """The point as it is typed: [x, y, z]."""
         return f"[{', '.join(f'{value:.6g}' for value in self.point)}]"
+
+    def radius(self, share: float) -> float:
+        """The radius of a ring around it."""
+        return float(f"{share * self.clearance:.2g}")
 
 
 def point_masts(plan: Plan) -> list[Mast]:
@@ -46,41 +46,32 @@ def point_masts(plan: Plan) -> list[Mast]:
 
     >>> square = [[0, 0], [8, 0], [8, 8], [0, 8]]
     >>> tent = Plan(square, edge_length=1, tension=1.0, pressure=0.0, supports=[[0, 0], [4, 3, 2]])
-    >>> [(mast.text, mast.room) for mast in point_masts(tent)]
+    >>> [(mast.text, mast.clearance) for mast in point_masts(tent)]
     [('[4, 3, 2]', 3.0)]
     """
-    curves = [s for s in plan.supports if isinstance(s, Curve)]
+    given = {k: np.asarray(s, dtype=float) for k, s in enumerate(plan.supports) if not isinstance(s, Curve)}
+    if not given:
+        return []
     parts: Sequence[Hole | Divider] = (*plan.holes, *plan.dividers)
+    curves = [s for s in plan.supports if isinstance(s, Curve)]
     curves += [plan.outline, *(part.curve for part in parts)]
     lines = [Line("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in curves]
-    numbers = [k for k, support in enumerate(plan.supports) if not isinstance(support, Curve)]
-    if not numbers:
-        return []
-    spots = np.array([_on_plane(plan, plan.supports[k]) for k in numbers])
-    room = np.min([line.nearest(spots[:, :2])[1] for line in lines], axis=0)
-    inside = room > SNAP * plan.edge_length
-    if len(spots) > 1:
-        near, _ = cKDTree(spots[:, :2]).query(spots[:, :2], k=[2])
-        room = np.minimum(room, np.ravel(near))
-    found = zip(numbers, spots, room.tolist(), inside, strict=True)
-    return [Mast(number, spot, space) for number, spot, space, free in found if free]
-
-
-def _on_plane(plan: Plan, spot: Floats) -> Floats:
-    """(3,) a support in the coordinates of Π."""
-    return plan.plane.to_local(spot) if len(spot) == 3 else np.append(np.asarray(spot, dtype=float), 0.0)
+    points = np.array([plan.plane.to_local(p) if len(p) == 3 else np.append(p, 0.0) for p in given.values()])
+    away = np.min([line.nearest(points[:, :2])[1] for line in lines], axis=0)
+    inside = away > SNAP * plan.edge_length
+    if len(points) > 1:
+        near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
+        away = np.minimum(away, np.ravel(near))
+    found = zip(given, points, away.tolist(), inside, strict=True)
+    return [Mast(number, point, clearance) for number, point, clearance, free in found if free]
 
 
 def with_rings(plan: Plan, masts: Sequence[Mast], share: float) -> Plan:
     """The plan with a held ring around each point instead of the point."""
     left_out = {mast.number for mast in masts}
     supports = [s for k, s in enumerate(plan.supports) if k not in left_out]
-    rings = [
-        Hole(
-            {"circle": {"centre": mast.point.tolist(), "radius": _radius(mast, share)}}, name=f"mast {number}"
-        )
-        for number, mast in enumerate(masts, 1)
-    ]
+    circles = [{"circle": {"centre": mast.point.tolist(), "radius": mast.radius(share)}} for mast in masts]
+    rings = [Hole(circle, name=f"mast {number}") for number, circle in enumerate(circles, 1)]
     return replace(plan, supports=supports, holes=[*plan.holes, *rings])
 
 
@@ -88,7 +79,7 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
     """What to type, or to draw, for these rings."""
     lines = []
     for number, mast in enumerate(masts, 1):
-        radius = f"{_radius(mast, share):g}"
+        radius = f"{mast.radius(share):g}"
         x, y, z = (f"{value:.6g}" for value in mast.point)
         if drawn:
             lines.append(f"draw a circle of radius {radius} around ({x}, {y}) at height {z} on layer 'mast'")
@@ -101,7 +92,7 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
 
 
 def mast_note(plan: Plan) -> str:
-    """That a roof is held at single points, and what to do; empty if it is not."""
+    """Warn about a roof held at single points, with the change to make; empty if it is not."""
     masts = point_masts(plan)
     if not masts:
         return ""
@@ -114,5 +105,24 @@ def mast_note(plan: Plan) -> str:
     )
 
 
-def _radius(mast: Mast, share: float) -> float:
-    return float(f"{share * mast.room:.2g}")
+def as_sail(plan: Plan, rises: Sequence[Rise] = ()) -> Plan | None:
+    """The plan with a cable along each free edge and without pressure; None if no edge is free.
+
+    A tension that stands for a rise becomes 1: a sail has the height of its supports.
+
+    >>> square = [[0, 0], [8, 0], [8, 8], [0, 8]]
+    >>> tent = Plan(square, edge_length=1, tension=2.0, edge="free", supports=[[0, 0, 1], [8, 8]])
+    >>> sail = as_sail(tent)
+    >>> sail.edge, sail.cable, sail.pressure
+    ('cable', 24.0, 0.0)
+    """
+    if all(part.edge != "free" for part in (plan, *plan.holes)):
+        return None
+    if rises and plan.tension is not None:
+        plan = replace(plan, tension=1.0)
+    risen = {rise.patch for rise in rises}
+    patches = [replace(a, pressure=0.0, tension=1.0 if a.name in risen else a.tension) for a in plan.patches]
+    cabled: dict[str, Any] = {"edge": "cable", "cable": usual_cable(plan)}
+    holes = [replace(hole, **cabled) if hole.edge == "free" else hole for hole in plan.holes]
+    edge = cabled if plan.edge == "free" else {}
+    return replace(plan, pressure=0.0, patches=patches, holes=holes, **edge)

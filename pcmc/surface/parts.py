@@ -1,0 +1,259 @@
+"""The parts of a surface that have a name and a load: patches, cables, and rooms of prescribed volume."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base import validate
+from ..base.arrays import Floats, Ints, read_only
+from ..base.errors import SurfaceError
+from ..base.validate import checked_name
+from . import checks
+from .topology import Topology, edge_places
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A part of the surface with one tension and one pressure.
+
+    Parameters
+    ----------
+    name : unique in its surface; 1 to 100 printable characters, no blank at either end.
+    tension : α ≥ 0, force per length. At rest the patch has mean curvature (p - s) / (2 α).
+    pressure : p, force per area along the positive normal: the pressure of the air below the patch minus
+        that above it. A wall between rooms of pressures p_1 and p_2 has pressure p_1 - p_2, its normal
+        pointing from room 1 to room 2; ``pcmc.energy`` describes E for other wall pressures.
+    wall : whether the patch is a wall between rooms: its cone is not part of the volume, and it may
+        pinch. A patch without pressure and snow that hangs below a junction is a wall, too: see
+        ``Surface.walls``.
+    weight : w, force per area of the patch, against Π's normal; negative for a lift.
+    snow : s, force per area of the plan. It acts as a lower pressure, p - s: see ``Surface.with_snow``. The
+        wall between rooms under snow s_1 and s_2 has s_1 - s_2, so that p - s is that of the rooms, too.
+
+    >>> Patch("roof", tension=2.0).target_curvature
+    0.25
+    """
+
+    name: str
+    tension: float
+    pressure: float = 1.0
+    wall: bool = field(default=False, repr=False)
+    weight: float = field(default=0.0, repr=False)
+    snow: float = field(default=0.0, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", checked_name("Patch.name", self.name, error=SurfaceError))
+        if not isinstance(self.wall, bool | np.bool_):
+            validate.refuse("wall", self.wall, "True or False", self.name, error=SurfaceError)
+        object.__setattr__(self, "wall", bool(self.wall))
+        tension = self._number("tension", least=0.0, hint="only a wall may have 0")
+        pressure, weight, snow = map(self._number, ("pressure", "weight", "snow"))
+        if tension == 0.0 and pressure != 0.0:
+            hint = f"a patch under pressure {pressure:g} must pull; a wall (pressure=0) may have tension 0"
+            validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
+        if tension == 0.0 and (weight != 0.0 or snow != 0.0):
+            bears = "carries snow" if snow else "weighs something"
+            hint = f"a patch that {bears} must pull; give it a tension"
+            validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
+
+    def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
+        value, where, most = getattr(self, key), self.name, checks.LARGEST
+        number = validate.number(key, value, least=least, where=where, hint=hint, error=SurfaceError)
+        hint = "use a larger unit of force"
+        validate.number(key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError)
+        if 0.0 < abs(number) < checks.SMALLEST:
+            bound = f"≥ {checks.SMALLEST:g}" if number > 0.0 else f"≤ {-checks.SMALLEST:g}"
+            hint = "use a smaller unit of force"
+            validate.refuse(key, number, f"0 or {bound}", where, hint, SurfaceError)
+        object.__setattr__(self, key, number)
+        return number
+
+    @property
+    def auxiliary(self) -> bool:
+        """Whether the energy and the solvers treat it as a wall: declared, or without pressure and snow."""
+        return self.wall or (self.pressure == 0.0 and self.snow == 0.0)
+
+    @property
+    def net_pressure(self) -> float:
+        """p - s, force per area: what the shape follows."""
+        return self.pressure - self.snow
+
+    @property
+    def target_curvature(self) -> float:
+        """H̄ = (p - s) / (2 α), 1/length; NaN for a wall without tension, whose shape is arbitrary."""
+        return self.net_pressure / (2.0 * self.tension) if self.tension > 0.0 else math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Cable:
+    """A curve of edges with one line tension: E gains τ · length.
+
+    Parameters
+    ----------
+    name : unique in its surface; 1 to 100 printable characters, no blank at either end.
+    tension : τ ≥ 0, force. A free edge of a flat membrane with tension α is at rest on arcs of radius τ/α.
+    edges : (k,2) int, the vertices that each edge joins, in any order.
+
+    >>> Cable("east", 2.0, [[4, 3], [4, 5]]).edges.tolist()
+    [[3, 4], [4, 5]]
+    """
+
+    name: str
+    tension: float
+    edges: Ints
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", checked_name("Cable.name", self.name, error=SurfaceError))
+        number = validate.number(
+            "tension", self.tension, least=0.0, most=checks.LARGEST, where=self.name, error=SurfaceError
+        )
+        object.__setattr__(self, "tension", number)
+        edges = checks.edge_array(self.edges, f"cable {self.name!r}")
+        object.__setattr__(self, "edges", read_only(edges))
+
+    @classmethod
+    def along(cls, name: str, tension: float, vertices: npt.ArrayLike, closed: bool = False) -> Cable:
+        """The cable through a sequence of vertices (k,), each joined to the next.
+
+        >>> Cable.along("ring", 1.0, [2, 0, 1], closed=True).edges.tolist()
+        [[0, 1], [0, 2], [1, 2]]
+        """
+        chain = np.asarray(vertices).tolist()
+        chain += chain[:1] * closed
+        return cls(name, tension, np.stack([chain[:-1], chain[1:]], axis=1))
+
+    def carried(self, number: Ints) -> Cable | None:
+        """The cable on the vertices that have these numbers (n,) now; None where no edge of it is left.
+
+        >>> Cable("a", 1.0, [[0, 1], [1, 2]]).carried(np.array([5, 5, 3])).edges.tolist()
+        [[3, 5]]
+        """
+        ends = number[self.edges]
+        ends = np.unique(np.sort(ends[ends[:, 0] != ends[:, 1]], axis=1), axis=0)
+        return replace(self, edges=ends) if len(ends) else None
+
+    def cut(self, ends: Ints, number: Ints) -> Cable:
+        """The cable with the vertices ``number`` (k,) on those of its edges that are among ``ends`` (k,2).
+
+        >>> Cable("a", 1.0, [[0, 1], [1, 2]]).cut(np.array([[0, 1]]), np.array([7])).edges.tolist()
+        [[0, 7], [1, 2], [1, 7]]
+        """
+        place = edge_places(self.edges, ends)
+        cut = place >= 0
+        middle, old = number[place[cut]], self.edges[cut]
+        halves = [np.stack([old[:, k], middle], axis=1) for k in (0, 1)]
+        return replace(self, edges=np.concatenate([self.edges[~cut], *halves]))
+
+
+class CableEdges(NamedTuple):
+    """The edges of a surface that pull: ``ends`` (c,2) int, and the ``tension`` (c,) of each, force."""
+
+    ends: Ints
+    tension: Floats
+
+
+def cable_edges(cables: Sequence[Cable]) -> CableEdges:
+    """The edges of all cables whose tension is not 0.
+
+    >>> cable_edges([Cable("a", 2.0, [[0, 1], [1, 2]]), Cable("b", 0.0, [[2, 3]])]).tension.tolist()
+    [2.0, 2.0]
+    """
+    pulling = [cable for cable in cables if cable.tension > 0.0]
+    ends = np.concatenate([np.empty((0, 2), dtype=np.int32), *(cable.edges for cable in pulling)])
+    tension = np.repeat([cable.tension for cable in pulling], [len(cable.edges) for cable in pulling])
+    return CableEdges(read_only(ends), read_only(tension.astype(float)))
+
+
+@dataclass(frozen=True)
+class Room:
+    """A room whose volume is prescribed instead of its pressure.
+
+    Parameters
+    ----------
+    name : unique in its surface; 1 to 100 printable characters, no blank at either end.
+    patches : mapping from the names of the patches around the room to 1, where the patch's positive normal
+        points out of the room, or -1, where it points into it.
+    volume : the volume (length³) of the room at rest.
+
+    The pressures of these patches are where a solver starts; it changes them by sign · δ with one δ for each
+    room. So a wall between two rooms keeps the difference of their pressures.
+
+    >>> Room("left", {"cap": 1, "wall": -1}, 2.0).patches
+    (('cap', 1), ('wall', -1))
+    """
+
+    name: str
+    patches: tuple[tuple[str, int], ...]
+    volume: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", checked_name("Room.name", self.name, error=SurfaceError))
+        pairs = tuple(self.patches.items() if isinstance(self.patches, Mapping) else self.patches)
+        if not pairs or not all(len(pair) == 2 and pair[1] in (1, -1) for pair in pairs):
+            expected = "a mapping from names of patches to 1 or -1"
+            validate.refuse("patches", self.patches, expected, self.name, error=SurfaceError)
+        object.__setattr__(self, "patches", tuple((str(name), int(sign)) for name, sign in pairs))
+        volume = validate.number("volume", self.volume, where=self.name, error=SurfaceError)
+        if volume == 0.0:
+            validate.refuse("volume", volume, "a number other than 0", self.name, error=SurfaceError)
+        object.__setattr__(self, "volume", volume)
+
+
+def room_signs(rooms: Sequence[Room], patches: Sequence[str]) -> Floats:
+    """(r,k) 1 or -1 where a patch bounds a room, by the sense of its normal; 0 elsewhere."""
+    signs = np.zeros((len(rooms), len(patches)))
+    for row, room in zip(signs, rooms, strict=True):
+        for name, sign in room.patches:
+            row[patches.index(validate.choice(f"room {room.name!r}: patch", name, list(patches)))] = sign
+    return signs
+
+
+def named_parts(kind: type[Part], what: str, given: Any) -> tuple[Part, ...]:
+    """The given parts as a tuple; SurfaceError if one is of another kind, or two have one name."""
+    parts: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
+    if not all(isinstance(part, kind) for part in parts):
+        validate.refuse(what, given, f"a sequence of {kind.__name__}", error=SurfaceError)
+    double = [name for name, times in Counter(part.name for part in parts).items() if times > 1]
+    if double:
+        message = f"{what}: the name {double[0]!r} is used twice; names must be unique"
+        raise SurfaceError(message, what=what, found=double[0])
+    return parts
+
+
+def checked_cables(given: Any, topo: Topology) -> tuple[Cable, ...]:
+    """Cables of unique names on edges of a mesh, no edge in two of them."""
+    parts = named_parts(Cable, "cables", given)
+    taken = np.zeros(len(topo.edges), dtype=bool)
+    for cable in parts:
+        place, what = topo.edge_numbers(cable.edges), f"cable {cable.name!r}: edges"
+        if (place < 0).any():
+            fault = "joins vertices that no edge of the mesh joins"
+            bad = np.flatnonzero(place < 0)
+            checks.refuse_rows(what, cable.edges, bad, fault, hint="name the two ends of an edge")
+        if taken[place].any():
+            hint = "make it one cable with the sum of their tensions"
+            bad = np.flatnonzero(taken[place])
+            checks.refuse_rows(what, cable.edges, bad, "carries another cable, too", hint=hint)
+        taken[place] = True
+    return parts
+
+
+def checked_rooms(given: Any, patches: Sequence[str]) -> tuple[Room, ...]:
+    """Rooms of unique names around patches of these names, their volumes independent of each other."""
+    parts = named_parts(Room, "rooms", given)
+    signs = room_signs(parts, patches)
+    for k in range(1, len(parts) + 1):
+        if np.linalg.matrix_rank(signs[:k]) < k:
+            name = parts[k - 1].name
+            message = f"room {name!r}: its volume is prescribed already, by that of the rooms before it"
+            raise SurfaceError(f"{message}; remove it", what="rooms", where=name)
+    return parts
