@@ -83,12 +83,12 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
         matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
     else:
         matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
-    s, slope = matrix.solve(np.zeros(len(at.left)), sense, TANGENT_ACCURACY)
-    size = at.space.size
+    s, slope = matrix.solve(np.zeros(len(at.defects)), sense, TANGENT_ACCURACY)
+    size = at.rest.space.size
     direction, weights = at.motion(s[:size], slope), at.area_weights
     length = Tangent(direction, slope, weights, scale).length(direction, slope)
     tangent = Tangent(direction / length, slope / length, weights, scale)
-    rates = at.volume_units * s[size:] / length
+    rates = at.rest.volume_units * s[size:] / length
     with _counted():
         return BranchPoint(at, tangent, _eigenvalues(matrix.second), matrix.second.negative, rates)
 
@@ -105,10 +105,10 @@ def _counted() -> Iterator[None]:
 def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, nearest first, and their motions (k,n,3)."""
     with _counted():
-        second = at.mesh.second_variation(at.surface, at.X)
+        second = at.rest.factorised(soften=False)
         every, fields = lowest(second, second.negative + count + 1)
     nearest = np.argsort(np.abs(every))[:count]
-    return every[nearest], np.array([at.motion(at.space.to_coordinates(fields[i])) for i in nearest])
+    return every[nearest], np.array([at.motion(at.rest.space.to_coordinates(fields[i])) for i in nearest])
 
 
 def along_branch(at: BranchPoint, count: int) -> float:

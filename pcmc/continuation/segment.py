@@ -72,7 +72,7 @@ class Segment:
             return float(tangent.direction[state.highest_vertex] @ normal)
         if name == "volume":
             return float((state.volume_gradient * tangent.direction).sum())
-        by_position = float((state.gradient * tangent.direction).sum())
+        by_position = float((state.rest.gradient * tangent.direction).sum())
         by_parameter = state.mesh.line.energy_derivative(state.surface, state.X, state.parameter)
         cones = state.surface.room_signs @ patch_volumes(state.surface.moved(state.X))
         return by_position + by_parameter * tangent.slope - float(cones @ at.room_rates)

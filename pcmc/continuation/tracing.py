@@ -14,7 +14,6 @@ from typing import Any
 
 from ..base.errors import NoBranch, SurfaceError
 from ..base.interrupts import stop_requested
-from ..forces.rigid_motions import rigid_modes, rigid_motions
 from ..forces.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
@@ -86,7 +85,7 @@ class Tracer:
     def first_point(self, mesh: BranchMesh) -> BranchPoint:
         """The surface given, corrected to the tolerance."""
         start = State(mesh, mesh.surface.vertices, self.line.value)
-        free = rigid_modes(start.space, rigid_motions(mesh.surface), start.X).shape[1]
+        free = start.rest.rigid.shape[1]
         if free:
             message = f"follow: nothing holds the surface against {free} rigid motions"
             hint = "it would drift instead of following the parameter; hold it with fixed= or on_plane="
@@ -97,7 +96,7 @@ class Tracer:
         try:
             if not start.residual <= START_RESIDUAL:
                 raise NotOnBranch(f"relative residual {start.residual:.1e}")
-            if start.overpulled:
+            if start.rest.excess_pull.any():
                 raise NotOnBranch("a junction is pulled off the plane harder than its wall can hold")
             given = fixed_parameter(start.parameter, self.line.scale)
             corrected = correct(start, given, self.options.tolerance)
@@ -151,14 +150,14 @@ class Tracer:
         here = self.here.state
         try:
             there = self.solve_at(length)
-            if there.overpulled:
+            if there.rest.excess_pull.any():
                 raise ContactChanged(there)
         except ContactChanged as change:
             there = self.solve_contact(change.near)
         bend = self.bend(there, length)
         if there.iterations > MANY_ITERATIONS and there.mesh is here.mesh:
             raise NotOnBranch("the correction hardly converges")
-        if turns_over(here.X, there.X, here.mesh.quality_faces):
+        if turns_over(here.X, there.X, here.mesh.part.quality_faces):
             raise MeshCollapsed("triangles turn over")
         if there.quality < QUALITY_LOSS * min(here.quality, self.options.min_quality):
             raise MeshCollapsed("triangles collapse")
@@ -213,7 +212,7 @@ class Tracer:
 
     def solve_contact(self, near: State) -> State:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        surface = near.at_parameter(near.mesh.surface_in_contact(near.X))
+        surface = near.with_values(near.mesh.surface_in_contact(near.X))
         tolerance, backend = self.options.tolerance, self.options.backend
         result = solve(surface, "newton", target="stationary", tolerance=tolerance, backend=backend)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
@@ -338,4 +337,4 @@ class Tracer:
 
     def surface_at(self, at: State) -> Surface:
         """The whole surface at a state."""
-        return at.at_parameter(at.mesh.full_surface(at.X))
+        return at.with_values(at.mesh.full_surface(at.X))
