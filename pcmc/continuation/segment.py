@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -52,10 +52,6 @@ class Segment:
         if t == self.length:
             return self.end
         return branch_point(self.solve(t), self.start.tangent)
-
-    def up_to(self, t: float, end: BranchPoint) -> Segment:
-        """The part of the segment from its start to t, where ``end`` is."""
-        return replace(self, end=end, length=t)
 
     def value(self, name: str, t: float) -> float:
         """A quantity at t."""
