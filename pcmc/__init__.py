@@ -150,7 +150,7 @@ if not TYPE_CHECKING:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
     def _cell_html(value: object) -> str:
-        return import_module(".plot.notebook", __name__).cell_html(value)
+        return import_module(".plot.pictures", __name__).cell_html(value)
 
     if "IPython" in sys.modules:  # a notebook: its cells show surfaces as pictures
         _shell = sys.modules["IPython"].get_ipython()

@@ -27,7 +27,7 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
-from ..meshing.curve_projection import onto_held_curves
+from ..meshing.held_curves import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..meshing.sizes import limit_growth, triangles_for
@@ -213,7 +213,7 @@ def size_field(surface: Surface, shares: Floats, triangles: float, growth: float
     wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
     for _ in range(6):  # limits to growth make edges shorter and triangles more
         size = limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
-        wanted *= math.sqrt(triangles_for(areas, size[F].mean(axis=1)) / triangles)
+        wanted *= math.sqrt(triangles_for(areas, size[F].mean(axis=1)).sum() / triangles)
     return limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
 
 

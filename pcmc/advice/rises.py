@@ -87,6 +87,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     except ModuleNotFoundError:
         raise MissingExtra("shapely", "plan") from None
     area = plan_area(plan)
+    least, span = least_tension(area), 2.0 * largest_circle(area)[1]
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)
     heights = outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
     level, loads = float(heights.mean()), net_pressures(plan)
@@ -97,7 +98,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
                 f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead"
             )
             raise OptionError(f"{text}, the greatest height over the plane", what=rise.kind, where=rise.patch)
-        over = rise.value if rise.kind != "span_ratio" else 2.0 * largest_circle(area)[1] / rise.value
+        over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
         names: str | list[str] = rise.patch or [
             name for name in patch_names(plan) if loads.get(name, plan.pressure - plan.snow)
@@ -107,7 +108,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             raise OptionError(
                 f"{text} pressure = ..., or tension = ... instead of {rise.kind}", what=rise.kind
             )
-        plan = _retensioned(plan, rise.patch, least_tension(area), height - level)
+        plan = _retensioned(plan, rise.patch, least, height - level)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
     return plan, targets, vary

@@ -17,6 +17,7 @@ Bools = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 Array = TypeVar("Array", bound=npt.NDArray[Any])
+Result = TypeVar("Result")
 
 
 def read_only(array: Array) -> Array:
@@ -27,6 +28,20 @@ def read_only(array: Array) -> Array:
     """
     array.setflags(write=False)
     return array
+
+
+def kept_with_owner(compute: Callable[[Any], Result]) -> Callable[[Any], Result]:
+    """A function of one object that is computed once: the object keeps the value like a cached property."""
+    name = compute.__name__
+
+    @wraps(compute)
+    def kept(owner: Any) -> Result:
+        values: dict[str, Result] = vars(owner)
+        if name not in values:
+            values[name] = compute(owner)
+        return values[name]
+
+    return kept
 
 
 def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:

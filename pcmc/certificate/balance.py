@@ -1,4 +1,4 @@
-"""Balance: the forces along junctions and at supports, and the most that these could carry."""
+"""Balance: loads, what supports could carry of them, and proofs that no smooth surface is at rest."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.supports import common_point, uncancelled_pressures
-from ..surface.topology import Curve
 from ..surface.values import balanced_wall
 from .proof import Overload, UnbalancedJunction, Unheld
 
@@ -19,6 +18,22 @@ ROUNDED = 1e-9  # a load, or a tension, that exceeds what balances it by less ma
 COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
+
+
+def load_name(surface: Surface) -> str:
+    """What sentences call the load: "pressure", "net pressure" less snow, "weight", or "load" for several."""
+    if surface.weights.any():
+        return "load" if surface.net_pressures.any() else "weight"
+    return "net pressure" if surface.snows.any() else "pressure"
+
+
+def load(surface: Surface) -> float:
+    """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
+    vector = area_vectors(surface.vertices[surface.faces])
+    pressed = surface.net_pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
+    if not surface.weights.any():
+        return float(pressed)
+    return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
 
 
 def load_ratio(surface: Surface) -> float:
@@ -32,8 +47,11 @@ def load_ratio(surface: Surface) -> float:
     """
     topo = surface.topology
     fixed, held = (np.asarray(mask[topo.edges].all(axis=1)) for mask in (surface.fixed, surface.held))
-    outer = topo.boundary_edge & held
-    return abs(load(surface)) / (_capacity(surface, outer | (fixed & ~_cuts_a_corner(surface))) or np.inf)
+    corners = np.zeros(len(fixed), dtype=bool)  # edges that cut off one triangle between two held edges
+    outer = topo.boundary_edge & fixed
+    corners[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
+    carrying = (topo.boundary_edge & held) | (fixed & ~(corners & ~topo.boundary_edge))
+    return abs(load(surface)) / (_capacity(surface, carrying) or np.inf)
 
 
 def overload(surface: Surface) -> Overload | None:
@@ -73,11 +91,9 @@ def load_is_given(surface: Surface) -> bool:
     """
     topo, pinned = surface.topology, surface.pinned
     pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
-    if surface.rooms or surface.weights.any() or surface.given_supports.on_line:
-        return False
-    if surface.on_ground[pulling].any():
-        return False
-    if any(abs(float(np.dot(plane.normal, surface.plane.normal))) > 1e-9 for plane, _ in surface.on_planes):
+    normals = [np.dot(plane.normal, surface.plane.normal) for plane, _ in surface.on_planes]
+    varies = surface.rooms or surface.weights.any() or surface.given_supports.on_line
+    if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > 1e-9 for up in normals):
         return False
     alone = pinned.copy()
     alone[topo.edges[pinned[topo.edges].all(axis=1)]] = False
@@ -86,19 +102,14 @@ def load_is_given(surface: Surface) -> bool:
     return not (alone.any() or moving.any())
 
 
-def _cuts_a_corner(surface: Surface) -> Bools:
-    """(e,) edges inside that cut off a single triangle between two held edges of the boundary."""
-    topo = surface.topology
-    outer = topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)
-    cut = np.zeros(len(outer), dtype=bool)
-    cut[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
-    return cut & ~topo.boundary_edge
-
-
 def _capacity(surface: Surface, carrying: Bools) -> float:
     """The most that edges by their mask (e,), single vertices and ends of cables carry along Π's normal."""
     topo, X, F = surface.topology, surface.vertices, surface.faces
-    pull = np.abs(edge_tensions(surface))
+    pull = np.repeat(surface.tensions[surface.patch_of_face][:, None], 3, axis=1)  # at the sides' middles
+    if surface.weights.any():
+        height, weight = surface.plane.height(X)[F], surface.weights[surface.patch_of_face, None]
+        pull += weight * (height.sum(axis=1, keepdims=True) - height) / 2.0
+    pull = np.abs(pull)
     sheets = np.bincount(topo.edge_of_face.ravel(), pull.ravel(), len(topo.edges))
     lengths = segment_lengths(X, topo.edges[carrying])
     slides = ~surface.pinned[topo.edges[carrying]].all(axis=1)
@@ -114,6 +125,26 @@ def _capacity(surface: Surface, carrying: Bools) -> float:
         capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
     ends, tension = surface.cable_edges
     return capacity + float(tension[supports[ends].sum(axis=1) == 1].sum())
+
+
+def coarseness(surface: Surface) -> float:
+    """(h / R)², h the mean length of the boundary's edges and R = 2 · area / length of the plan.
+
+    The balance of a mesh has an error of about this size; 0 for a closed surface.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> coarseness(square)
+    4.0
+    """
+    X, topo = surface.vertices, surface.topology
+    length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
+    corners = X[surface.faces[~surface.auxiliary[surface.patch_of_face]]]
+    plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
+    if not len(length) or plan == 0.0:
+        return 0.0
+    return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
 def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
@@ -154,82 +185,50 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
 def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
     left = table.iloc[-1]
-    share = (
-        f"to {left['force_share']:.1g} of them in x, y and z, and to {left['moment_share']:.1g} in moments"
-    )
+    force, moment = left["force_share"], left["moment_share"]
+    share = f"to {force:.1g} of them in x, y and z, and to {moment:.1g} in moments"
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
     place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")
     whose = " of the piece between the mirror planes" if mirrors else ""
-    hint = "; the rest is what the mesh leaves along its sheets: refine it"
-    coarse = hint if left["force_share"] > COARSE else ""
-    return f"the supports carry the loads{whose} {share} about ({place}){coarse}"
+    hint = "; the rest is what the mesh leaves along its sheets: refine it" if force > COARSE else ""
+    return f"the supports carry the loads{whose} {share} about ({place}){hint}"
 
 
-def load_name(surface: Surface) -> str:
-    """What sentences call the load: "pressure", "net pressure" less snow, "weight", or "load" for several."""
-    if surface.weights.any():
-        return "load" if surface.net_pressures.any() else "weight"
-    return "net pressure" if surface.snows.any() else "pressure"
-
-
-def load(surface: Surface) -> float:
-    """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
-    vector = area_vectors(surface.vertices[surface.faces])
-    pressed = surface.net_pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
-    if not surface.weights.any():
-        return float(pressed)
-    return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
-
-
-def edge_tensions(surface: Surface) -> Floats:
-    """(m,3) the tension with which each triangle pulls at its sides, α + w z at their middles."""
-    patch = surface.patch_of_face
-    tension = np.repeat(surface.tensions[patch][:, None], 3, axis=1)
-    if surface.weights.any():
-        height = surface.plane.height(surface.vertices)[surface.faces]
-        tension += surface.weights[patch, None] * (height.sum(axis=1, keepdims=True) - height) / 2.0
-    return tension
-
-
-def coarseness(surface: Surface) -> float:
-    """(h / R)², h the mean length of the boundary's edges and R = 2 · area / length of the plan.
-
-    The balance of a mesh has an error of about this size; 0 for a closed surface.
-
-    >>> from pcmc import Patch
-    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
-    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
-    >>> coarseness(square)
-    4.0
-    """
-    X, topo = surface.vertices, surface.topology
-    length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
-    corners = X[surface.faces[~surface.auxiliary[surface.patch_of_face]]]
-    plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
-    if not len(length) or plan == 0.0:
-        return 0.0
-    return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
-
-
-def unbalanced(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
+def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + ROUNDED) -> UnbalancedJunction | None:
     """A junction whose tensions cannot balance at any angles; None if there is none.
 
-    Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. A junction that is held
-    all along is left out, as its support takes the difference, and so is one with a wall that slides on
-    Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,) marks such walls.
-    Nothing is known where a cable or pressures that do not cancel pull, too, or a sheet's weight changes its
-    tension with the height.
+    Σ α n = 0 (7) needs the largest tension to be at most the sum of the others, or here ``share`` of it. A
+    junction that is held all along is left out, as its support takes the difference, and so is one with a
+    wall that slides on Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,)
+    marks such walls. Nothing is known where a cable or pressures that do not cancel pull, too, or a sheet's
+    weight changes its tension with the height.
     """
-    return _strained(surface, pinchable, 1.0 + ROUNDED)
+    held, numbers = surface.held, surface.topology.edge_numbers
+    on_cable = numbers(surface.cable_edges.ends)
+    for curve in surface.topology.junctions:
+        sheets, edges = list(curve.sheets), numbers(curve.pairs)
+        strongest = max(sheets, key=lambda patch: surface.tensions[patch])
+        *others, largest = sorted(surface.tensions[sheets])
+        excused = pinchable[strongest] or held[curve.vertices].all() or surface.weights[sheets].any()
+        excused = excused or np.isin(edges, on_cable).any() or surface.uncancelled[edges].any()
+        if largest > share * sum(others) and not excused:
+            names = tuple(surface.patches[i].name for i in sheets)
+            remedy = _remedy(surface, sheets)
+            return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others), remedy)
+    return None
+
+
+def strained_junction(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
+    """A junction as in ``unbalanced`` whose tensions balance only with sheets nearly on each other.
+
+    At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow.
+    """
+    return unbalanced(surface, pinchable, HARDLY)
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
-    """Names a junction whose tensions balance only with sheets nearly on each other, or not at all.
-
-    At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow. Arguments as
-    for ``unbalanced``.
-    """
+    """Names a ``strained_junction``; or empty."""
     strained = strained_junction(surface, pinchable)
     if strained is None:
         return ""
@@ -238,27 +237,6 @@ def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
         f"the tensions at the junction {' | '.join(strained.junction)} could balance only with its sheets"
         f" nearly on each other: {strained.strongest:g} against {others}{strained.hint}"
     )
-
-
-def strained_junction(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
-    """A junction as in ``hardly_balanced``, or None."""
-    return _strained(surface, pinchable, HARDLY)
-
-
-def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJunction | None:
-    """A junction whose largest tension is over ``share`` of the sum of the others."""
-    held = surface.held
-    for curve in surface.topology.junctions:
-        strongest = max(curve.sheets, key=lambda patch: surface.tensions[patch])
-        *others, largest = sorted(surface.tensions[list(curve.sheets)])
-        excused = pinchable[strongest] or held[curve.vertices].all()
-        excused = excused or surface.weights[list(curve.sheets)].any() or _carries_cable(surface, curve)
-        excused = excused or surface.uncancelled[surface.topology.edge_numbers(curve.pairs)].any()
-        if largest > share * sum(others) and not excused:
-            names = tuple(surface.patches[i].name for i in curve.sheets)
-            remedy = _remedy(surface, curve.sheets)
-            return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others), remedy)
-    return None
 
 
 def _remedy(surface: Surface, sheets: Sequence[int]) -> tuple[str, float, bool] | None:
@@ -276,15 +254,6 @@ def _remedy(surface: Surface, sheets: Sequence[int]) -> tuple[str, float, bool] 
         value = largest if not others else 1.25 * largest - sum(others)
     name = surface.patches[changed].name
     return (name, float(value), bool(surface.walls[changed])) if value > 0.0 else None
-
-
-def _carries_cable(surface: Surface, curve: Curve) -> bool:
-    """Whether a cable runs along an edge of the curve."""
-    if not len(surface.cable_edges.ends):
-        return False
-    numbers = surface.topology.edge_numbers
-    on_cable = numbers(surface.cable_edges.ends)
-    return bool(np.isin(numbers(curve.pairs), on_cable).any())
 
 
 def unheld(surface: Surface) -> Unheld | None:
@@ -319,9 +288,8 @@ def growing_part(surface: Surface) -> int | None:
     T = Σ α A and P = Σ p V. At rest C + 2 T = 3 P, and there E'' = 2 T - 6 P = -2 (T + C) < 0.
     """
     parts = surface.topology.components
-    return next(
-        (int(np.flatnonzero(parts == part)[0]) for part, pressed in _scaled(surface) if pressed), None
-    )
+    growing = (int(np.flatnonzero(parts == part)[0]) for part, pressed in _scaled(surface) if pressed)
+    return next(growing, None)
 
 
 def describe_growing(vertex: int) -> str:
@@ -333,26 +301,25 @@ def describe_growing(vertex: int) -> str:
 
 
 def _scaled(surface: Surface) -> list[tuple[int, bool]]:
-    """The connected parts that may grow and shrink about a point, and whether there is pressure on them."""
-    parts, used = surface.topology.components, surface.faces[:, 0]
+    """The connected parts that may grow and shrink about a point, and whether there is pressure on them.
+
+    Of a part that slides on several planes these must meet in a point, towards which it can shrink.
+    """
+    parts, used, given = surface.topology.components, surface.faces[:, 0], surface.given_supports
     pressed = np.unique(parts[used[surface.net_pressures[surface.patch_of_face] != 0.0]])
-    held = surface.given_supports.fixed.copy()
-    for _, along in surface.given_supports.on_line:
+    held = given.fixed.copy()
+    for _, along in given.on_line:
         held |= along
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
-    loose = np.setdiff1d(parts[used], parts[held])
-    return [(part, bool(part in pressed)) for part in loose if _may_shrink(surface, parts == part)]
-
-
-def _may_shrink(surface: Surface, part: Bools) -> bool:
-    """Whether the planes that a part slides on meet in a point, towards which it can shrink."""
-    planes = [(surface.plane, surface.given_supports.on_plane), *surface.on_planes]
-    there = [plane for plane, mask in planes if (mask & part).any()]
-    if len(there) < 2:
-        return True
-    point = common_point(np.array(there[0].point), there)
-    return bool(all(abs(plane.height(point)) <= 1e-9 * surface.size for plane in there))
+    loose = []
+    for part in np.setdiff1d(parts[used], parts[held]):
+        planes = [(surface.plane, given.on_plane), *surface.on_planes]
+        there = [plane for plane, mask in planes if (mask & (parts == part)).any()]
+        point = common_point(np.array(there[0].point), there) if len(there) > 1 else None
+        if point is None or all(abs(plane.height(point)) <= 1e-9 * surface.size for plane in there):
+            loose.append((part, bool(part in pressed)))
+    return loose
 
 
 def pressures_left_over(surface: Surface) -> str:

@@ -1,23 +1,24 @@
-"""Cables: their balance with the sheets along them, and the forces at their ends."""
+"""Cables: their balance with the sheets along them, the forces at their ends, and where they are too weak."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..forces.cables import directions
 from ..surface import Surface
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import cross_2d, segment_lengths
 from ..surface.parts import Cable
 from ..surface.symmetry import mirrored
 from ..surface.topology import Curve
-from .curve_tables import conormal_sum, middle
 from .proof import WeakCable
+from .tables import conormal_sum, middle
 
 FLAT = 1e-9  # of the size: fixed points this near to one plane lie in it; the least excess that counts
 
@@ -35,12 +36,13 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
     """
     rows = []
     for cable, curve in _parts(surface):
-        lengths = segment_lengths(surface.vertices, curve.pairs)
-        total, t = float(lengths.sum()), directions(surface.vertices, curve.pairs)[0]
+        lengths, t = segment_lengths(surface.vertices, curve.pairs), _tangents(surface, curve.pairs)
+        total = float(lengths.sum())
         turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if curve.closed else np.diff(t, axis=0), axis=1)
         weight = 0.5 * (lengths + np.roll(lengths, 1)) if curve.closed else 0.5 * (lengths[1:] + lengths[:-1])
         sheets = np.linalg.norm(conormal_sum(surface, surface.topology.edge_numbers(curve.pairs)), axis=1)
         inner = curve.vertices if curve.closed else curve.vertices[1:-1]
+        most = float(np.linalg.norm(left[inner], axis=1).max(initial=0.0))
         rows.append(
             {
                 "cable": cable.name,
@@ -49,8 +51,7 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
                 **middle(surface, curve),
                 "sheet_pull": float(sheets @ lengths) / (total or 1.0),
                 "cable_pull": cable.tension * float(turns.sum()) / (float(weight.sum()) or 1.0),
-                "force_left": float(np.linalg.norm(left[inner], axis=1).max(initial=0.0))
-                / (float(lengths.mean()) or 1.0),
+                "force_left": most / (float(lengths.mean()) or 1.0),
             }
         )
     return pd.DataFrame(rows)
@@ -62,29 +63,22 @@ def cable_end_table(surface: Surface) -> pd.DataFrame:
     ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -τ t, with t the
     direction from the end along the cable. Where several cables end, their support carries the sum.
     """
-    rows = []
-    for cable, vertex, force in cable_ends(surface):
-        rows.append(
-            {
-                "cable": cable.name,
-                "vertex": vertex,
-                **dict(zip("xyz", surface.vertices[vertex].tolist(), strict=True)),
-                "held": bool(surface.held[vertex]),
-                **dict(zip(("force_x", "force_y", "force_z"), force.tolist(), strict=True)),
-            }
-        )
-    return pd.DataFrame(rows)
+    rows = [
+        [cable.name, vertex, *surface.vertices[vertex].tolist(), bool(surface.held[vertex]), *force.tolist()]
+        for cable, vertex, force in cable_ends(surface)
+    ]
+    columns = ["cable", "vertex", *"xyz", "held", "force_x", "force_y", "force_z"]
+    return pd.DataFrame(rows, columns=columns if rows else None)
 
 
 def cable_ends(surface: Surface) -> list[tuple[Cable, int, Floats]]:
     """Each end of a part of a cable: the cable, the vertex, and -τ t (3,), the force that holds it there."""
-    ends = []
-    for cable, curve in _parts(surface):
-        for end, beside in () if curve.closed else ((0, 1), (-1, -2)):
-            pair = curve.vertices[[end, beside]]
-            direction = directions(surface.vertices, pair[None])[0][0]
-            ends.append((cable, int(pair[0]), -cable.tension * direction))
-    return ends
+    return [
+        (cable, int(pair[0]), -cable.tension * _tangents(surface, pair[None])[0])
+        for cable, curve in _parts(surface)
+        if not curve.closed
+        for pair in (curve.vertices[:2], curve.vertices[:-3:-1])
+    ]
 
 
 def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
@@ -115,10 +109,10 @@ def too_long(surface: Surface) -> str:
         if curve.closed or len(curve.sheets) != 1:
             continue
         chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
-        tension = float(surface.tensions[curve.sheets[0]])
-        widest = 2.0 * cable.tension
+        tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
         if chord * tension > widest:
-            enough = _upwards(chord * tension)  # an arc of 60°, which rises by 0.13 of its chord
+            step = 10.0 ** (math.floor(math.log10(chord * tension)) - 1)  # two digits, rounded up
+            enough = math.ceil(chord * tension / step) * step  # an arc of 60°, 0.13 of its chord high
             return (
                 f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g}, the"
                 f" diameter of the arc along a flat edge; raise its tension, well beyond"
@@ -208,21 +202,19 @@ def _sides(surface: Surface, loop: Ints) -> tuple[list[str], Floats]:
         rope[topo.edge_numbers(cable.edges)] = number if cable.tension > 0.0 else -1
     along = rope[topo.edge_numbers(np.stack([loop, np.roll(loop, -1)], axis=1))]
     names, pulls = [], []
-    for first, last in zip(held, np.append(held[1:], held[:1] + len(loop)), strict=True):
+    for first, last in pairwise([*held, *(held[:1] + len(loop))]):
         ropes = np.unique(np.take(along, np.arange(first, last), mode="wrap"))
         known = len(ropes) == 1 and ropes[0] >= 0
         names.append(surface.cables[ropes[0]].name if known else "")
-        pulls.append(
-            math.inf if last == first + 1 else surface.cables[ropes[0]].tension if known else math.nan
-        )
+        tension = surface.cables[ropes[0]].tension if known else math.nan
+        pulls.append(math.inf if last == first + 1 else tension)
     return names, np.array(pulls)
 
 
 def _angles(chords: Floats) -> Floats:
     """(k,) the angle β at the start of each side (k,2) of a polygon; infinite where it does not turn once."""
     before = np.roll(chords, 1, axis=0)
-    across = before[:, 0] * chords[:, 1] - before[:, 1] * chords[:, 0]
-    turns = np.arctan2(across, np.einsum("ij,ij->i", before, chords))
+    turns = np.arctan2(cross_2d(before, chords), np.einsum("ij,ij->i", before, chords))
     once = abs(abs(turns.sum()) - 2.0 * math.pi) < FLAT
     return np.asarray(math.pi - np.sign(turns.sum()) * turns if once else np.full(len(turns), math.inf))
 
@@ -239,25 +231,20 @@ def _least_factor(small: float, large: float, angle: float) -> float:
     return float(brentq(excess, least, 2.0 * (small + large) / min(1.0, angle)))
 
 
-def _upwards(value: float) -> float:
-    """The value rounded up to two digits."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return math.ceil(value / step) * step
+def _tangents(surface: Surface, pairs: Ints) -> Floats:
+    return directions(surface.vertices, pairs)[0]
 
 
 def _parts(surface: Surface) -> list[tuple[Cable, Curve]]:
-    """The parts of each cable of tension > 0 between its ends, branches and the supports in between."""
+    """The parts of each cable of tension > 0 between its ends, branches and the supports in between.
+
+    A support in between is a mast that it runs over: a fixed vertex beside one that moves.
+    """
     parts = []
     for cable in surface.cables:
         if cable.tension > 0.0:
-            curves = surface.topology.chains(cable.edges, _supported(surface, cable))
-            parts += [(cable, curve) for curve in curves]
+            mast = np.zeros(surface.n, dtype=bool)
+            leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
+            mast[leading] = surface.fixed[leading]
+            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, mast)]
     return parts
-
-
-def _supported(surface: Surface, cable: Cable) -> Bools:
-    """(n,) fixed vertices of a cable beside one that moves: a mast that it runs over."""
-    mask = np.zeros(surface.n, dtype=bool)
-    leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
-    mask[leading] = surface.fixed[leading]
-    return mask

@@ -16,30 +16,25 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.units import NO_UNITS, Units
-from ..contact.pinching import standing_part
-from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..forces.functional import patch_areas
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
-from ..forces.motion_space import VertexClasses
 from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
-from ..stability.equilibrium import Equilibrium
+from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
-from ..stability.softness import Spectrum, count_soft
+from ..stability.softness import NEAR, NEUTRAL, Spectrum, count_soft
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
 from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
 from .cables import cable_end_table, cable_table
-from .curve_tables import junction_table, room_table
-from .leaning import lean_table, lean_texts
 from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
 from .supports import boundary_view, pull_table, support_table
-from .verdict import COLLAPSED, NEAR, NEUTRAL, Evidence, Findings, Verdict, judge, only_coarse
+from .tables import junction_table, lean_table, lean_texts, patch_table, room_table
+from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge, only_coarse
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
-UNKNOWN = np.empty(0), np.empty((0, 0, 3))  # no eigenvalues, no modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +51,6 @@ class Certificate:
     energy, volume : E (force·length) and the volume between the roof and Π (``volumes_below``, length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
         that change a prescribed volume.
-    leaning : a row per wall: its largest angle from the vertical of Π, degrees, and the place.
-    symmetric_in : the mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
-        symmetric in these; ``certify(surface, whole=True)`` is about all.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
@@ -67,18 +59,6 @@ class Certificate:
         area, errors by both definitions, quality.
     junctions : one row per junction curve: length, its middle (the centre of a closed one), forces
         left and Σ α n, force/length.
-    supports : one row per support: a line, point, plane, mirror or end of a cable, with its length, middle,
-        force, moment and largest force per length; see ``pcmc.certificate.supports.support_table``.
-        Its forces and moments add up to those of the loads, but for the ``balance``'s remainder.
-    pulls : one row per edge of these, with the force per length there and its direction.
-    boundaries : the rows of ``supports`` that are as long as a curve: length, middle, reaction, largest
-        reaction per length.
-    balance : force and moment of the loads, of the supports, and what remains of both: a row each.
-    rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
-        over the latter, and the room's pressure.
-    cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
-        sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
-    cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
     load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
         what the mesh leaves along the sheets.
     acting : the forces of the supports by how they act; ``reactions`` are these (n,3) for each vertex.
@@ -88,6 +68,14 @@ class Certificate:
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
         ``Unheld`` or ``WeakCable``.
     tried : what a search for an equilibrium has tried, if that led to none.
+    cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
+        sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
+    cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
+    rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
+        over the latter, and the room's pressure.
+    symmetric_in : the mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
+        symmetric in these; ``certify(surface, whole=True)`` is about all.
+    leaning : a row per wall: its largest angle from the vertical of Π, degrees, and the place.
     """
 
     verdict: Verdict
@@ -119,33 +107,36 @@ class Certificate:
 
     @cached_property
     def supports(self) -> pd.DataFrame:
-        """The table of supports, made when first asked for."""
+        """One row per support: a line, point, plane, mirror or end of a cable, with its length, middle,
+        force, moment and largest force per length; see ``pcmc.certificate.supports.support_table``. Forces
+        and moments add up to those of the loads, but for the ``balance``'s remainder."""
         return support_table(self.acting)
 
     @cached_property
     def pulls(self) -> pd.DataFrame:
-        """The force per length along each edge of the supports, made when first asked for."""
+        """One row per edge of these, with the force per length there and its direction."""
         return pull_table(self.acting)
 
     @cached_property
+    def boundaries(self) -> pd.DataFrame:
+        """The rows of ``supports`` as long as a curve: length, middle, reaction, largest one per length."""
+        return boundary_view(self.supports)
+
+    @cached_property
     def balance(self) -> pd.DataFrame:
-        """The balance of loads and supports, made when first asked for."""
+        """Force and moment of the loads, of the supports, and what remains of both: a row each."""
         return balance_table(self.acting.standing, self.supports)
+
+    @property
+    def remainder(self) -> tuple[Floats, Floats]:
+        """Force (3,) and moment (3,) that loads and supports leave; see ``balance``."""
+        left = self.balance.iloc[-1]
+        return left[[*FORCE]].to_numpy(float), left[[*MOMENT]].to_numpy(float)
 
     @property
     def reactions(self) -> Floats:
         """(n,3) force of each support on the surface."""
         return self.acting.forces
-
-    @property
-    def certified(self) -> bool:
-        """At rest, and neither a saddle nor degenerate."""
-        return self.verdict in (Verdict.STABLE, Verdict.NEUTRAL)
-
-    @cached_property
-    def boundaries(self) -> pd.DataFrame:
-        """The rows of ``supports`` that are as long as a curve, with the names of its columns for curves."""
-        return boundary_view(self.supports)
 
     @property
     def largest_reaction(self) -> float:
@@ -154,10 +145,9 @@ class Certificate:
         return float(table["per_length_max"][table["kind"] != "mirror"].max())
 
     @property
-    def remainder(self) -> tuple[Floats, Floats]:
-        """Force (3,) and moment (3,) that loads and supports leave; see ``balance``."""
-        left = self.balance.iloc[-1]
-        return left[[*FORCE]].to_numpy(float), left[[*MOMENT]].to_numpy(float)
+    def certified(self) -> bool:
+        """At rest, and neither a saddle nor degenerate."""
+        return self.verdict in (Verdict.STABLE, Verdict.NEUTRAL)
 
     def numbers(self) -> dict[str, Any]:
         """The scalar findings, for tables."""
@@ -205,9 +195,7 @@ class Certificate:
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         supports = self.supports.drop(columns=[*MOMENT])
         tables = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
-        shown = [
-            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}") for frame in tables if len(frame)
-        ]
+        shown = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in tables if len(t)]
         return "\n\n".join([head, *shown])
 
 
@@ -219,6 +207,7 @@ def certify(
     evidence: Evidence | None = None,
     tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
+    clear: SecondVariation | None = None,
 ) -> Certificate:
     """Examine a surface.
 
@@ -231,6 +220,7 @@ def certify(
         ``Result.certify`` passes them on.
     whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
         index then, and not only those symmetric in these planes. True, or the planes to unfold at.
+    clear : what the solver factorised at this shape, so that it is not factorised again.
 
     Examples
     --------
@@ -249,51 +239,53 @@ def certify(
         validate.refuse("evidence", evidence, "an Evidence or None")
     if whole is not False:
         surface = mirrored(surface, None if whole is True else whole)
-    part = standing_part(surface)
-    standing, classes, X = part.surface, part.classes, part.surface.vertices
     equilibrium = Equilibrium.of(surface)
-    unheld, left = equilibrium.excess_pull, equilibrium.unbalanced
-    below, areas = volume_below(surface), patch_areas(surface)
-    residual, rooms = equilibrium.residual_with_pull, room_table(surface)
-
+    part, left, residual = equilibrium.part, equilibrium.unbalanced, equilibrium.residual_with_pull
+    standing, X, pinchable = part.surface, part.surface.vertices, part.walls.pinchable
     qualities = triangle_quality(X, standing.faces)
-    in_wall = part.walls.pinchable[standing.patch_of_face]
+    in_wall = pinchable[standing.patch_of_face]
     quality = float(qualities[~in_wall].min(initial=1.0))
     at_rest = residual <= tolerance and quality > COLLAPSED
-    spectrum, eigenvalues, fields = Spectrum(), *UNKNOWN
+    spectrum, eigenvalues, fields = Spectrum(), np.empty(0), np.empty((0, 0, 3))
     if at_rest:
-        spectrum, eigenvalues, fields = _stability(equilibrium, modes)
-
-    patches = _patch_table(surface, standing, areas, qualities)
-    ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
-    coarse = only_coarse(surface, part.walls.pinchable) if at_rest and surface.tensions.any() else ""
-    notes = coarse, _pulled_off(unheld), pressures_left_over(standing)
+        spectrum, eigenvalues, fields = _stability(equilibrium, modes, clear)
     findings = Findings(
         surface=surface,
-        pinchable=part.walls.pinchable,
+        pinchable=pinchable,
         residual=residual,
         tolerance=tolerance,
         quality=quality,
         spectrum=spectrum,
-        own_residuals=_own_residuals(standing, classes, left),
-        rounding=rounding_left(standing, classes, X),
+        own_residuals=_own_residuals(equilibrium),
+        rounding=rounding_left(standing, part.classes, X),
         evidence=evidence,
         tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
         rigid=equilibrium.rigid.shape[1] if surface.rooms else 0,
     )
     verdict, reason = judge(findings)
+    pulled = np.flatnonzero(equilibrium.excess_pull)
+    notes = (
+        only_coarse(surface, pinchable) if at_rest and surface.tensions.any() else "",
+        f"at {len(pulled)} pinched vertices, the first {pulled[0]}, the sheets pull harder than the"
+        " wall can hold: the wall will stand there once solved"
+        if len(pulled)
+        else "",
+        pressures_left_over(standing),
+    )
+    patches = patch_table(surface, standing, patch_areas(surface), qualities)
+    errors, acting = patches["variational_max"], support_forces(surface, standing=standing)
     return Certificate(
         verdict=verdict,
         detail="; ".join(filter(None, (reason, *notes))),
         residual=residual,
         scale=equilibrium.scale,
         energy=equilibrium.energy,
-        volume=below,
+        volume=volume_below(surface),
         index=spectrum.index,
         eigenvalues=eigenvalues,
         modes=fields,
-        curvature_error=_largest(patches["variational_max"]),
+        curvature_error=_largest(errors),
         quality=quality,
         walls_quality=float(qualities[in_wall].min(initial=1.0)),
         patches=patches,
@@ -302,83 +294,46 @@ def certify(
         support=float((acting.forces @ np.array(surface.plane.normal)).sum()),
         acting=acting,
         pinched=np.flatnonzero(part.resting),
-        load_ratio=ratio,
+        load_ratio=load_ratio(standing),
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
         tried=tried,
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
-        rooms=rooms,
+        rooms=room_table(surface),
         leaning=lean_table(standing),
         symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
 
 
-def _stability(equilibrium: Equilibrium, modes: int) -> tuple[Spectrum, Floats, Floats]:
+def _stability(
+    equilibrium: Equilibrium, modes: int, clear: SecondVariation | None
+) -> tuple[Spectrum, Floats, Floats]:
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
     square = equilibrium.shape.size**2
-    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square)
+    clear = clear if clear is not None and clear.of.same_as(equilibrium) else None
+    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square, clear)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)
         except SingularMatrix as error:
             spectrum = replace(spectrum, hidden=f"{error}; modes=0 judges by counts alone")
-    return spectrum, *UNKNOWN
+    return spectrum, np.empty(0), np.empty((0, 0, 3))
 
 
-def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
-    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces.
+def _own_residuals(equilibrium: Equilibrium) -> Floats:
+    """(patches,) the forces left inside each patch over the norm of its own triangles' forces.
 
     Of a patch with several islands, the worst one counts.
     """
+    surface, classes = equilibrium.surface, equilibrium.classes
     island = islands(surface.topology)[classes.active]
     own = squared_forces(surface, classes, surface.vertices)
     island_of_vertex = np.zeros(surface.n, dtype=np.int64)
     island_of_vertex[classes.faces] = island[:, None]
-    inside = left * (classes.kind == SHEET)[:, None]
+    inside = equilibrium.unbalanced * (classes.kind == SHEET)[:, None]
     out = np.zeros(len(surface.patches))
-    squares = ratios(inside, island_of_vertex, own, island)
-    np.maximum.at(out, classes.patch_of_face, squares[island])
+    np.maximum.at(out, classes.patch_of_face, ratios(inside, island_of_vertex, own, island)[island])
     return np.sqrt(out)
-
-
-def _pulled_off(excess: Floats) -> str:
-    """Names the resting vertices that the sheets pull harder than their wall can take; or empty."""
-    vertices = np.flatnonzero(excess)
-    if not len(vertices):
-        return ""
-    return (
-        f"at {len(vertices)} pinched vertices, the first {vertices[0]}, the sheets pull harder than the"
-        " wall can hold: the wall will stand there once solved"
-    )
-
-
-def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Floats) -> pd.DataFrame:
-    errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
-    curvature, target = mean_curvature(standing, "variational"), target_curvature(standing)
-    rows = []
-    for index, patch in enumerate(surface.patches):
-        faces = standing.patch_of_face == index
-        inside = np.zeros(surface.n, dtype=bool)
-        inside[standing.faces[faces]] = True
-        inside &= np.isfinite(curvature)
-        row: dict[str, Any] = {
-            "patch": patch.name,
-            "tension": patch.tension,
-            "pressure": patch.pressure,
-            **({"snow": patch.snow, "net": patch.net_pressure} if surface.snows.any() else {}),
-            "target": float(target[inside].mean())
-            if patch.weight and inside.any()
-            else patch.target_curvature,
-            "area": float(areas[index]),
-            "mean_H": float(curvature[inside].mean()) if inside.any() else np.nan,
-        }
-        for method, error in errors.items():
-            known = error[inside & np.isfinite(error)]
-            row[f"{method}_max"] = float(known.max()) if len(known) else np.nan
-            row[f"{method}_mean"] = float(known.mean()) if len(known) else np.nan
-        row["quality"] = float(quality[faces].min(initial=1.0))
-        rows.append(row)
-    return pd.DataFrame(rows)
 
 
 def _largest(values: pd.Series) -> float:

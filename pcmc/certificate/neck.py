@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, maxi
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from .reactions import held_boundary
 
 PINCHED = 0.1  # of the held curves' length: a neck shorter than this has pinched off
 UNITS = 500_000_000  # of the length of all edges: the flow counts in whole numbers
@@ -18,17 +19,11 @@ UNITS = 500_000_000  # of the length of all edges: the flow counts in whole numb
 
 @dataclass(frozen=True, eq=False)
 class Neck:
-    """The shortest cut through the triangles that parts two held curves.
+    """The shortest cut through the triangles that parts two held curves."""
 
-    Attributes
-    ----------
-    girth : its length. place : (3,) its middle.
-    ratio : girth over the length of the shorter of the two curves.
-    """
-
-    girth: float
-    place: Floats
-    ratio: float
+    girth: float  # its length
+    place: Floats  # (3,) its middle
+    ratio: float  # girth over the length of the shorter of the two curves
 
     def __str__(self) -> str:
         place = self.place.round(3) + 0.0
@@ -77,8 +72,7 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     shrink.
     """
     topo, n = surface.topology, surface.n
-    held = surface.held
-    edges = topo.edges[topo.boundary_edge & held[topo.edges].all(axis=1) & ~surface.mirror_edge]
+    edges = topo.edges[held_boundary(surface)]
     links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     label = connected_components(links, directed=False)[1]
     on_curve = np.zeros(n, dtype=bool)
@@ -124,14 +118,14 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
     face, edge = face[edge >= 0], edge[edge >= 0]
     source, sink, plenty = m + 2 * k, m + 2 * k + 1, 2 * UNITS
     capacity = np.maximum(np.rint(lengths * (UNITS / lengths.sum())), 1.0)
-    pairs = (
-        (face, m + edge, np.full(len(face), plenty)),
+    links = (
+        (face, m + edge, plenty),
         (m + np.arange(k), m + k + np.arange(k), capacity),
-        (m + k + edge, face, np.full(len(face), plenty)),
-        (np.full(len(starts), source), starts, np.full(len(starts), plenty)),
-        (ends, np.full(len(ends), sink), np.full(len(ends), plenty)),
+        (m + k + edge, face, plenty),
+        (source, starts, plenty),
+        (ends, sink, plenty),
     )
-    row, column, data = (np.concatenate([pair[i] for pair in pairs]) for i in range(3))
+    row, column, data = np.concatenate([np.broadcast_arrays(*link) for link in links], axis=1)
     graph = csr_array(coo_array((data.astype(np.int32), (row, column)), shape=(sink + 1, sink + 1)))
     left = (graph - csr_array(maximum_flow(graph, source, sink).flow)).astype(float)
     left.eliminate_zeros()

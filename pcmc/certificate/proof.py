@@ -18,17 +18,12 @@ class Overload:
     Load and capacity are those of every smooth surface with these supports: see
     ``pcmc.certificate.balance.load_is_given``.
 
-    Attributes
-    ----------
-    ratio : load over capacity, above 1; see ``pcmc.certificate.balance.load_ratio``.
-    load : what it is called, ``"pressure"`` or, under snow, ``"net pressure"``.
-
     >>> print(Overload(1.2))
     the pressure is 1.20 times what the boundary's tension could carry on any smooth surface
     """
 
-    ratio: float
-    load: str = "pressure"
+    ratio: float  # load over capacity, above 1; see ``pcmc.certificate.balance.load_ratio``
+    load: str = "pressure"  # what it is called: under snow "net pressure"
 
     def __str__(self) -> str:
         digits = ".3f" if self.ratio < 1.1 else ".2f" if self.ratio < 1e4 else ".3g"
@@ -42,22 +37,16 @@ class Overload:
 class UnbalancedJunction:
     """Tensions at a junction that cannot balance at any angles, Eq. (7).
 
-    Attributes
-    ----------
-    junction : names of the patches that meet there.
-    strongest, others : the largest tension, and those of the other patches, force/length.
-    remedy : a patch, a tension of it with which they balance, force/length, and whether it is a wall.
-
     >>> print(UnbalancedJunction(("left", "right", "wall"), 5.0, (1.0, 3.0)))
     the tensions at the junction left | right | wall cannot balance: 5 > 1 + 3
     >>> UnbalancedJunction(("left", "right", "wall"), 5.0, (1.0, 3.0), ("wall", 2.3, True)).hint
     "; try a tension of 2.3 for 'wall' (in a plan, wall = 2.3)"
     """
 
-    junction: tuple[str, ...]
-    strongest: float
+    junction: tuple[str, ...]  # names of the patches that meet there
+    strongest: float  # the largest tension, and those of the other patches, force/length
     others: tuple[float, ...]
-    remedy: tuple[str, float, bool] | None = None
+    remedy: tuple[str, float, bool] | None = None  # a patch, the tension for balance, whether a wall
 
     def __str__(self) -> str:
         return f"{self.imbalance}{self.hint}"
@@ -83,20 +72,15 @@ class UnbalancedJunction:
 class WeakCable:
     """A cable that is too weak for the free edge of a flat sail; see ``pcmc.certificate.cables.weak_cable``.
 
-    Attributes
-    ----------
-    cable : its name. tension, least : its tension, and the least at which it could be at rest, force.
-    chord : distance of its ends, length. angle : φ, the most that its arc can turn by, radians.
-
     >>> print(WeakCable("east", 1.0, 2.0**0.5, 2.0, 0.5 * math.pi))
     cable 'east' is too weak for a flat sail: 1 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°; raise it
     """
 
     cable: str
-    tension: float
-    least: float
-    chord: float
-    angle: float
+    tension: float  # force
+    least: float  # the least tension at which it could be at rest
+    chord: float  # L, distance of its ends
+    angle: float  # φ, the most that its arc can turn by, radians
 
     def __str__(self) -> str:
         return (
@@ -111,20 +95,14 @@ class Unheld:
 
     Without pressure its homotheties about Π's point have E(s) = s T, or s² T and cables s C, all of which
     grow with s. Of a part on no support E(X + t n) = E(X) + t Σ w A, where the pressures cancel.
-
-    Attributes
-    ----------
-    vertex : one of its vertices.
-    falls : whether it falls; otherwise it shrinks.
     """
 
-    vertex: int
-    falls: bool = False
+    vertex: int  # one of its vertices
+    falls: bool = False  # otherwise it shrinks
 
     def __str__(self) -> str:
-        why = (
-            "and it has a weight: it falls" if self.falls else "which has no pressure: it shrinks to nothing"
-        )
+        falls, shrinks = "and it has a weight: it falls", "which has no pressure: it shrinks to nothing"
+        why = falls if self.falls else shrinks
         return f"nothing holds the part of the surface around vertex {self.vertex}, {why}"
 
 
@@ -209,9 +187,9 @@ class Attempt:
         return f"lower all {loads} below {below} of theirs, or raise all tensions above {above} times theirs"
 
 
-def _three(value: float, whole: Callable[[float], float] = round) -> str:
-    """Three digits behind the point, or three in all for small and large numbers; ``whole`` rounds them."""
+def _three(value: float, rounding: Callable[[float], float] = round) -> str:
+    """Three digits behind the point, or three in all for small and large numbers."""
     fixed = 1e-2 <= value < 1e4
     step = 10.0 ** (-3 if fixed else math.floor(math.log10(value or 1.0)) - 2)
-    rounded = step * whole(value / step)
+    rounded = step * rounding(value / step)
     return f"{rounded:.3f}" if fixed else f"{rounded:.3g}"

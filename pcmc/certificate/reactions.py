@@ -12,20 +12,20 @@ left in the limit. Forces at points are those of cables that end, and of points 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
-from ..forces import kernels
+from ..forces import triangles
 from ..forces.functional import add_cables_and_weights
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.supports import apply_supports, symmetric_part
 from .cables import cable_ends
-from .curve_tables import conormal_sum
+from .tables import conormal_sum
 
 SPAN = 1e-9  # of the largest force: what planes leave of the forces that they carry
 
@@ -41,48 +41,31 @@ def reactions(surface: Surface) -> Floats:
     """
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
-    forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
+    forces = triangles.measure(triangles.energy_mesh(surface, pressure=zero), X)[2]
     add_cables_and_weights(surface, X, forces)
     third = area_vectors(X[F]) / 3.0
     forces -= vertex_sums(third * surface.net_pressures[surface.patch_of_face, None], F, surface.n)
     return forces - apply_supports(surface, forces.copy())
 
 
-class SupportForces(NamedTuple):
-    """The reactions by how they act, force; ``along`` + ``points`` + ``mirrors`` are all of them.
-
-    Attributes
-    ----------
-    surface, standing : the surface, and the part of it that stands, which the supports hold.
-    forces : (n,3) all of them.
-    along : (n,3) on lines and sheets.
-    points : (n,3) at single points, and of the cables that end on a line.
-    mirrors : (n,3) the pull of images across mirror planes.
-    lines : (e,2) the ends of edges that are held as lines: of the boundary, of lines inside the surface, and
-        of junctions that a plane holds, as on an upright wall, or that rest on Π.
-    lengths : (n,) half the length of the edges of ``lines`` at each vertex; 0 where there is none.
-    pulls : (e,3) force per length that holds the sheets along the edges of ``lines``; 0 at the others.
-    clamped : (n,) the vertices that cannot move, or only along a line that was given.
-    single : (n,) those of them that are in no line.
-    on_boundary : (n,) the vertices of the held boundary.
-    by_plane : (1 + planes,n,3) what Π and each of ``on_planes`` carry at the vertices that slide on them.
-    cables : (1 + planes,n,3) the part of these that holds the ends of cables.
-    """
+@dataclass(frozen=True, eq=False)
+class SupportForces:
+    """The reactions by how they act, force; ``along``, ``points`` and the pull of images are all of them."""
 
     surface: Surface
-    standing: Surface
-    forces: Floats
-    along: Floats
-    points: Floats
-    mirrors: Floats
-    lines: Bools
-    lengths: Floats
-    pulls: Floats
-    clamped: Bools
-    single: Bools
-    on_boundary: Bools
-    by_plane: Floats
-    cables: Floats
+    standing: Surface  # the part of it that stands, which the supports hold
+    forces: Floats  # (n,3) all of them
+    along: Floats  # (n,3) on lines and sheets
+    points: Floats  # (n,3) at single points, and of the cables that end on a line
+    lines: Bools  # (e,2) the ends of edges that are held as lines: of the boundary, of lines inside the
+    # surface, and of junctions that a plane holds, as on an upright wall, or that rest on Π
+    lengths: Floats  # (n,) half the length of the edges of ``lines`` at each vertex; 0 where there is none
+    pulls: Floats  # (e,3) force per length that holds the sheets along the edges of ``lines``; else 0
+    clamped: Bools  # (n,) the vertices that cannot move, or only along a line that was given
+    single: Bools  # (n,) those of them that are in no line
+    on_boundary: Bools  # (n,) the vertices of the held boundary
+    by_plane: Floats  # (1 + planes,n,3) what Π and each of ``on_planes`` carry at the vertices on them
+    cables: Floats  # (1 + planes,n,3) the part of these that holds the ends of cables
 
     @property
     def per_length(self) -> Floats:
@@ -93,13 +76,6 @@ class SupportForces(NamedTuple):
             np.add.at(force, edges[:, side], half * self.lines[:, [side]])
         share = self.lengths[:, None]
         return np.divide(force, share, out=np.full(force.shape, np.nan), where=share > 0.0)
-
-    @property
-    def left(self) -> Floats:
-        """(n,3) at vertices of lines r_v: ``along`` less the pulls; a mesh leaves it, the limit does not."""
-        return np.where(
-            self.lengths[:, None] > 0.0, self.along - self.lengths[:, None] * self.per_length, 0.0
-        )
 
     def along_patch(self, patch: int | None) -> Bools:
         """(e,) the edges of lines that belong to a patch, or all of them."""
@@ -133,19 +109,18 @@ def support_forces(
     """
     standing = standing_part(surface).surface if standing is None else standing
     forces = reactions(standing) if forces is None else forces
-    planes, topo = standing.on_planes, surface.topology
+    topo, planes = surface.topology, [plane for plane, _ in standing.on_planes]
     ends = np.zeros_like(forces)
     for _, vertex, force in cable_ends(standing):
         ends[vertex] += force
     ends -= apply_supports(standing, ends.copy())
     clamped, on, by_plane, cables = _divided(standing, forces, ends)
-    mirror = [False, *(plane.mirror for plane, _ in planes)]
-    mirrors = by_plane[mirror].sum(axis=0)
-    boundary, held = _held_boundary(surface), standing.fixed | standing.on_plane
+    mirror = np.array([False, *(plane.mirror for plane in planes)])
+    boundary, held = held_boundary(surface), standing.fixed | standing.on_plane
     on_boundary, used = np.zeros((2, surface.n), dtype=bool)
     on_boundary[topo.edges[boundary]] = True
     used[standing.faces] = used[standing.cable_edges.ends] = True
-    for plane, mask in planes:
+    for plane, mask in standing.on_planes:
         held = held | (mask & (not plane.mirror))
     single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
     between = topo.junction_edge | topo.seam_edge
@@ -153,36 +128,34 @@ def support_forces(
     drawn = (between | surface.edges_on_curves.drawn) & ~topo.boundary_edge
     inner = at_both_ends(single, topo.edges) | (drawn & at_both_ends(clamped, topo.edges))
     lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
-    lengths = _half_lengths(surface, lines)
-    pulls, normals = (
-        np.zeros((len(lines), 3)),
-        np.array([standing.plane.normal, *(p.normal for p, _ in planes)]),
-    )
+
     some = np.flatnonzero(lines.any(axis=1))
+    half = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[some])[:, None], 2, axis=1)
+    lengths = np.bincount(topo.edges[some][lines[some]], half[lines[some]], surface.n).astype(float)
+    pulls = np.zeros((len(lines), 3))
     pulls[some] = sheet_pulls(standing, topo.edges[some])
-    common = (on | clamped)[:, topo.edges[some]].all(axis=2) & ~np.array(mirror)[:, None]
-    part = some[~at_both_ends(clamped, topo.edges[some])]
-    pulls[part] = _by_normal(normals, common[:, np.isin(some, part)], pulls[part]).sum(axis=0)
+    part = some[~at_both_ends(clamped, topo.edges[some])]  # a plane holds the part across itself
+    common = (on | clamped)[:, topo.edges[part]].all(axis=2) & ~mirror[:, None]
+    normals = np.array([standing.plane.normal, *(plane.normal for plane in planes)])
+    pulls[part] = _by_normal(normals, common, pulls[part]).sum(axis=0)
     points = np.where(lengths[:, None] > 0.0, ends - cables[mirror].sum(axis=0), 0.0)
-    inside = forces - mirrors
+    inside = forces - by_plane[mirror].sum(axis=0)
     alone = single & (lengths == 0.0)
     points[alone] = inside[alone]
-    along = inside - points
     return SupportForces(
-        surface,
-        standing,
-        forces,
-        along,
-        points,
-        mirrors,
-        lines,
-        lengths,
-        pulls,
-        clamped,
-        alone,
-        on_boundary,
-        by_plane,
-        cables,
+        surface=surface,
+        standing=standing,
+        forces=forces,
+        along=inside - points,
+        points=points,
+        lines=lines,
+        lengths=lengths,
+        pulls=pulls,
+        clamped=clamped,
+        single=alone,
+        on_boundary=on_boundary,
+        by_plane=by_plane,
+        cables=cables,
     )
 
 
@@ -191,18 +164,10 @@ def at_both_ends(mask: Bools, edges: Ints) -> Bools:
     return np.asarray(mask[edges[:, 0]] & mask[edges[:, 1]])
 
 
-def _held_boundary(surface: Surface) -> Bools:
+def held_boundary(surface: Surface) -> Bools:
     """(e,) edges of the boundary that are held at both ends, but for those in mirror planes."""
     topo = surface.topology
     return topo.boundary_edge & ~surface.mirror_edge & at_both_ends(surface.held, topo.edges)
-
-
-def _half_lengths(surface: Surface, ends: Bools) -> Floats:
-    """(n,) at each vertex half the length of the edges (e,2) that have one of the chosen ends there."""
-    chosen = np.flatnonzero(ends[:, 0] | ends[:, 1])
-    edges, ends = surface.topology.edges[chosen], ends[chosen]
-    half = np.repeat(0.5 * segment_lengths(surface.vertices, edges)[:, None], 2, axis=1)
-    return np.asarray(np.bincount(edges[ends], half[ends], surface.n), dtype=float)
 
 
 def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
@@ -223,15 +188,12 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Boo
     on = np.array([ground, *(mask for _, mask in surface.on_planes)])
     clamped = surface.given_supports.fixed_and_sliding()[0]
     least = SPAN * float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    across = [part - symmetric_part(surface.on_planes, part.copy()) for part in (forces, ends)]
     for _ in range(2):  # again with those clamped that planes cannot carry, as where a held bottom is pinched
         here = np.where(clamped, on & mirror[:, None], on)
         carried, of_cables = (
-            _by_normal(
-                normals,
-                here,
-                np.where(clamped[:, None], part - symmetric_part(surface.on_planes, part.copy()), part),
-            )
-            for part in (forces, ends)
+            _by_normal(normals, here, np.where(clamped[:, None], mirrored, part))
+            for part, mirrored in zip((forces, ends), across, strict=True)
         )
         clamped = clamped | (np.linalg.norm(forces - carried.sum(axis=0), axis=1) > least)
     return clamped, on, carried, of_cables

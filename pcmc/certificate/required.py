@@ -16,10 +16,10 @@ def certified(surface: Surface, anyway: bool, known: Certificate | None = None) 
     unless ``anyway``, and if the known certificate belongs to another surface."""
     validate.flag("anyway", anyway)
     if known is not None:
-        same = len(known.reactions) == surface.n and math.isclose(known.energy, energy(surface), rel_tol=1e-9)
-        if not same:
+        own = energy(surface)
+        if len(known.reactions) != surface.n or not math.isclose(known.energy, own, rel_tol=1e-9):
             text = "certificate: belongs to another surface; pass certify(surface), or leave it out"
-            raise SurfaceError(text, what="certificate", found=known.energy, expected=energy(surface))
+            raise SurfaceError(text, what="certificate", found=known.energy, expected=own)
     certificate = certify(surface) if known is None else known
     require_certified(certificate, anyway)
     return certificate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,28 +13,26 @@ from ..surface import Plane, Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, Curve, vertex_kind
 from .cables import cable_ends
-from .curve_tables import middle
-from .reactions import SupportForces, at_both_ends, sheet_pulls
+from .reactions import SupportForces, at_both_ends, held_boundary, sheet_pulls
+from .tables import middle, names_of
 
 COLUMNS = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 COLUMNS += ["moment_x", "moment_y", "moment_z", "per_length_max"]
-AT_POINTS = ("point", "cable end")  # the kinds whose forces act at one point
+LETTERS = {"point": "S", "cable end": "C"}  # of the kinds whose forces act at one point; B for the others
 STEEP = 1e-9  # of a normal's part along that of Π, up to which a plane is upright
 
 
 class _Part(NamedTuple):
-    """A support: name and kind, its vertices (k,), its share of the force at each (k,3), length, place,
-    and its edges (j,) with the pull along each (j,3).
-    """
+    """A support."""
 
     name: str
     kind: str
-    vertices: Ints
-    forces: Floats
+    vertices: Ints  # (k,)
+    forces: Floats  # (k,3) its share of the force at each
     length: float
-    place: Floats
-    edges: Ints = np.empty(0, dtype=np.int64)
-    pulls: Floats = np.empty((0, 3))
+    place: Floats  # (3,)
+    edges: Ints = np.empty(0, dtype=np.int64)  # (j,)
+    pulls: Floats = np.empty((0, 3))  # (j,3) along each edge, force/length
 
 
 def support_table(acting: SupportForces) -> pd.DataFrame:
@@ -53,11 +51,11 @@ def support_table(acting: SupportForces) -> pd.DataFrame:
     ``pulls`` along its edges, NaN for points.
     """
     rows, surface = [], acting.surface
-    size = surface.size
     for label, part in _labelled(acting):
-        at = np.where(np.abs(part.place) <= 1e-12 * size, 0.0, part.place)
+        at = np.where(np.abs(part.place) <= 1e-12 * surface.size, 0.0, part.place)
         moment = np.cross(surface.vertices[part.vertices] - at, part.forces).sum(axis=0)
-        numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, _most(part.pulls)]
+        most = float(np.linalg.norm(part.pulls, axis=1).max()) if len(part.pulls) else np.nan
+        numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, most]
         rows.append([label, part.name or label, part.kind, *map(float, numbers)])
     return pd.DataFrame(rows, columns=COLUMNS)
 
@@ -90,37 +88,42 @@ def support_vertices(acting: SupportForces) -> dict[str, Ints]:
     return {label: part.vertices for label, part in _labelled(acting)}
 
 
+def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table of supports that are as long as a curve, as ``Certificate.boundaries`` has them."""
+    names = {"name": "boundary"} | {f"force_{c}": f"reaction_{c}" for c in "xyz"}
+    names |= {c: f"middle_{c}" for c in "xyz"}
+    chosen = ["name", "length", *"xyz", "force_x", "force_y", "force_z", "per_length_max"]
+    rows = supports[~supports["kind"].isin([*LETTERS])]
+    return rows[chosen].rename(columns=names).reset_index(drop=True)
+
+
 def _labelled(acting: SupportForces) -> Iterator[tuple[str, _Part]]:
     """Each support with its number."""
     count = {"B": 0, "S": 0, "C": 0}
-    parts = [*_held_lines(acting), *_mirrors(acting), *_inner_lines(acting), *_planes(acting)]
-    for part in (*parts, *_points(acting), *_ends_of_cables(acting)):
-        letter = {"point": "S", "cable end": "C"}.get(part.kind, "B")
+    sources = _held_lines, _mirrors, _inner_lines, _planes, _points
+    for part in (part for source in sources for part in source(acting)):
+        letter = LETTERS.get(part.kind, "B")
         count[letter] += 1
         yield f"{letter}{count[letter]}", part
 
 
-def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
-    """The rows of a table of supports that are as long as a curve, as ``Certificate.boundaries`` has them."""
-    rows = supports[~supports["kind"].isin(AT_POINTS)]
-    names = {"name": "boundary"} | {f"force_{c}": f"reaction_{c}" for c in "xyz"}
-    names |= {c: f"middle_{c}" for c in "xyz"}
-    chosen = ["name", "length", *"xyz", "force_x", "force_y", "force_z", "per_length_max"]
-    return rows[chosen].rename(columns=names).reset_index(drop=True)
-
-
 def held_curves(surface: Surface) -> tuple[Curve, ...]:
     """The curves of the held boundary but for mirror planes, each along one patch and one support."""
-    topo = surface.topology
-    boundary = topo.boundary_edge & ~surface.mirror_edge
-    held = boundary & at_both_ends(surface.held, topo.edges)
-    stop = vertex_kind(topo.edges[boundary], surface.n) == POINT
+    topo, held = surface.topology, held_boundary(surface)
+    stop = vertex_kind(topo.edges[topo.boundary_edge & ~surface.mirror_edge], surface.n) == POINT
     for keys in (_patch_of_edge(surface), _support_of_edge(surface)):
         for key in np.unique(keys[held]):
             there = np.zeros((2, surface.n), dtype=bool)
             there[0, topo.edges[held & (keys == key)]] = there[1, topo.edges[held & (keys != key)]] = True
             stop |= there.all(axis=0)
     return topo.chains(topo.edges[held], stop)
+
+
+def _patch_of_edge(surface: Surface) -> Ints:
+    """(e,) a patch at each edge: the patch, at the boundary."""
+    patch = np.empty(len(surface.topology.edges), dtype=np.int64)
+    patch[surface.topology.edge_of_face] = surface.patch_of_face[:, None]
+    return patch
 
 
 def _support_of_edge(surface: Surface) -> Ints:
@@ -142,107 +145,91 @@ def _held_lines(acting: SupportForces) -> Iterator[_Part]:
     kinds = [*planes, "plane", "line", "ground"]  # -2 and -1 count from the end
     for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
         kind = kinds[support[surface.topology.edge_numbers(curve.pairs[:1])[0]]]
-        yield _line(acting, kind, curve, forces, _names(surface, curve.sheets))
+        yield _line(acting, kind, curve, forces)
 
 
 def _mirrors(acting: SupportForces) -> Iterator[_Part]:
     """The pull of the image along each curve in a mirror plane, and of single vertices there."""
-    surface = acting.surface
-    topo = surface.topology
+    surface, topo = acting.surface, acting.surface.topology
     patch = _patch_of_edge(surface)
     for k, (plane, mask) in enumerate(surface.on_planes, start=1):
         if not plane.mirror:
             continue
         edges = surface.mirror_edge & at_both_ends(mask, topo.edges)
         curves = [c for p in np.unique(patch[edges]) for c in topo.curves_among(edges & (patch == p))]
-        pull = acting.by_plane[k]
+        pull, normal = acting.by_plane[k], np.array(plane.normal)
         groups = [curve.vertices for curve in curves]
         for curve, forces in zip(curves, _shared(pull, groups), strict=True):
-            name = f"{_names(surface, curve.sheets)} in the {plane}"
-            normal = np.array(plane.normal)
             across = np.outer(sheet_pulls(acting.standing, curve.pairs) @ normal, normal)
-            yield _line(acting, "mirror", curve, forces, name, across)
+            yield _line(acting, "mirror", curve, forces, f" in the {plane}", across)
         yield from _others(acting, "mirror", pull, mask, groups, f"single points in the {plane}")
 
 
 def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
     """The lines inside the surface that are held."""
-    surface, topo = acting.surface, acting.surface.topology
+    topo = acting.surface.topology
     chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
     curves, along = topo.curves_among(chosen), np.where(acting.on_boundary[:, None], 0.0, acting.along)
     for curve, forces in zip(curves, _shared(along, [c.vertices for c in curves]), strict=True):
-        yield _line(acting, "line", curve, forces, f"{_names(surface, curve.sheets)}, inside")
+        yield _line(acting, "line", curve, forces, ", inside")
 
 
 def _planes(acting: SupportForces) -> Iterator[_Part]:
     """What Π and the planes carry away from the held boundary: upright walls, and junctions at rest."""
-    surface, topo = acting.surface, acting.surface.topology
+    surface, standing = acting.surface, acting.standing
     inside = ~acting.clamped & ~acting.on_boundary
-    planes = [(surface.plane, _on_ground(acting)), *surface.on_planes]
-    for k, (plane, mask) in enumerate(planes):
+    at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
+    for k, (plane, mask) in enumerate([(surface.plane, at_rest), *surface.on_planes]):
         if plane.mirror or not (mask & inside).any():
             continue
         kind = "ground" if k == 0 else _kind(surface, plane)
-        where = (
-            f" in the {plane}" if plane.name else {"ground": ", at rest"}.get(kind, f", {kind.split()[0]}")
-        )
+        where = ", at rest" if k == 0 else f", {kind.split()[0]}"
+        where = f" in the {plane}" if plane.name else where
         listed = np.where(acting.lengths[:, None] > 0.0, acting.cables[k], 0.0)  # as ends of cables
-        pull, flat = (
-            np.where(inside[:, None], acting.by_plane[k] - listed, 0.0),
-            mask[surface.faces].all(axis=1),
-        )
-        held = (topo.junction_edge | topo.seam_edge) & at_both_ends(mask | acting.clamped, topo.edges)
-        groups: list[tuple[str, Ints, Bools]] = []
-        for wall in np.unique(surface.patch_of_face[flat]).tolist() if k else ():
-            faces = flat & (surface.patch_of_face == wall)
-            own = np.zeros_like(held)
-            own[topo.edge_of_face[faces]] = True
-            groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), own & held))
-        done = np.zeros_like(inside)
-        done[[v for _, vertices, _ in groups for v in vertices]] = True
-        rest = held & (mask & inside & ~done)[topo.edges].any(axis=1)
-        for curve in topo.curves_among(rest):
-            numbers = np.zeros_like(held)
-            numbers[topo.edge_numbers(curve.pairs)] = True
-            groups.append((_names(surface, curve.sheets), curve.vertices, numbers))
-        shares = _shared(pull, [vertices for _, vertices, _ in groups])
-        for (name, vertices, edges), forces in zip(groups, shares, strict=True):
-            ends = topo.edges[edges]
+        pull = np.where(inside[:, None], acting.by_plane[k] - listed, 0.0)
+        groups = _groups_on_plane(acting, mask, inside, walls=k > 0)
+        vertices = [vertices for _, vertices, _ in groups]
+        for (name, on, edges), forces in zip(groups, _shared(pull, vertices), strict=True):
+            ends = surface.topology.edges[edges]
             lengths = segment_lengths(surface.vertices, ends)
-            points = surface.vertices[ends].mean(axis=1) if edges.any() else surface.vertices[vertices]
+            points = surface.vertices[ends].mean(axis=1) if len(edges) else surface.vertices[on]
             place = np.average(points, axis=0, weights=lengths if lengths.sum() > 0.0 else None)
-            pulled = np.flatnonzero(edges & acting.lines.any(axis=1))
-            yield _Part(
-                name + where,
-                kind,
-                vertices,
-                forces,
-                float(lengths.sum()),
-                place,
-                pulled,
-                acting.pulls[pulled],
-            )
-        name = f"single points{where}"
-        yield from _others(acting, kind, pull, mask & inside, [vertices for _, vertices, _ in groups], name)
+            pulled = edges[acting.lines[edges].any(axis=1)]
+            length = float(lengths.sum())
+            yield _Part(name + where, kind, on, forces, length, place, pulled, acting.pulls[pulled])
+        yield from _others(acting, kind, pull, mask & inside, vertices, f"single points{where}")
+
+
+def _groups_on_plane(
+    acting: SupportForces, mask: Bools, inside: Bools, walls: bool
+) -> list[tuple[str, Ints, Ints]]:
+    """Name, vertices and edges of what one plane carries: walls that lie in it, then curves of junctions."""
+    surface, topo = acting.surface, acting.surface.topology
+    held = (topo.junction_edge | topo.seam_edge) & at_both_ends(mask | acting.clamped, topo.edges)
+    flat = mask[surface.faces].all(axis=1)
+    groups: list[tuple[str, Ints, Ints]] = []
+    done = np.zeros_like(inside)
+    for wall in np.unique(surface.patch_of_face[flat]).tolist() if walls else ():
+        faces = flat & (surface.patch_of_face == wall)
+        edges = np.unique(topo.edge_of_face[faces])
+        groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), edges[held[edges]]))
+        done[surface.faces[faces]] = True
+    for curve in topo.curves_among(held & (mask & inside & ~done)[topo.edges].any(axis=1)):
+        edges = np.sort(topo.edge_numbers(curve.pairs))
+        groups.append((_unique_names(surface, curve), curve.vertices, edges))
+    return groups
 
 
 def _points(acting: SupportForces) -> Iterator[_Part]:
-    """The single fixed points, with the cables that end there."""
+    """The single fixed points, and the vertices of lines where cables end, with the force of these."""
+    X, names = acting.surface.vertices, dict[int, list[str]]()
     for v in np.flatnonzero(acting.single)[:, None]:
-        yield _Part("", "point", v, acting.points[v], 0.0, acting.surface.vertices[v[0]])
-
-
-def _ends_of_cables(acting: SupportForces) -> Iterator[_Part]:
-    """The vertices of lines where cables end, with the force of all of these."""
-    names: dict[int, list[str]] = {}
+        yield _Part("", "point", v, acting.points[v], 0.0, X[v[0]])
     for cable, vertex, _ in cable_ends(acting.standing):
         names.setdefault(vertex, []).append(cable.name)
     for v in sorted(names):
         if acting.lengths[v] > 0.0 and acting.points[v].any():
-            at = np.array([v])
-            yield _Part(
-                " + ".join(names[v]), "cable end", at, acting.points[at], 0.0, acting.surface.vertices[v]
-            )
+            yield _Part(" + ".join(names[v]), "cable end", np.array([v]), acting.points[[v]], 0.0, X[v])
 
 
 def _line(
@@ -250,7 +237,7 @@ def _line(
     kind: str,
     curve: Curve,
     forces: Floats,
-    name: str,
+    where: str = "",
     pulls: Floats | None = None,
 ) -> _Part:
     """A support along a curve; the ``pulls`` (k,3) along its edges are those of the lines if not given."""
@@ -259,12 +246,8 @@ def _line(
     pulls = acting.pulls[edges] if pulls is None else pulls
     length = float(segment_lengths(surface.vertices, curve.pairs).sum())
     place = np.array(list(middle(surface, curve).values()))
+    name = _unique_names(surface, curve) + where
     return _Part(name, kind, curve.vertices, forces, length, place, edges, pulls)
-
-
-def _most(pulls: Floats) -> float:
-    """The largest of pulls (k,3); NaN where there is none."""
-    return float(np.linalg.norm(pulls, axis=1).max()) if len(pulls) else np.nan
 
 
 def _shared(forces: Floats, groups: Sequence[Ints]) -> list[Floats]:
@@ -276,7 +259,7 @@ def _shared(forces: Floats, groups: Sequence[Ints]) -> list[Floats]:
 
 
 def _others(
-    acting: SupportForces, kind: str, forces: Floats, mask: Bools, groups: Iterable[Ints], name: str
+    acting: SupportForces, kind: str, forces: Floats, mask: Bools, groups: Sequence[Ints], name: str
 ) -> Iterator[_Part]:
     """The vertices of a mask with a force that are in none of the groups, as one support."""
     left = mask & forces.any(axis=1)
@@ -287,23 +270,10 @@ def _others(
         yield _Part(name, kind, vertices, forces[vertices], 0.0, place)
 
 
-def _on_ground(acting: SupportForces) -> Bools:
-    """(n,) vertices that slide or rest on Π."""
-    surface = acting.standing
-    return surface.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
-
-
-def _patch_of_edge(surface: Surface) -> Ints:
-    """(e,) a patch at each edge: the patch, at the boundary."""
-    patch = np.empty(len(surface.topology.edges), dtype=np.int64)
-    patch[surface.topology.edge_of_face] = surface.patch_of_face[:, None]
-    return patch
-
-
 def _kind(surface: Surface, plane: Plane) -> str:
     steep = abs(float(np.dot(plane.normal, surface.plane.normal))) <= STEEP
     return "upright plane" if steep else "plane"
 
 
-def _names(surface: Surface, sheets: Iterable[int]) -> str:
-    return " | ".join(dict.fromkeys(surface.patches[i].name for i in sheets))
+def _unique_names(surface: Surface, curve: Curve) -> str:
+    return names_of(surface, dict.fromkeys(curve.sheets))

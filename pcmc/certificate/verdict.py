@@ -10,24 +10,19 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..forces.weight import compressed, effective_tensions
-from ..stability.softness import Spectrum
+from ..forces.triangles import compressed, effective_tensions
+from ..stability.softness import NEAR, NEUTRAL, Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
-from .collapse import held_wall_down, where_collapsed
+from .diagnosis import describe_saddle, held_wall_down, where_collapsed
 from .neck import Neck, pinched_neck
 from .proof import Attempt, Overload, Proof
-from .slipping import describe_saddle
 
 NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-# |λ| size²/α up to which the detail names a fold. A mesh's own branch folds where the derivative of the
-# forces left is singular, which is not quite the second variation: at reported folds of coarse caps,
-# catenoids and pairs of caps |λ| is 0.003 to 0.55. A flat film over a disc has 46.
-NEAR = 1.0
-NEUTRAL = 1e-2  # |λ| size²/α up to which a motion counts as neutral, α the tension of what it moves
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
+NO_TENSION = "no patch has a tension: every shape is at rest"
 COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
 
 
@@ -58,35 +53,20 @@ class Evidence(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What the verdict about a surface depends on.
-
-    Attributes
-    ----------
-    surface : the whole surface.
-    pinchable : (patches,) bool, its walls that can pinch.
-    residual, tolerance : forces left, relative; the most at which a surface counts as at rest.
-    quality : smallest triangle quality outside walls that can pinch.
-    spectrum : how many eigenvalues are negative, and how many nearly zero; see ``Spectrum``.
-    own_residuals : (patches,) each patch's forces left, relative to its own.
-    rounding : what rounding of the coordinates alone leaves of the residual, about.
-    evidence : what happened on the way, if a solver was there to see it.
-    tried : what a search has tried; empty if there was none.
-    mode : (n,3) displacements of the lowest mode; empty where none is known.
-    rigid : number of rigid motions that nothing resists, where rooms prescribe volumes.
-    """
+    """What the verdict about a surface depends on."""
 
     surface: Surface
-    pinchable: Bools
-    residual: float
-    tolerance: float
-    quality: float
-    spectrum: Spectrum
-    own_residuals: Floats
-    rounding: float = 0.0
-    evidence: Evidence | None = None
-    tried: tuple[Attempt, ...] = ()
-    mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    rigid: int = 0
+    pinchable: Bools  # (patches,) its walls that can pinch
+    residual: float  # forces left, relative
+    tolerance: float  # the most at which it counts as at rest
+    quality: float  # smallest triangle quality outside walls that can pinch
+    spectrum: Spectrum  # how many eigenvalues are negative, and how many nearly zero
+    own_residuals: Floats  # (patches,) each patch's forces left, relative to its own
+    rounding: float = 0.0  # what rounding of the coordinates alone leaves of the residual, about
+    evidence: Evidence | None = None  # what happened on the way, if a solver was there to see it
+    tried: tuple[Attempt, ...] = ()  # by a search
+    mode: Floats = field(default_factory=lambda: np.empty((0, 3)))  # (n,3) the lowest; empty if unknown
+    rigid: int = 0  # number of rigid motions that nothing resists, where rooms prescribe volumes
 
     @property
     def moving(self) -> bool:
@@ -107,8 +87,7 @@ class Findings:
         """
         if not self.moving:
             return ()
-        settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
-        load = self.overload
+        settled, load = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED), self.overload
         if load and not settled and load.ratio <= 1.0 + coarseness(self.surface):
             load = None
         return _theorems(self.surface, self.pinchable, load)
@@ -134,6 +113,11 @@ class Findings:
         """Whether triangles have collapsed."""
         return self.evidence is Evidence.COLLAPSED or self.quality <= COLLAPSED
 
+    @property
+    def wall_down(self) -> bool:
+        """Whether they have collapsed in a wall with a held bottom."""
+        return self.collapsed and held_wall_down(self.surface, self.pinchable)
+
 
 def _theorems(surface: Surface, pinchable: Bools, load: Overload | None) -> tuple[Proof, ...]:
     """What rules out a smooth surface at rest, with an overload if one is given."""
@@ -147,30 +131,20 @@ def only_coarse(surface: Surface, pinchable: Bools) -> str:
     return why and f"only a mesh as coarse as this is at rest here, no smooth surface is: {why}"
 
 
-@dataclass(frozen=True)
-class Rule:
-    """A verdict, when it applies, and the sentence that gives the reason (empty for none)."""
-
-    verdict: Verdict
-    applies: Callable[[Findings], bool]
-    reason: Callable[[Findings], str]
-
-
 def judge(findings: Findings) -> tuple[Verdict, str]:
     """The verdict on the findings and its reason, by the first of ``RULES`` that applies."""
-    rule = next(rule for rule in RULES if rule.applies(findings))
-    return rule.verdict, rule.reason(findings)
+    verdict, reason = next((verdict, reason) for verdict, applies, reason in RULES if applies(findings))
+    parts = reason(findings)
+    return verdict, parts if isinstance(parts, str) else "; ".join(str(part) for part in parts if part)
 
 
-def _disproved(f: Findings) -> str:
-    folds = (attempt for attempt in f.tried if attempt.folds)
-    return "; ".join(map(str, (*f.proofs, *folds, *([f.neck] if f.neck else []))))
+def _disproved(f: Findings) -> list[object]:
+    return [*f.proofs, *(attempt for attempt in f.tried if attempt.folds), f.neck]
 
 
-def _none_found(f: Findings) -> str:
+def _none_found(f: Findings) -> list[object]:
     vertex = growing_part(f.surface)
-    alone = "" if vertex is None else describe_growing(vertex)
-    return "; ".join(filter(None, (alone, *map(str, f.tried), str(f.neck or ""), _compressed(f))))
+    return ["" if vertex is None else describe_growing(vertex), *f.tried, f.neck, _compressed(f)]
 
 
 def _ran_away(f: Findings) -> str:
@@ -184,19 +158,18 @@ def _ran_away(f: Findings) -> str:
     return "it shrank to nothing; hold it with fixed= or on_plane=, raise the pressure, or start larger"
 
 
-def _collapse(f: Findings) -> str:
-    reasons = f.hardly_balanced, too_long(f.surface), where_collapsed(f.surface, f.pinchable)
-    return "; ".join(filter(None, (*reasons, *map(str, f.tried[1:]))))
+def _collapse(f: Findings) -> list[object]:
+    return [f.hardly_balanced, too_long(f.surface), where_collapsed(f.surface, f.pinchable), *f.tried[1:]]
 
 
-def _forces_left(f: Findings) -> str:
-    reason = f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}"
-    if f.hardly_balanced:
-        reason += f"; {f.hardly_balanced}"
-    reason = "; ".join(filter(None, (reason, too_long(f.surface), _compressed(f))))
-    if f.overload:
-        reason += f"; {f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"
-    return "; ".join((reason, *map(str, f.tried[1:])))
+def _residual(f: Findings) -> str:
+    return f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}"
+
+
+def _forces_left(f: Findings) -> list[object]:
+    coarse = f"{f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"
+    reasons = [_residual(f), f.hardly_balanced, too_long(f.surface), _compressed(f)]
+    return [*reasons, coarse if f.overload else "", *f.tried[1:]]
 
 
 def _weak_patch(f: Findings) -> str:
@@ -209,21 +182,20 @@ def _weak_patch(f: Findings) -> str:
 
 def _hidden_forces(f: Findings) -> str:
     return (
-        f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}, but rounding of the coordinates"
+        f"{_residual(f)}, but rounding of the coordinates"
         f" alone leaves about {f.rounding:.0e}: parts that are small beside their coordinates lose their"
         " digits; move the origin near them, or solve them by themselves"
     )
 
 
-def _hidden_stability(f: Findings) -> str:
+def _hidden_stability(f: Findings) -> list[object]:
     hidden = f.spectrum.hidden or (
         "the second variation is singular to rounding, so its negative eigenvalues cannot be counted"
     )
     reason = f"the forces balance (relative residual {f.residual:.1e}), but {hidden}"
     tensions = f.surface.tensions[f.surface.tensions > 0.0]
-    if len(tensions) and tensions.max() > FACTOR * tensions.min():
-        reason += f"; the tensions differ by a factor of {tensions.max() / tensions.min():.0e}"
-    return reason
+    factor = tensions.max() / tensions.min() if len(tensions) else 1.0
+    return [reason, f"the tensions differ by a factor of {factor:.0e}" if factor > FACTOR else ""]
 
 
 def _compressed(f: Findings) -> str:
@@ -242,9 +214,9 @@ def _compressed(f: Findings) -> str:
     )
 
 
-def _ways_down(f: Findings) -> str:
-    saddle = describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode)
-    return "; ".join(filter(None, (saddle, _near_fold(f))))
+def _saddle(f: Findings) -> list[object]:
+    ways = describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode)
+    return [ways, _near_fold(f)]
 
 
 def _near_fold(f: Findings) -> str:
@@ -258,40 +230,27 @@ def _near_fold(f: Findings) -> str:
     return f"at a fold or a branching, or near one: {modes} within ±{band:g} α/size², {signs}"
 
 
-RULES = (
-    Rule(
-        Verdict.NEUTRAL,
-        lambda f: not f.surface.tensions.any(),
-        lambda f: "no patch has a tension: every shape is at rest",
-    ),
-    Rule(
-        Verdict.NO_EQUILIBRIUM,
-        lambda f: bool(f.proofs),
-        _disproved,
-    ),
-    Rule(Verdict.NONE_FOUND, lambda f: f.lost and bool(f.tried), _none_found),
-    Rule(Verdict.RAN_AWAY, lambda f: f.lost, _ran_away),
-    Rule(
-        Verdict.WALL_DOWN,
-        lambda f: f.moving and f.collapsed and held_wall_down(f.surface, f.pinchable),
-        _collapse,
-    ),
-    Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
-    Rule(Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
-    Rule(Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
-    Rule(Verdict.NOT_CONVERGED, lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance), _weak_patch),
-    Rule(Verdict.SADDLE, lambda f: bool(compressed(f.surface).any()), _compressed),
-    Rule(Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
-    Rule(Verdict.SADDLE, lambda f: bool(f.spectrum.below), _ways_down),
-    Rule(
-        Verdict.NEUTRAL,
-        lambda f: f.rigid > 0,
-        lambda f: f"nothing resists {f.rigid} rigid motions; every change of shape at these volumes raises E",
-    ),
-    Rule(
-        Verdict.NEUTRAL,
-        lambda f: bool(f.spectrum.soft),
-        _near_fold,
-    ),
-    Rule(Verdict.STABLE, lambda f: True, _near_fold),
+def _free_motions(f: Findings) -> str:
+    return f"nothing resists {f.rigid} rigid motions; every change of shape at these volumes raises E"
+
+
+Rule = tuple[Verdict, Callable[[Findings], object], Callable[[Findings], str | list[object]]]
+"""A verdict, when it applies, and the reason, or its parts."""
+
+RULES: tuple[Rule, ...] = (
+    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: NO_TENSION),
+    (Verdict.NO_EQUILIBRIUM, lambda f: f.proofs, _disproved),
+    (Verdict.NONE_FOUND, lambda f: f.lost and f.tried, _none_found),
+    (Verdict.RAN_AWAY, lambda f: f.lost, _ran_away),
+    (Verdict.WALL_DOWN, lambda f: f.moving and f.wall_down, _collapse),
+    (Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
+    (Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
+    (Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
+    (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > SMALL * f.tolerance, _weak_patch),
+    (Verdict.SADDLE, lambda f: compressed(f.surface).any(), _compressed),
+    (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
+    (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
+    (Verdict.NEUTRAL, lambda f: f.rigid > 0, _free_motions),
+    (Verdict.NEUTRAL, lambda f: f.spectrum.soft, _near_fold),
+    (Verdict.STABLE, lambda f: True, _near_fold),
 )

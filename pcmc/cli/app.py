@@ -9,7 +9,7 @@ import typer
 
 from .arguments import with_groups
 from .building import draw_, panels_, report_, structure
-from .preparing import cache_, plan, repair_
+from .preparing import cache_, plan, repair_, schema
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
 from .sweeping import sweep
@@ -54,6 +54,7 @@ for name, command, summary in (
     ("plot", plot, "Draw a surface."),
     ("repair", repair_, "Repair a dirty mesh."),
     ("plan", plan, "Write the project file for a drawing."),
+    ("schema", schema, "Print the JSON Schema of project files, for editors."),
     ("structure", structure, "Write a structural model for CalculiX."),
     ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
     ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),

@@ -1,7 +1,8 @@
-"""The commands plan, repair and cache: files before and beside a roof. Each returns the exit code."""
+"""The commands plan, repair, schema and cache: files before and beside a roof. Each returns the exit code."""
 
 from __future__ import annotations
 
+import json
 import warnings
 from pathlib import Path
 from typing import Annotated
@@ -87,6 +88,17 @@ def repair_(
     with defer_interrupts():
         write(output, repaired, units=repaired.units)
     print(repaired, *metres_note([output], repaired.units.length), f"written: {output}", sep="\n")
+    return OK
+
+
+def schema() -> int:
+    """Print the JSON Schema of project files, from which editors complete their keys.
+
+    \b
+    Example:
+      pcmc schema > pcmc.schema.json
+    """
+    print(json.dumps(projects.json_schema(), indent=1))
     return OK
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ..accuracy import MeshCheck
 from ..certificate.balance import strained_junction
-from ..certificate.leaning import lean_texts
+from ..certificate.tables import lean_texts
 from ..contact.pinching import standing_part
 from ..design.outcome import values_text
 from ..project import MOST_CHECKED, Outcome

@@ -1,13 +1,13 @@
-"""The meshes themselves as arrays: vertices, faces and cables. Every error names the mesh."""
+"""Vertices, faces, cables and common values from COMPAS meshes. Every error names the mesh."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
 from itertools import chain
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -16,11 +16,12 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra, OptionError, SurfaceError, unknown
 from ..io.mesh_data import FIXED, FREE, SLIDING, coincident
 from ..io.polygons import triangulate
-from ..surface import Cable, Patch
+from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room
 
 HELD = ("is_support", "is_anchor", "is_fixed")  # names that COMPAS packages use for a held vertex
 SLIDES, GUIDE, PLANES = "is_sliding", "guide", "planes"  # further attributes of vertices
 CABLE, TENSION = "cable", "tension"  # attributes of edges
+KEY = "pcmc"  # attribute of the first mesh
 
 Places = Mapping[str, Mapping[int, int]]  # by mesh name and key, the index of the vertex
 
@@ -72,83 +73,116 @@ def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> lis
     return patches
 
 
-@dataclass(frozen=True, eq=False)
-class Vertices:
-    """The vertices of all meshes that faces use, one mesh after the other.
+class Whole(NamedTuple):
+    """What belongs to the whole surface and not to a mesh: the first mesh's attribute ``pcmc``."""
 
-    Attributes
-    ----------
-    X : (v,3) coordinates.
-    keys : (v,) their keys.
-    start : (k+1,) where each mesh begins.
-    support : (v,) FREE, SLIDING or FIXED; None if no mesh has an attribute for it.
-    guide : (v,) number of the line or circle along which the vertex slides, or -1.
-    planes : (v,) the numbers of the planes besides Π that the vertex slides on.
-    unused : how many more vertices there are.
+    plane: Plane = Plane()
+    guides: tuple[Guide, ...] = ()  # the lines and circles that vertices slide along
+    planes: tuple[Plane, ...] = ()  # besides Π, that vertices slide on
+    rooms: tuple[Room, ...] = ()
+    cables: tuple[str, ...] = ()  # their names in order
+    curves: tuple[
+        HeldCurve, ...
+    ] = ()  # that held vertices were drawn on; their vertices are keys of the meshes
+
+
+def read_whole(named: Mapping[str, Any]) -> Whole:
+    """That of the one mesh that has it; without it Π is z = 0, and there is nothing else."""
+    owners = [name for name, mesh in named.items() if KEY in mesh.attributes]
+    if not owners:
+        return Whole()
+    values = named[owners[0]].attributes[KEY]
+    for other in owners[1:]:
+        if named[other].attributes[KEY] != values:
+            text = f"attributes[{KEY!r}] differs from that of mesh {owners[0]!r}; keep one of the two"
+            refuse(KEY, other, text)
+
+    def made(kind: Any, row: Mapping[str, Any]) -> Any:
+        """A part of a surface, with tuples for lists."""
+        vectors = {key: tuple(one) for key, one in row.items() if isinstance(one, list | tuple)}
+        return kind(**{**row, **vectors})
+
+    try:
+        return Whole(
+            made(Plane, values["plane"]),
+            tuple(made(Circle if "radius" in one else Line, one) for one in values.get("guides", ())),
+            tuple(made(Plane, one) for one in values.get("planes", ())),
+            tuple(Room(**one) for one in values.get("rooms", ())),
+            tuple(str(one) for one in values.get("cables", ())),
+            tuple(map(HeldCurve.from_plain, values.get("curves", ()))),
+        )
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({reason}); without it Π is z = 0")
+
+
+class Vertex(NamedTuple):
+    """A vertex of a mesh that a face uses."""
+
+    mesh: str
+    key: int
+    point: list[float]
+    support: int  # FREE, SLIDING or FIXED
+    guide: int  # number of the line or circle along which it slides, or -1
+    planes: Sequence[int]  # numbers of the planes besides Π that it slides on
+
+
+def read_vertices(named: Mapping[str, Any], whole: Whole) -> tuple[list[Vertex], bool, int]:
+    """The vertices of all meshes, one mesh after the other; whether any has an attribute for its support.
+
+    And how many more vertices there are, which no face uses.
     """
-
-    X: Floats
-    keys: Ints
-    start: Ints
-    support: Ints | None
-    guide: Ints
-    planes: list[Sequence[int]]
-    unused: int
-
-
-def read_vertices(named: Mapping[str, Any]) -> Vertices:
-    """The vertices of all meshes."""
-    keys: list[int] = []
-    rows: list[tuple[list[float], int, int, Sequence[int]]] = []
-    start, unused, marked = [0], 0, False
+    vertices: list[Vertex] = []
+    unused, marked = 0, False
     for name, mesh in named.items():
         used = set(chain.from_iterable(mesh.face.values()))
-        lost = used - set(mesh.vertex)
-        if lost:
+        if lost := used - set(mesh.vertex):
             refuse("faces", name, f"a face names vertex {min(lost)}, which the mesh does not have")
-        mine = [key for key in mesh.vertex if key in used]
-        unused += len(mesh.vertex) - len(mine)
-        for key in mine:
+        unused += len(mesh.vertex) - len(used)
+        for key in filter(used.__contains__, mesh.vertex):
             row = mesh.default_vertex_attributes | mesh.vertex[key]
             held = any(row.get(mark) for mark in HELD)
             support = FIXED if held else SLIDING if row.get(SLIDES) else FREE
+            marked |= any(mark in row for mark in (SLIDES, *HELD))
             guide, planes = row.get(GUIDE), row.get(PLANES) or ()
             if not (guide is None or _is_index(guide)):
                 refuse(GUIDE, name, f"vertex {key}: {GUIDE!r} must be the number of a line or circle")
             if not (isinstance(planes, Sequence) and all(map(_is_index, planes))):
                 refuse(PLANES, name, f"vertex {key}: {PLANES!r} must be a list of numbers of planes")
-            rows.append((_position(row, name, key), support, -1 if guide is None else guide, planes))
-            marked |= any(mark in row for mark in (SLIDES, *HELD))
-        keys += mine
-        start.append(len(keys))
-    if not keys:
+            point = [row.get(axis) for axis in "xyz"]
+            if not all(isinstance(x, int | float | np.number) and math.isfinite(x) for x in point):
+                refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
+            place = [float(x) for x in point if x is not None]
+            vertices.append(Vertex(name, key, place, support, -1 if guide is None else guide, planes))
+    if not vertices:
         validate.refuse("meshes", list(named), "meshes with faces", error=SurfaceError)
-    X, supports, guides, planes_of = zip(*rows, strict=True)
-    held_by = np.array(supports) if marked else None
-    return Vertices(
-        np.array(X), np.array(keys), np.array(start), held_by, np.array(guides), list(planes_of), unused
-    )
+    for what, listed, numbers in (
+        (GUIDE, len(whole.guides), [vertex.guide for vertex in vertices]),
+        (PLANES, len(whole.planes), [number for vertex in vertices for number in vertex.planes]),
+    ):
+        if (largest := max(numbers, default=-1)) >= listed:
+            text = f"a vertex has {what!r} {largest}, but attributes[{KEY!r}] lists only {listed} of them;"
+            text = f"{text} keep the mesh that has this attribute, or remove {what!r} from the vertices"
+            raise SurfaceError(text, what=what, found=largest, expected=listed)
+    return vertices, marked, unused
 
 
-def shared_vertices(vertices: Vertices, named: Mapping[str, Any], weld: bool) -> tuple[Ints, Places]:
-    """Which vertices to keep, and the index among them of every key of each mesh.
+def shared_vertices(vertices: Sequence[Vertex], weld: bool) -> tuple[Ints, Ints]:
+    """Which vertices to keep, and the index among them of every vertex.
 
     Vertices of one key are one, and must lie at one place; with ``weld``, vertices at one place are one.
     """
-    names, X, start = list(named), vertices.X, vertices.start
+    X = np.array([vertex.point for vertex in vertices])
     if weld:
-        keep, place = coincident(X)
-    else:
-        _, keep, place = np.unique(vertices.keys, return_index=True, return_inverse=True)
-        apart = np.flatnonzero((X[keep][place] != X).any(axis=1))
-        if len(apart):
-            one, two = int(keep[place[apart[0]]]), int(apart[0])
-            owner, other = (names[k] for k in np.searchsorted(start, [one, two], side="right") - 1)
-            text = f"vertex {vertices.keys[two]} is at {X[two].tolist()}, and in mesh {owner!r} at"
-            text = f"{text} {X[one].tolist()}; give a key to a common vertex only, or pass weld=True"
-            refuse("vertices", other, text)
-    pairs = list(zip(vertices.keys.tolist(), place.tolist(), strict=True))
-    return keep, {name: dict(pairs[start[k] : start[k + 1]]) for k, name in enumerate(names)}
+        return coincident(X)
+    keys = np.array([vertex.key for vertex in vertices])
+    _, keep, place = np.unique(keys, return_index=True, return_inverse=True)
+    apart = np.flatnonzero((X[keep][place] != X).any(axis=1))
+    if len(apart):
+        one, two = vertices[keep[place[apart[0]]]], vertices[apart[0]]
+        text = f"vertex {two.key} is at {two.point}, and in mesh {one.mesh!r} at {one.point};"
+        refuse("vertices", two.mesh, f"{text} give a key to a common vertex only, or pass weld=True")
+    return keep, place
 
 
 def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Ints, Ints, tuple[str, ...]]:
@@ -212,11 +246,3 @@ def damaged_mesh(error: Exception) -> SurfaceError:
 def _is_index(value: Any) -> bool:
     """Whether it is a whole number ≥ 0."""
     return isinstance(value, int | np.integer) and int(value) >= 0
-
-
-def _position(row: Mapping[str, Any], name: str, key: int) -> list[float]:
-    """The coordinates in the attributes of a vertex."""
-    point = [row.get(axis) for axis in "xyz"]
-    if not all(isinstance(x, int | float | np.number) and math.isfinite(x) for x in point):
-        refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
-    return [float(x) for x in point if x is not None]

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats
 from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
@@ -24,8 +23,7 @@ from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
 from ..surface.topology import topology
 from . import mesh_arrays
-from .mesh_arrays import CABLE, GUIDE, PLANES, SLIDES, TENSION
-from .whole import KEY, Whole, read_whole
+from .mesh_arrays import CABLE, GUIDE, KEY, PLANES, SLIDES, TENSION
 
 MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
@@ -66,9 +64,13 @@ def to_meshes(surface: Surface) -> list[Any]:
     """
     mesh_class = mesh_arrays.mesh_class()
     expect_surface(surface)
-    _check_carried(surface)
-    rows = _vertex_attributes(surface)
-    meshes = []
+    for field in fields(surface):
+        value = getattr(surface, field.name)
+        empty = not value.any() if isinstance(value, np.ndarray) else value == field.default
+        if field.name not in CARRIED and not empty:
+            text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
+            raise SurfaceError(text, what=field.name, found=value)
+    rows, meshes = _vertex_attributes(surface), []
     for index, patch in enumerate(surface.patches):
         mesh = mesh_class(default_vertex_attributes=MARKS | QUANTITIES, name=patch.name)
         mesh.attributes.update({f.name: getattr(patch, f.name) for f in fields(patch) if f.name != "name"})
@@ -82,7 +84,14 @@ def to_meshes(surface: Surface) -> list[Any]:
         for edge in map(tuple, cable.edges.tolist()):
             for mesh in (mesh for mesh in meshes if mesh.has_edge(edge)):
                 mesh.edge_attributes(edge, [CABLE, TENSION], [cable.name, cable.tension])
-    meshes[0].attributes[KEY] = Whole.of(surface).plain()
+    meshes[0].attributes[KEY] = {
+        "plane": _plain(surface.plane),
+        "guides": [_plain(guide) for guide, _ in surface.given_supports.on_line],
+        "planes": [_plain(plane) for plane, _ in surface.on_planes],
+        "rooms": [{**asdict(room), "patches": dict(room.patches)} for room in surface.rooms],
+        "cables": [cable.name for cable in surface.cables],
+        "curves": [curve.plain() for curve in surface.held_curves],
+    }
     return meshes
 
 
@@ -145,30 +154,25 @@ def _surface(
 ) -> tuple[Surface, tuple[str, ...]]:
     """The surface of meshes by name, and notes on what was changed or is doubtful."""
     patches = tuple(mesh_arrays.read_patches(named, tensions, pressures))
-    whole, vertices = read_whole(named), mesh_arrays.read_vertices(named)
-    keep, places = mesh_arrays.shared_vertices(vertices, named, weld)
-    X, n = vertices.X[keep], len(keep)
-    F, patch, notes = mesh_arrays.read_faces(named, X, places)
-    if vertices.unused:
-        notes = (*notes, f"{vertices.unused} vertices that no face uses were left out")
-    place = np.array([k for of_mesh in places.values() for k in of_mesh.values()])
+    whole = mesh_arrays.read_whole(named)
+    vertices, marked, unused = mesh_arrays.read_vertices(named, whole)
+    keep, place = mesh_arrays.shared_vertices(vertices, weld)
+    X, n = np.array([vertex.point for vertex in vertices])[keep], len(keep)
+    places: dict[str, dict[int, int]] = {name: {} for name in named}
     support, guide = np.zeros(n, dtype=np.int8), np.full(n, -1)
-    np.maximum.at(guide, place, vertices.guide)
     on_planes = [np.zeros(n, dtype=bool) for _ in whole.planes]
-    _check_numbers(GUIDE, vertices.guide.tolist(), len(whole.guides))
-    _check_numbers(PLANES, [number for numbers in vertices.planes for number in numbers], len(whole.planes))
-    for vertex, numbers in zip(place.tolist(), vertices.planes, strict=True):
-        for number in numbers:
-            on_planes[number][vertex] = True
-    held = None
-    if vertices.support is not None:
-        np.maximum.at(support, place, vertices.support)
-        held = support
-    else:
+    for vertex, k in zip(vertices, place.tolist(), strict=True):
+        places[vertex.mesh][vertex.key] = k
+        support[k], guide[k] = max(support[k], vertex.support), max(guide[k], vertex.guide)
+        for number in vertex.planes:
+            on_planes[number][k] = True
+    F, patch, notes = mesh_arrays.read_faces(named, X, places)
+    if unused:
+        notes = (*notes, f"{unused} vertices that no face uses were left out")
+    if not marked:
         support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
         notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
-    notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, held)))
-    along = tuple((one, guide == number) for number, one in enumerate(whole.guides))
+    notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, support if marked else None)))
     surface = Surface(
         X,
         F,
@@ -177,41 +181,24 @@ def _surface(
         support == FIXED,
         support == SLIDING,
         whole.plane,
-        along,
+        tuple((one, guide == number) for number, one in enumerate(whole.guides)),
         tuple(zip(whole.planes, on_planes, strict=True)),
         mesh_arrays.read_cables(named, places, whole.cables),
         whole.rooms,
     )
     of_key = {key: k for of_mesh in places.values() for key, k in of_mesh.items()}
     try:
-        curves = [
-            replace(c, vertices=np.array([of_key[k] for k in c.vertices.tolist()])) for c in whole.curves
-        ]
+        drawn = [(curve, [of_key[key] for key in curve.vertices.tolist()]) for curve in whole.curves]
+        curves = [replace(curve, vertices=np.array(own)) for curve, own in drawn]
         return surface.rebuilt(curves=curves), notes
     except (KeyError, SurfaceError):
-        lost = (
-            "the curves that held vertices were drawn on do not fit these meshes any more and were left out"
-        )
-        return surface, (*notes, lost)
+        lost = "the curves that held vertices were drawn on do not fit these meshes any more"
+        return surface, (*notes, f"{lost} and were left out")
 
 
-def _check_carried(surface: Surface) -> None:
-    """Refuse a surface with a property, other than at its default, that meshes do not carry."""
-    for field in fields(surface):
-        value = getattr(surface, field.name)
-        empty = not value.any() if isinstance(value, np.ndarray) else value == field.default
-        if field.name not in CARRIED and not empty:
-            text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
-            raise SurfaceError(text, what=field.name, found=value)
-
-
-def _check_numbers(name: str, numbers: list[int], listed: int) -> None:
-    """Refuse a vertex attribute that names a line or plane beyond those listed."""
-    largest = max(numbers, default=-1)
-    if largest >= listed:
-        text = f"a vertex has {name!r} {largest}, but attributes[{KEY!r}] lists only {listed} of them"
-        text = f"{text}; keep the mesh that has this attribute, or remove {name!r} from the vertices"
-        raise SurfaceError(text, what=name, found=largest, expected=listed)
+def _plain(value: Any) -> dict[str, Any]:
+    """The fields of a plane, line or circle, with lists for vectors."""
+    return {key: list(one) if isinstance(one, tuple) else one for key, one in asdict(value).items()}
 
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
@@ -224,18 +211,14 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     for number, (_, mask) in enumerate(surface.on_planes):
         for vertex in np.flatnonzero(mask):
             planes[vertex].append(number)
+    curvature = mean_curvature(standing, "variational").tolist()
     columns: dict[str, list[Any]] = {
         **dict(zip("xyz", surface.vertices.T.tolist(), strict=True)),
         "is_support": (support == FIXED).tolist(),
         SLIDES: (support == SLIDING).tolist(),
         GUIDE: guide.tolist(),
         PLANES: planes,
-        "mean_curvature": _none_for_nan(mean_curvature(standing, "variational")),
+        "mean_curvature": [H if H == H else None for H in curvature],  # JSON has no NaN
         **dict(zip(("rx", "ry", "rz"), reactions(standing).T.tolist(), strict=True)),
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
-def _none_for_nan(values: Floats) -> list[float | None]:
-    """The numbers, and None where there is none: JSON has no NaN."""
-    return [value if value == value else None for value in values.tolist()]

@@ -48,18 +48,11 @@ MESH = "compas.datastructures/Mesh"
 
 @dataclass(frozen=True)
 class Settings:
-    """Who may call, and what is read and written.
+    """Who may call, and what is read and written."""
 
-    Attributes
-    ----------
-    folder : the folder that ``read`` and ``write`` are kept in.
-    secret : what a request must show.
-    port : where the service listens.
-    """
-
-    folder: Path
-    secret: str
-    port: int
+    folder: Path  # that ``read`` and ``write`` are kept in
+    secret: str  # what a request must show
+    port: int  # where the service listens
 
     def text(self) -> str:
         """The settings as their file has them: the folder, and the arguments of ``compas.rpc.Proxy``."""
@@ -74,11 +67,6 @@ class Settings:
             "working_directory": str(settings_path().parent),  # Python imports from there: not any folder
         }
         return json.dumps({"folder": str(self.folder), "proxy": proxy}, indent=2) + "\n"
-
-    def allows(self, authorization: str) -> bool:
-        """Whether a request's header ``Authorization`` shows the secret."""
-        wanted = "Basic " + base64.b64encode(f"{USER}:{self.secret}".encode()).decode()
-        return hmac.compare_digest(authorization.encode(), wanted.encode())
 
     def place(self, path: object) -> Path:
         """The path of a file in the folder, links resolved; FileError for one that leads out of it."""
@@ -113,7 +101,11 @@ def set_up(folder: str | os.PathLike[str]) -> Path:
     try:
         port = read_settings().port
     except FileError:
-        port = _free_port()
+        port = 0
+    while not port:  # one that no program uses, below those that systems give to connections
+        tried = 20_000 + secrets.randbelow(10_000)
+        with socket.socket() as probe:
+            port = tried if probe.connect_ex((HOST, tried)) else 0
     with writing(path):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with atomic_write(path) as temporary:
@@ -172,10 +164,11 @@ class Handler(SimpleXMLRPCRequestHandler):
         if "Origin" in self.headers or "Sec-Fetch-Site" in self.headers:
             return 403, "web pages may not call this service"
         try:
-            allowed = read_settings().allows(self.headers.get("Authorization", ""))
+            shown = f"{USER}:{read_settings().secret}".encode()
         except FileError as error:
             return 403, str(error).encode("latin-1", "replace").decode("latin-1")
-        if not allowed:
+        wanted = "Basic " + base64.b64encode(shown).decode()
+        if not hmac.compare_digest(self.headers.get("Authorization", "").encode(), wanted.encode()):
             return 401, f"the secret is wrong or missing; pass Proxy the url in {settings_path().name}"
         if self.headers.get_content_type() != "text/xml":
             return 415, "send XML-RPC as text/xml"
@@ -190,7 +183,10 @@ class Handler(SimpleXMLRPCRequestHandler):
 
 
 class LoopbackServer(ThreadingMixIn, Server):
-    """The server on the loopback; a silent connection does not keep others from being answered."""
+    """The server on the loopback; a silent connection does not keep others from being answered.
+
+    It calls the functions of the service by name, one at a time, with arguments as COMPAS encodes them.
+    """
 
     daemon_threads = True
     block_on_close = False
@@ -198,28 +194,21 @@ class LoopbackServer(ThreadingMixIn, Server):
 
     def __init__(self, port: int) -> None:
         super().__init__((HOST, port), requestHandler=Handler, logRequests=False)
-        self.register_instance(Dispatcher())
+        self._lock = threading.Lock()  # warnings are recorded, which two threads cannot do at once
+        offered: tuple[Callable[..., Any], ...] = (service.solve, service.certify, read, write)
+        self._offered = {f"{PACKAGE}.{function.__name__}": function for function in offered}
 
     def handle_error(self, *_: object) -> None:
         """A connection that broke is not worth a word; ``Handler.log_message`` says why."""
 
-
-class Dispatcher:
-    """Calls the functions of the service by name, one at a time, with arguments as COMPAS encodes them."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()  # warnings are recorded, which two threads cannot do at once
-        self._functions: dict[str, Callable[..., Any]] = {
-            f"{PACKAGE}.{function.__name__}": function
-            for function in (service.solve, service.certify, read, write)
-        }
-
-    def _dispatch(self, name: str, arguments: tuple[Any, ...]) -> str:
+    def _dispatch(self, method: str, params: tuple[Any, ...]) -> Any:
         """The answer to a call, as ``Proxy`` reads it; an error in one line."""
+        if method in self.funcs:  # of COMPAS: ping, remote_shutdown
+            return super()._dispatch(method, params)
         answer: dict[str, Any] = {"data": None, "error": None, "profile": None}
         with self._lock:
             try:
-                answer["data"] = self._call(name, *arguments[:1])
+                answer["data"] = self._call(method, *params[:1])
             except Exception as error:  # the caller is in another process
                 kind = "" if isinstance(error, PcmcError | MissingExtra) else f"{type(error).__name__}: "
                 answer["error"] = " ".join(f"{kind}{error}".split())
@@ -227,15 +216,14 @@ class Dispatcher:
 
     def _call(self, name: str, text: str = "") -> Any:
         """Call a function with the arguments in a text."""
-        if name not in self._functions:
-            raise OptionError(unknown("function", name, self._functions), what="function", found=name)
-        given = json.loads(text, cls=MeshDecoder)
-        function = self._functions[name]
+        if name not in self._offered:
+            raise OptionError(unknown("function", name, self._offered), what="function", found=name)
+        given, function = json.loads(text, cls=MeshDecoder), self._offered[name]
         try:
-            bound = inspect.signature(function).bind(*given["args"], **given["kwargs"])
+            inspect.signature(function).bind(*given["args"], **given["kwargs"])
         except TypeError as error:
             raise OptionError(f"{name}: {error}", what=name) from None
-        return function(*bound.args, **bound.kwargs)
+        return function(*given["args"], **given["kwargs"])
 
 
 class MeshDecoder(DataDecoder):
@@ -275,12 +263,3 @@ def serve(port: int | None = None) -> None:
         raise OptionError(f"{text} {settings_path()} and set up again", what="port", found=port) from None
     with closing(server.socket):
         server.serve_forever()
-
-
-def _free_port() -> int:
-    """A port that no program uses, below those that systems give to connections."""
-    while True:
-        port = 20_000 + secrets.randbelow(10_000)
-        with socket.socket() as probe:
-            if probe.connect_ex((HOST, port)) != 0:
-                return port

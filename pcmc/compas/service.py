@@ -10,7 +10,6 @@ from typing import Any
 from .. import certificate, existence, io
 from ..base.arrays import plain
 from ..certificate import Certificate
-from ..surface import Surface
 from .meshes import from_meshes, to_meshes
 
 Values = Mapping[str, float] | float | None
@@ -21,18 +20,10 @@ def solve(
 ) -> dict[str, Any]:
     """Solve the surface of COMPAS meshes.
 
-    Parameters
-    ----------
-    meshes, tensions, pressures, weld : as in ``from_meshes``.
-    options : as in ``pcmc.solve``; over RPC plain data, such as ``method="lbfgs"``.
+    Options are those of ``pcmc.solve``; over RPC plain data, such as ``method="lbfgs"``. The answer has the
+    ``meshes`` of the surface reached, ``converged``, ``status`` (the name of the Status), ``message``,
+    ``energy``, ``iterations``, ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
 
-    Returns
-    -------
-    dict : ``meshes`` of the surface reached, ``converged``, ``status`` (the name of the Status), ``message``,
-        ``energy``, ``iterations``, ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
-
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.1]]
     >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
@@ -43,9 +34,8 @@ def solve(
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        result = existence.solve(
-            from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld), **options
-        )
+        start = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
+        result = existence.solve(start, **options)
         return {
             "meshes": to_meshes(result.surface),
             "converged": result.converged,
@@ -63,16 +53,9 @@ def certify(
 ) -> dict[str, Any]:
     """The certificate of the surface of COMPAS meshes, as plain data.
 
-    Parameters
-    ----------
-    meshes, tensions, pressures, weld : as in ``from_meshes``.
-    options : as in ``pcmc.certify``.
-
-    Returns
-    -------
-    dict : ``certified``, ``verdict``, ``detail``, the numbers of ``Certificate.numbers``, the tables
-        ``patches``, ``junctions``, ``boundaries`` and ``supports`` as lists of rows, and ``warnings``.
-        None stands for NaN.
+    Options are those of ``pcmc.certify``. The answer has ``certified``, ``verdict``, ``detail``, the numbers
+    of ``Certificate.numbers``, its tables ``patches``, ``junctions``, ``boundaries`` and ``supports`` as
+    lists of rows, and ``warnings``. None stands for NaN.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -83,8 +66,7 @@ def certify(
 
 def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
     """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``."""
-    surface: Surface = io.read(path, **options)
-    return to_meshes(surface)
+    return to_meshes(io.read(path, **options))
 
 
 def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:

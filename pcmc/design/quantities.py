@@ -17,9 +17,8 @@ from scipy.sparse import csr_array
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..certificate.cables import chord
-from ..certificate.curve_tables import sides_at
-from ..certificate.leaning import lean_sines
 from ..certificate.reactions import SupportForces, support_forces
+from ..certificate.tables import lean_sines, sides_at
 from ..forces.functional import weighted
 from ..forces.parameters import gradient_by
 from ..forces.volume_below import volume_below_gradient, volumes_below

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,7 +25,7 @@ from ..surface.sections import Polyline, section
 from . import dxf, pdf, views
 from .panel_sheets import flat_panels
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sheet import FORMATS, Sheet, add_frames, table_sheets
+from .sheet import FORMATS, Line, Sheet, add_frames, table_sheets
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
@@ -35,31 +35,18 @@ Ends = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class DrawingSet:
-    """The drawings of a roof.
-
-    Attributes
-    ----------
-    surface, units : the roof, and the unit of its lengths.
-    certificate : of the surface.
-    curves : ridges, rims and wall lines, with their layers.
-    sections : the lines in which each plane cuts the roof.
-    points : setting-out points: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable).
-    marks : name and place (3,) of each mast or other support of one point.
-    schedule : the panels, if a tolerance was given; else None.
-    flat : all panels at true size, mm, where sheets of panels are asked for; else None.
-    sheets : the sheets of paper, in order.
-    """
+    """The drawings of a roof."""
 
     surface: Surface
-    units: str
-    certificate: Certificate
-    curves: Sequence[views.Curve]
-    sections: Sequence[Polyline]
-    points: pd.DataFrame
-    marks: Sequence[tuple[str, Floats]]
-    schedule: Panels | None
-    flat: Sheet | None
-    sheets: Sequence[Sheet]
+    units: str  # of its lengths
+    certificate: Certificate  # of the surface
+    curves: Sequence[Line]  # ridges, rims, wall lines and cables
+    sections: Sequence[Polyline]  # the lines in which each plane cuts the roof
+    points: pd.DataFrame  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable)
+    marks: Sequence[tuple[str, Floats]]  # name and place (3,) of each mast or other support of one point
+    schedule: Panels | None  # the panels, if a tolerance was given
+    flat: Sheet | None  # all panels at true size, mm, where sheets of panels are asked for
+    sheets: Sequence[Sheet]  # of paper, in order
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
@@ -182,35 +169,31 @@ def drawing_set(
     named += [
         (np.array(at), name, "PCMC-POINT") for name, *at in points[["point", *"xyz"]].to_numpy().tolist()
     ]
-    levels = _levels(surface, heights)
-    profiles = _profiles(surface, lines)
-    size: dict[str, Any] = {"name": sheet, "millimetres": millimetres, "scale": scale, "decimals": decimals}
-    sheets = [
-        views.placed([views.plan(surface, curves, named)], "Plan", **size),
-        views.placed(views.elevations(surface, curves), "Elevations", **size),
-    ]
-    if levels:
-        sheets.append(views.placed([views.contours(surface, curves, levels)], "Sections at heights", **size))
-    if profiles:
-        sheets.append(views.placed([view for view, _ in profiles], "Sections along lines", **size))
-    sheets += table_sheets("Setting-out points", *_rows(points, decimals), sheet)
+    levels, profiles = _levels(surface, heights), _profiles(surface, lines)
+    drawn: dict[str, list[views.View]] = {
+        "Plan": [views.plan(surface, curves, named)],
+        "Elevations": views.elevations(surface, curves),
+        "Sections at heights": [views.contours(surface, curves, levels)] if levels else [],
+        "Sections along lines": [view for view, _ in profiles],
+    }
+    size = sheet, millimetres, scale, decimals
+    sheets = [views.placed(shown, title, *size) for title, shown in drawn.items() if shown]
+    tables, flat = {"Setting-out points": points}, None
     if len(certificate.cables):
         cables = certificate.cables[["cable", "tension", "length"]]
-        cables = cables.rename(columns={"tension": "force"})
-        sheets += table_sheets("Cables", *_rows(cables, decimals, {"force": units.force}), sheet)
+        tables["Cables"] = cables.rename(columns={"tension": "force"})
     if len(certificate.supports):
-        listed = certificate.supports[SUPPORT]
-        forces = dict.fromkeys(SUPPORT[-3:], units.force)
-        sheets += table_sheets("Supports", *_rows(listed, decimals, forces), sheet)
-    flat = None
+        tables["Supports"] = certificate.supports[SUPPORT]
     if schedule is not None:
-        listed = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
-        listed = listed.assign(family=[f"F{k}" for k in listed["family"]])
-        listed = listed.rename(columns={"count": "panels", "mirrored": "turned over"})
-        sheets += table_sheets("Families of panels", *_rows(listed, decimals), sheet)
-        if panel_sheets:
-            flat = flat_panels(schedule, millimetres)
-            sheets += panels_at_true_size(schedule, sheet, millimetres)
+        families = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
+        families = families.assign(family=[f"F{k}" for k in families["family"]])
+        tables["Families of panels"] = families.rename(columns={"count": "panels", "mirrored": "turned over"})
+    forces = dict.fromkeys(("force", *SUPPORT[-3:]), units.force)
+    for title, table in tables.items():
+        sheets += table_sheets(title, table, sheet, decimals, forces)
+    if schedule is not None and panel_sheets:
+        flat = flat_panels(schedule, millimetres)
+        sheets += panels_at_true_size(schedule, sheet, millimetres)
     part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
     add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
@@ -222,7 +205,7 @@ def check_suffix(path: Path) -> str:
     return suffix_of(path, SUFFIXES, "a drawing")
 
 
-def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:
+def _setting_out(curves: Sequence[Line]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
     order: dict[int, tuple[Floats, str]] = {}
     open_ended = [c for c in curves if not (c.closed or c.layer == "PCMC-CABLE")]
@@ -269,14 +252,3 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
         profiles.append((views.profile(surface, title, ends[0], along, found), found))
     return profiles
-
-
-def _rows(
-    table: pd.DataFrame, decimals: int, units: Mapping[str, str] | None = None
-) -> tuple[list[str], list[list[str]]]:
-    """The head, with the units that columns have, and the rows of a table as texts."""
-    rows = [
-        [f"{x:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
-        for row in table.to_numpy(dtype=object).tolist()
-    ]
-    return [", ".join(filter(None, (name, (units or {}).get(name)))) for name in table.columns], rows

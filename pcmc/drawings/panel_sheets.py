@@ -27,11 +27,11 @@ def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]
             sheets.append(Sheet("", name, "1:1"))
         sheets[page].title = f"Panels {first} to {k + 1} at true size, outside up"
         _add_panel(sheets[page], placed + corner() + [0.0, high], k, schedule, labels[k])
-    sizes = schedule.panels[["a", "b", "c"]].to_numpy() * millimetres
-    rows = [[str(k + 1), *(f"{x:.1f}" for x in sizes[k])] for k in turned if k not in fit]
-    if rows:
+    large = (schedule.panels[["a", "b", "c"]] * millimetres).iloc[[k for k in turned if k not in fit]]
+    if len(large):
+        large.insert(0, "panel", large.index + 1)
         title = f"Panels larger than {name}: flat at true size in the model space of the .dxf"
-        sheets += table_sheets(title, ["panel", "a, mm", "b, mm", "c, mm"], rows, name)
+        sheets += table_sheets(title, large, name, 1, dict.fromkeys("abc", "mm"))
     return sheets
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from ..base.arrays import Floats
 
@@ -24,11 +25,11 @@ WIDTH = 0.72  # of a letter, in its height, for what must fit
 
 
 class Layer(NamedTuple):
-    """A layer of a drawing: colour by AutoCAD's index, width of its lines in 1/100 mm, and what it holds."""
+    """A layer of a drawing."""
 
-    color: int
-    weight: int
-    about: str
+    color: int  # by AutoCAD's index
+    weight: int  # width of its lines, 1/100 mm
+    about: str  # what it holds
 
 
 LAYERS = {
@@ -51,11 +52,13 @@ LAYERS = {
 
 
 class Line(NamedTuple):
-    """A polyline (k,2), mm."""
+    """A polyline (k,2), mm; or (k,3) in the model, with its name and the numbers of its vertices."""
 
     points: Floats
     layer: str
     closed: bool = False
+    name: str = ""
+    vertices: tuple[int, ...] = ()
 
 
 class Text(NamedTuple):
@@ -210,27 +213,31 @@ def fits(size: Floats, name: str) -> bool:
     return bool((np.asarray(size) <= np.array(drawing_area(name)) + 1e-9).all())
 
 
-def table_sheets(title: str, head: list[str], rows: list[list[str]], name: str) -> list[Sheet]:
-    """A table in as many columns and sheets as it needs."""
-    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
+def table_sheets(
+    title: str, table: pd.DataFrame, name: str, decimals: int, units: Mapping[str, str] | None = None
+) -> list[Sheet]:
+    """A table in as many columns and sheets as it needs; its head has the units that columns have."""
+    rows = [[", ".join(filter(None, (key, (units or {}).get(key)))) for key in table.columns]]
+    rows += [
+        [f"{x:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
+        for row in table.to_numpy(dtype=object).tolist()
+    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     across = np.append(0.0, np.cumsum([(w + 2.0) * WIDTH * SMALL for w in widths]))
     wide, high = drawing_area(name)
     step = 1.8 * SMALL
     per_column = int(high / step) - 1
     columns = max(1, int((wide + GAP) // (across[-1] + GAP)))
     sheets = []
-    for start in range(0, max(1, len(rows)), per_column * columns):
-        sheet = Sheet(title, name)
-        for column in range(columns):
-            first = start + column * per_column
-            part = rows[first : first + per_column]
-            if part or not column:
-                left, top = corner() + np.array([column * (across[-1] + GAP), high])
-                for k, row in enumerate([head, *part]):
-                    ends = left + across[1:] - 2.0 * WIDTH * SMALL
-                    places = np.stack([ends, np.full(len(ends), top - (k + 0.5) * step)], axis=1)
-                    sheet.texts += [Text(at, text, align="R") for at, text in zip(places, row, strict=True)]
-                rule = np.array([[left, top - step], [left + across[-1] - 2.0 * WIDTH * SMALL, top - step]])
-                sheet.lines.append(Line(rule, "PCMC-FRAME"))
-        sheets.append(sheet)
+    for first in range(1, max(2, len(rows)), per_column):
+        column = (first - 1) // per_column % columns
+        if column == 0:
+            sheets.append(Sheet(title, name))
+        left, top = corner() + np.array([column * (across[-1] + GAP), high])
+        right = left + across[1:] - 2.0 * WIDTH * SMALL
+        for k, row in enumerate([rows[0], *rows[first : first + per_column]]):
+            y = top - (k + 0.5) * step
+            sheets[-1].texts += [Text((x, y), text, align="R") for x, text in zip(right, row, strict=True)]
+        rule = np.array([[left, top - step], [right[-1], top - step]])
+        sheets[-1].lines.append(Line(rule, "PCMC-FRAME"))
     return sheets

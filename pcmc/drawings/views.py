@@ -43,32 +43,18 @@ ELEVATIONS = {  # to the right, and towards the viewer
 }
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A ridge, a rim, a wall line or a cable: its layer, points (k,3), whether it is closed, and its name."""
-
-    layer: str
-    points: Floats
-    closed: bool
-    vertices: tuple[int, ...] = field(repr=False)
-    name: str = ""
-
-
 @dataclass
 class View:
-    """What is drawn on two axes, in the surface's unit: lines by layer, and texts at points.
-
-    Texts stand beside their point in a direction (2,). ``points`` are marked on their layer, with names.
-    ``stations`` are the places along each axis between which the view is dimensioned, ``levels`` the heights
-    that are marked beside it.
-    """
+    """What is drawn on two axes, in the surface's unit."""
 
     title: str
     lines: list[Line] = field(default_factory=list)
-    texts: list[tuple[Floats, str, Floats]] = field(default_factory=list)
-    points: list[tuple[Floats, str, str]] = field(default_factory=list)
-    stations: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
-    levels: Floats = field(default_factory=lambda: np.empty(0))
+    texts: list[tuple[Floats, str, Floats]] = field(
+        default_factory=list
+    )  # beside a point, in a direction (2,)
+    points: list[tuple[Floats, str, str]] = field(default_factory=list)  # marked, with their names and layers
+    stations: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # along each axis, to be dimensioned
+    levels: Floats = field(default_factory=lambda: np.empty(0))  # heights that are marked beside it
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -77,7 +63,7 @@ class View:
         return every.min(axis=0), every.max(axis=0)
 
 
-def model_curves(surface: Surface) -> list[Curve]:
+def model_curves(surface: Surface) -> list[Line]:
     """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone; cables."""
     names = [patch.name for patch in surface.patches]
     found = [
@@ -88,12 +74,12 @@ def model_curves(surface: Surface) -> list[Curve]:
     for cable in surface.cables:
         found += [("PCMC-CABLE", c, cable.name) for c in surface.topology.chains(cable.edges, nowhere)]
     return [
-        Curve(layer, surface.vertices[c.vertices], c.closed, tuple(c.vertices.tolist()), name)
+        Line(surface.vertices[c.vertices], layer, c.closed, name, tuple(c.vertices.tolist()))
         for layer, c, name in found
     ]
 
 
-def outline(curves: Sequence[Curve], axis: Sequence[float]) -> Floats:
+def outline(curves: Sequence[Line], axis: Sequence[float]) -> Floats:
     """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
     places = []
     for curve in curves:
@@ -109,7 +95,7 @@ def outline(curves: Sequence[Curve], axis: Sequence[float]) -> Floats:
     return np.concatenate(places) if places else np.empty(0)
 
 
-def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[Floats, str, str]]) -> View:
+def plan(surface: Surface, curves: Sequence[Line], points: Sequence[tuple[Floats, str, str]]) -> View:
     """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
     view = View("plan", points=[(at[:2], name, layer) for at, name, layer in points])
     roof = surface.roof[surface.patch_of_face]
@@ -126,7 +112,7 @@ def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[Float
     return view
 
 
-def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
+def elevations(surface: Surface, curves: Sequence[Line]) -> list[View]:
     """From four sides: curves, the edges of the panels that face the viewer, and levels."""
     topo, X = surface.topology, surface.vertices
     roof = surface.roof[surface.patch_of_face]
@@ -145,7 +131,7 @@ def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
     return views
 
 
-def contours(surface: Surface, curves: Sequence[Curve], cuts: Sequence[tuple[float, list[Polyline]]]) -> View:
+def contours(surface: Surface, curves: Sequence[Line], cuts: Sequence[tuple[float, list[Polyline]]]) -> View:
     """Sections at heights, seen from above, each with its height."""
     view = plan(surface, curves, ())
     view.title = "sections at heights"

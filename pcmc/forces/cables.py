@@ -1,10 +1,10 @@
-"""Cables: the part Σ τ ℓ of E, over edges with a line tension τ, and its gradient.
+"""The force of a cable: the part Σ τ ℓ of E over edges with a line tension τ; gradient and Hessian block.
 
 An edge from a to b has the length ℓ = |b - a| and the direction t = (b - a) / ℓ. Then
 
-    ∂ℓ/∂b = t = -∂ℓ/∂a
+    ∂ℓ/∂b = t = -∂ℓ/∂a,     ∂²ℓ/∂b² = (1 - t tᵀ) / ℓ = ∂²ℓ/∂a² = -∂²ℓ/∂a∂b
 
-An edge without length has no direction and contributes neither. Nothing is computed where no cable pulls.
+An edge without length has no direction and contributes none of these.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats, Ints
+from ..base.compiled import inlined
 from ..base.errors import SurfaceError
 from ..surface import Surface
+from ..surface.geometry import norm, point, scaled, sub
 from ..surface.parts import CableEdges
 from ..surface.topology import Topology
+from .triangles import Block
 
 
 def add_cables(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
@@ -29,10 +32,7 @@ def add_cables(surface: Surface, X: Floats, gradient: Floats | None = None) -> f
     (10.0, [1.6, -1.2, 0.0])
     """
     ends, tension = surface.cable_edges
-    if not len(ends):
-        return 0.0
-    length = add_pull(X, ends, tension, gradient)
-    return float((tension * length).sum())
+    return float((tension * add_pull(X, ends, tension, gradient)).sum()) if len(ends) else 0.0
 
 
 def add_pull(X: Floats, ends: Ints, tension: Floats | float, gradient: Floats | None = None) -> Floats:
@@ -50,6 +50,16 @@ def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
     side = X[ends[:, 1]] - X[ends[:, 0]]
     length = np.sqrt(np.einsum("ij,ij->i", side, side))
     return side / np.where(length > 0.0, length, 1.0)[:, None], length
+
+
+@inlined
+def cable_block(cables: CableEdges, X: Floats, e: int, hessian: float, stiffness: float) -> Block:
+    """Of an end with itself; that of both ends with each other is the negative. The stiffness is τ/ℓ 1."""
+    side = sub(point(X, cables.ends[e, 1]), point(X, cables.ends[e, 0]))
+    length = norm(side)
+    scale = 1.0 / length if length > 0.0 else 0.0
+    pull = cables.tension[e] * scale
+    return Block(-hessian * pull, scaled(scale, side), (hessian + stiffness) * pull)
 
 
 def squared_cable_forces(surface: Surface) -> Floats:

@@ -2,16 +2,16 @@
 
 V_i is the volume of the cones from ``Surface.origin`` o to the triangles. Where the boundary slides on a
 plane through o, the side of the cones lies in that plane and carries nothing. On another plane k it does not,
-and a flat piece between the boundary and a point c of plane k is added, as seen from o:
+and a flat piece between the boundary and a point c of plane k, its apex, is added. With the sides a → b of
+triangles on the boundary in plane k, all positions seen from o,
 
-    V_i += -(1/6) Σ ⟨c, a × b⟩
+    V = -(1/6) Σ ⟨c, a × b⟩,    ∂V/∂a = (1/6) c × b,    ∂V/∂b = -(1/6) c × a,    ∂²V/∂a∂b = (1/6) [c]×
 
-over the sides a → b of triangles on the boundary in plane k, all positions seen from o. Other curves between
-two vertices of plane k may rise from it like an arch; only in mirror planes they count, too. Where the
-boundary leaves plane k for a plane j, the piece ends along the line that both have in common. c is chosen on
-as many of these lines as possible, and then as near to o as possible. On others, with c' the point of the
-line nearest to o,
-V_i += ∓(1/6) ⟨c, v × c'⟩ for the vertex v there (- at the head of the last side, + at the tail of the first).
+Other curves between two vertices of plane k may rise from it like an arch; only in mirror planes they count,
+too. Where the boundary leaves plane k for a plane j, the piece ends along the line that both have in common.
+c is chosen on as many of these lines as possible, and then as near to o as possible. On others, with c' the
+point of the line nearest to o, V += ∓(1/6) ⟨c, v × c'⟩ =: ⟨n, v⟩ for the vertex v there (- at the head of the
+last side, + at the tail of the first), so ∂V/∂v = n. It all costs nothing where every plane passes through o.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..surface import Plane, Surface
 from ..surface.checks import lying
 from ..surface.supports import common_point
@@ -30,29 +30,57 @@ MEETS = 1e-9  # sine of an angle up to which two planes count as parallel
 
 
 class FlatPieces(NamedTuple):
-    """Sides of triangles and ends of boundaries that the flat pieces start from.
+    """Sides of triangles and ends of boundaries that the flat pieces start from."""
 
-    Attributes
-    ----------
-    face, corner : (h,) int: the side a → b from corner ``corner`` of triangle ``face`` to the next one.
-    apex : (h,3) c of its plane, seen from the origin.
-    end, end_patch : (e,) int: vertices where the boundary leaves a plane for another, and the patch.
-    normal : (e,3) the vector whose product with v, seen from the origin, is the volume of the corner.
-    """
-
-    face: Ints
-    corner: Ints
-    apex: Floats
-    end: Ints
-    end_patch: Ints
-    normal: Floats
+    face: Ints  # (h,) the triangle of each side a → b
+    corner: Ints  # (h,) its corner a; the next one is b
+    apex: Floats  # (h,3) c, seen from the origin
+    end: Ints  # (e,) vertices where the boundary leaves a plane for another
+    end_patch: Ints  # (e,) the patch there
+    normal: Floats  # (e,3) n
 
     def __bool__(self) -> bool:
         return len(self.face) > 0
 
+    def sides(self, surface: Surface) -> tuple[Ints, Ints]:
+        """The vertices a and b (h,)."""
+        return surface.faces[self.face, self.corner], surface.faces[self.face, (self.corner + 1) % 3]
+
 
 EMPTY, FLAT = np.empty(0, dtype=np.int64), np.empty((0, 3))
 NONE = FlatPieces(EMPTY, EMPTY, FLAT, EMPTY, EMPTY, FLAT)
+
+
+def add_plane_volumes(surface: Surface, X: Floats, volumes: Floats) -> Floats:
+    """The volumes (k,) with the flat pieces of each patch added, in place; vertices at X (n,3)."""
+    if pieces := flat_pieces(surface):
+        a, b = pieces.sides(surface)
+        X = X - surface.origin
+        each = -np.einsum("ij,ij->i", pieces.apex, np.cross(X[a], X[b])) / 6.0
+        volumes += np.bincount(surface.patch_of_face[pieces.face], each, len(volumes))
+        at_ends = np.einsum("ij,ij->i", pieces.normal, X[pieces.end])
+        volumes += np.bincount(pieces.end_patch, at_ends, len(volumes))
+    return volumes
+
+
+def add_plane_forces(surface: Surface, pressures: Floats, X: Floats, gradient: Floats) -> Floats:
+    """The gradient (n,3) with -Σ p ∂V of the flat pieces added, in place; pressures (k,)."""
+    if pieces := flat_pieces(surface):
+        a, b = pieces.sides(surface)
+        X = X - surface.origin
+        p = pressures[surface.patch_of_face[pieces.face], None] / 6.0
+        np.subtract.at(gradient, a, p * np.cross(pieces.apex, X[b]))
+        np.add.at(gradient, b, p * np.cross(pieces.apex, X[a]))
+        np.subtract.at(gradient, pieces.end, pressures[pieces.end_patch, None] * pieces.normal)
+    return gradient
+
+
+def plane_blocks(surface: Surface, pressures: Floats) -> tuple[Ints, Floats]:
+    """The sides a → b (h,2) of flat pieces under pressure, and q (h,3) of their Hessian blocks [q]×."""
+    pieces = flat_pieces(surface)
+    p = pressures[surface.patch_of_face[pieces.face]]
+    ends = np.stack(pieces.sides(surface), axis=1)[p != 0.0]
+    return ends, -p[p != 0.0, None] / 6.0 * pieces.apex[p != 0.0]
 
 
 def ground(surface: Surface) -> Bools:
@@ -61,27 +89,20 @@ def ground(surface: Surface) -> Bools:
     return surface.given_supports.on_plane | (surface.fixed & low)
 
 
+@kept_with_owner
 def flat_pieces(surface: Surface) -> FlatPieces:
     """The flat pieces of a surface, computed once; ``NONE`` where all planes pass through its origin."""
     if not surface.on_planes:
         return NONE
-    pieces: FlatPieces | None = vars(surface).get("flat_pieces")
-    if pieces is None:
-        pieces = vars(surface)["flat_pieces"] = _flat_pieces(surface)
-    return pieces
-
-
-def _flat_pieces(surface: Surface) -> FlatPieces:
     masks = [(surface.plane, ground(surface)), *surface.on_planes]
     topo, origin = surface.topology, surface.origin
     distance = np.array([-float(plane.height(origin)) for plane, _ in masks])
     rounding = 1e-12 * (surface.size + float(np.abs(origin).max()))
-    away = np.flatnonzero(np.abs(distance) > rounding)
     taken = np.zeros(len(topo.edges), dtype=bool)
     for k in np.flatnonzero(np.abs(distance) <= rounding):
         taken = taken | masks[k][1][topo.edges].all(axis=1)
-    sides, ends = [], []
-    for k in away:
+    columns = []
+    for k in np.flatnonzero(np.abs(distance) > rounding):
         plane, mask = masks[k]
         along = topo.curve_edge if plane.mirror else topo.boundary_edge
         chosen = mask[topo.edges].all(axis=1) & along & ~taken
@@ -89,19 +110,12 @@ def _flat_pieces(surface: Surface) -> FlatPieces:
         others = [other for number, other in enumerate(masks) if number != k]
         touching = [other for other, there in others if (there & mask).any()]
         apex = common_point(origin + distance[k] * np.array(plane.normal), [plane, *touching]) - origin
-        side = _sides(surface, chosen, apex)
-        sides.append(side)
-        ends.append(_ends(surface, side, (plane, mask), others))
-    if not sum(len(side[0]) for side in sides):
+        face, opposite = np.nonzero(chosen[topo.edge_of_face])
+        side = face, (opposite + 1) % 3, np.broadcast_to(apex, (len(face), 3))
+        columns.append((*side, *_ends(surface, side, (plane, mask), others)))
+    if not sum(len(column[0]) for column in columns):
         return NONE
-    parts = [np.concatenate(column) for column in (*zip(*sides, strict=True), *zip(*ends, strict=True))]
-    return FlatPieces(*parts)
-
-
-def _sides(surface: Surface, chosen: Bools, apex: Floats) -> tuple[Ints, Ints, Floats]:
-    """The sides of triangles at the chosen edges (e,): face, first corner, and the apex of each."""
-    face, opposite = np.nonzero(chosen[surface.topology.edge_of_face])
-    return face, (opposite + 1) % 3, np.broadcast_to(apex, (len(face), 3))
+    return FlatPieces(*(np.concatenate(column) for column in zip(*columns, strict=True)))
 
 
 def _ends(

@@ -4,7 +4,7 @@
     A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
     V_i = (1/6) Σ_T ⟨p, q_j × q_{j+1}⟩             (10b), positions seen from the point of Π
 
-τ L are the cables (``cables``), w ∫ z dA the patches' weights (``weight``); the paper has neither.
+τ L are the cables, w ∫ z dA the patches' weights; the paper has neither.
 
 V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.origin``) to patch i. At a
 junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
@@ -24,10 +24,9 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
-from . import kernels
 from .cables import add_cables
-from .plane_pieces import add_plane_forces, add_plane_volumes
-from .weight import add_weights
+from .flat_pieces import add_plane_forces, add_plane_volumes
+from .triangles import add_weights, areas_and_volumes, energy_mesh, measure
 
 
 def energy(surface: Surface) -> float:
@@ -45,7 +44,7 @@ def energy(surface: Surface) -> float:
 
 def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
-    areas, volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)
+    areas, volumes = areas_and_volumes(energy_mesh(surface), X)
     add_plane_volumes(surface, X, volumes)
     return total(surface.tensions, areas, surface.net_pressures, volumes) + add_cables_and_weights(surface, X)
 
@@ -56,11 +55,7 @@ def add_cables_and_weights(surface: Surface, X: Floats, gradient: Floats | None 
 
 
 def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -> float:
-    """E of the patches' areas and volumes.
-
-    Sums, not dot products: BLAS rounds those differently on different processors, and the paper's
-    flow amplifies the last digit.
-    """
+    """E of the patches' areas and volumes. Sums: BLAS rounds dot products differently on each processor."""
     return float((tensions * areas).sum() - (pressures * volumes).sum())
 
 
@@ -72,7 +67,7 @@ def energy_and_gradient(
     ``supports=False`` keeps the forces at held vertices, which the supports must carry.
     """
     X = surface.vertices if X is None else X
-    areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
+    areas, volumes, gradient = measure(energy_mesh(surface), X, workers)
     add_plane_volumes(surface, X, volumes)
     add_plane_forces(surface, surface.net_pressures, X, gradient)
     further = add_cables_and_weights(surface, X, gradient)
@@ -105,22 +100,19 @@ def weighted(
     """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
     alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
     X = surface.vertices if X is None else X
-    areas, volumes, forces = kernels.measure(kernels.energy_mesh(surface, alpha, p), X)
+    areas, volumes, forces = measure(energy_mesh(surface, alpha, p), X)
     return areas, add_plane_volumes(surface, X, volumes), add_plane_forces(surface, p, X, forces)
 
 
 def patch_areas(surface: Surface) -> Floats:
     """(k,) area A_i of each patch, length²."""
-    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[0]
+    return areas_and_volumes(energy_mesh(surface), surface.vertices)[0]
 
 
-def patch_volumes(surface: Surface) -> Floats:
-    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b).
-
-    With the flat pieces of ``plane_pieces`` where a boundary slides on a plane that misses the origin.
-    """
-    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
-    return add_plane_volumes(surface, surface.vertices, volumes)
+def patch_volumes(surface: Surface, X: Floats | None = None) -> Floats:
+    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b), with flat pieces."""
+    X = surface.vertices if X is None else X
+    return add_plane_volumes(surface, X, areas_and_volumes(energy_mesh(surface), X)[1])
 
 
 def volume(surface: Surface) -> float:

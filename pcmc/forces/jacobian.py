@@ -9,7 +9,7 @@ The second part vanishes at rest, but for circles. Newton's method converges qua
 - inside a sheet, with the area vector a = |a| n:   (∇E - n n·∇E) · Da / |a|;
 - on a curve, with the chord c = |c| t between its neighbours:   -(t·∇E) Bᵀ Dc / |c|;
 - where a curve slides on a plane the same, with the chord's part along it; where a sheet does, its normal's;
-- along a circle, with the tangent t:   Dt · ∇E, without supports; see ``turning``.
+- along a circle, with the tangent t:   Dt · ∇E, without supports; see ``circle_curvatures``.
 """
 
 from __future__ import annotations
@@ -35,8 +35,7 @@ from ..surface.geometry import (
 )
 from ..surface.topology import SHEET
 from .motion_space import MotionSpace, VertexClasses, curve_chords
-from .second_variation import add_products
-from .turning import circle_turning
+from .second_variation import add_products, circle_curvatures
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,7 @@ class Linearisation:
     sheet_factor : (n,3) (∇E - n n·∇E) / |a| inside sheets, which Da is multiplied with; zero elsewhere.
     curve_rows, curve_factor : (b,) numbers in ``classes.curve`` of the vertices whose curve may turn,
         and -(t·∇E) / |c| there, which Dc is multiplied with.
-    circle_rows, circle_factor : (k,), (k,3) as ``circle_turning`` gives them.
+    circle_rows, circle_factor : (k,), (k,3) as ``circle_curvatures`` gives them.
     """
 
     surface: Surface
@@ -96,7 +95,7 @@ def linearise(
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
     sheet_rows = np.flatnonzero(single)
-    turning = circle_turning(surface, space, X)
+    turning = circle_curvatures(surface, space, X)
     return Linearisation(
         surface, classes, space, X, sheet_rows, sheet_factor, rows, -along / square, *turning
     )

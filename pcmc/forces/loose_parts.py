@@ -12,7 +12,7 @@ from ..surface import Surface
 from ..surface.topology import Topology, components
 from .cables import squared_cable_forces
 from .motion_space import VertexClasses, force_scale
-from .weight import effective_tensions
+from .triangles import effective_tensions
 
 
 def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: Floats) -> float:

@@ -49,8 +49,7 @@ from ..surface.topology import (
     vertex_kind,
 )
 from .cables import squared_cable_forces, tensions_on
-from .kernels import Mesh, energy_mesh
-from .weight import effective_tensions
+from .triangles import Mesh, effective_tensions, energy_mesh
 
 PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 

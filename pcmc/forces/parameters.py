@@ -17,7 +17,7 @@ from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from .cables import add_pull
 from .functional import weighted
-from .weight import moments
+from .triangles import moments
 
 Rates = Mapping[str, Floats]
 

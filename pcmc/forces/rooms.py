@@ -1,9 +1,9 @@
 """The volumes of rooms that are prescribed, and their gradients.
 
-The volume V of a room is the one that its patches enclose: the cones from ``Surface.origin`` to its patches,
-each with the sign of its normal, and what closes their boundary. Along edges on Π the cones' sides lie in Π;
-along edges on other sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed;
-a flat fan about its middle closes it, and adds a constant.
+The volume V of a room is that of the cones from ``Surface.origin`` to its patches, each with the sign of its
+normal, and of what closes their boundary. Along edges on Π the cones' sides lie in Π; along edges on other
+sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed; a flat fan about its
+middle closes it, and adds a constant.
 
 A pressure δ in all of the room adds -δ V to E. At rest the pressures δ are those at which V is as prescribed:
 δ is the multiplier of the condition V = V̄ in
@@ -17,17 +17,13 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
-from ..base.compiled import compiled
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..surface import Line, Surface, expect_surface
-from ..surface.geometry import accumulate, cross, point, scaled, sub, vector
 from ..surface.parts import Room
 from ..surface.supports import apply_supports
 from ..surface.topology import components
-from . import kernels
-from .motion_space import MotionSpace
-from .plane_pieces import add_plane_forces, add_plane_volumes
+from .functional import patch_volumes, weighted
 
 ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
 UNCHANGED = 1e-13  # of the size, squared: a gradient of a volume that is rounding
@@ -72,30 +68,13 @@ def volumes_at(surface: Surface, X: Floats) -> Floats:
     """(r,) the volumes of the rooms of a surface with its vertices at X (n,3)."""
     if not surface.rooms:
         return np.zeros(0)
-    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)[1]
-    add_plane_volumes(surface, X, volumes)
-    return surface.room_signs @ volumes + closing_volumes(surface)
+    return surface.room_signs @ patch_volumes(surface, X) + closing_volumes(surface)
 
 
 def volume_gradients_at(surface: Surface, X: Floats) -> Floats:
     """(r,n,3) the gradients of the rooms' volumes at X (n,3), supports applied."""
-    gradients = np.zeros((len(surface.rooms), *X.shape))
-    if len(gradients):
-        _add_gradients(kernels.energy_mesh(surface), X, np.array(surface.room_signs), gradients)
-    for gradient, signs in zip(gradients, surface.room_signs, strict=True):
-        add_plane_forces(surface, -signs, X, gradient)
-        apply_supports(surface, gradient, X)
-    return gradients
-
-
-def volume_columns(surface: Surface, space: MotionSpace, X: Floats) -> Floats:
-    """(N,r) the gradients of the rooms' volumes in the motion space, Bᵀ ∂V_r/∂X, length²."""
-    gradients = volume_gradients_at(surface, X)
-    return (
-        np.stack([space.to_coordinates(g) for g in gradients], axis=1)
-        if len(gradients)
-        else np.zeros((space.size, 0))
-    )
+    gradients = [apply_supports(surface, weighted(surface, 0.0, -s, X)[2], X) for s in surface.room_signs]
+    return np.array(gradients).reshape(len(surface.rooms), *X.shape)
 
 
 def volume_defects(surface: Surface) -> Floats:
@@ -188,17 +167,14 @@ def check_rooms(surface: Surface) -> None:
             raise SurfaceError(message, what="rooms", where=room.name, found=float(volume))
 
 
+@kept_with_owner
 def closing_volumes(surface: Surface) -> Floats:
     """(r,) what the fans over the fixed boundaries of each room add to its cones, length³.
 
-    Computed once per surface. SurfaceError where a room has an open edge.
+    SurfaceError where a room has an open edge.
     """
-    closing: Floats | None = vars(surface).get("closing_volumes")
-    if closing is None:
-        rows = zip(surface.rooms, surface.room_signs, strict=True)
-        closing = np.array([sum(_fans(surface, room, row)) for room, row in rows], dtype=float)
-        vars(surface)["closing_volumes"] = closing  # where a cached property would put it
-    return closing
+    rows = zip(surface.rooms, surface.room_signs, strict=True)
+    return np.array([sum(_fans(surface, room, row)) for room, row in rows], dtype=float)
 
 
 def _left_over(surface: Surface, signs: Floats) -> Floats:
@@ -280,19 +256,3 @@ def _refuse_open(surface: Surface, room: Room, edges: Iterable[int]) -> None:
 def _cones(a: Floats, b: Floats, c: Floats) -> Floats:
     """(k,) signed volumes of the tetrahedra over triangles a, b, c seen from the origin."""
     return np.asarray(np.einsum("...i,...i->...", a, np.cross(b, c)) / 6.0)
-
-
-@compiled
-def _add_gradients(mesh: kernels.Mesh, X: Floats, signs: Floats, out: Floats) -> None:
-    """Add ∂V_r/∂X to out (r,n,3), ∂V/∂a = b × c / 6 for a triangle a, b, c, with the patches' signs (r,k)."""
-    F, origin = mesh.faces, vector(mesh.origin)
-    for f in range(len(F)):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
-        at_a, at_b, at_c = cross(b, c), cross(c, a), cross(a, b)
-        for r in range(len(signs)):
-            sixth = signs[r, mesh.patch[f]] / 6.0
-            if sixth != 0.0:
-                accumulate(out[r], i, scaled(sixth, at_a))
-                accumulate(out[r], j, scaled(sixth, at_b))
-                accumulate(out[r], k, scaled(sixth, at_c))

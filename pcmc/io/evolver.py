@@ -17,7 +17,7 @@ A room of prescribed volume is a body with that ``volume``; its Lagrange multipl
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +25,12 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..forces.flat_pieces import flat_pieces
-from ..forces.plane_pieces import add_plane_volumes
+from ..forces.flat_pieces import add_plane_volumes, flat_pieces
 from ..forces.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from .evolver_reading import ROUNDING, read
+from .formats import Content
 from .mesh_data import FREE, SLIDING, given_support
 from .text import escaped, format_rows
 
@@ -51,7 +51,7 @@ DEFINE FACET ATTRIBUTE patch INTEGER
 """
 
 
-def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """The datafile of a surface."""
     patches = list(enumerate(surface.patches, 1))
     weights = np.unique(surface.weights[surface.weights != 0.0]).tolist()
@@ -62,7 +62,7 @@ def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) ->
         face_tags.append(f" tension {p.tension!r} patch {k}{snow}{weight}")
     origin = surface.origin if surface.on_planes else np.array(surface.plane.point)
     named = [("patch", k, p.name) for k, p in patches]
-    named += [("bare", k, p.name) for k, p in patches if p.name in bare]
+    named += [("bare", k, p.name) for k, p in patches if p.name in content.bare]
     named += [("wall", k, "") for k, p in patches if p.wall]
     named += [("room", k, room.name) for k, room in enumerate(surface.rooms, 1)]
     named += [("cable", k, cable.name) for k, cable in enumerate(surface.cables, 1)]

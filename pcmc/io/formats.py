@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -54,6 +54,19 @@ class Format:
             "unit": units,
         }
         return [LOST[part].format(unit=units.length) for part in self.loses if there[part]]
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a writer gets besides a surface."""
+
+    metadata: str  # the text of ``metadata_text``
+    scalars: Mapping[str, Floats]
+    colour: str  # the scalar that colours the vertices, or ""
+    certificate: Mapping[str, Any]  # its values by name
+    walls: str | None  # the text of ``encode_walls``
+    units: Units
+    bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
 
 
 LOST = {

@@ -13,19 +13,17 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
+from .formats import Content
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata
@@ -36,19 +34,11 @@ NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does n
 ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
-def write(
-    path: Path,
-    surface: Surface,
-    scalars: Mapping[str, Floats],
-    metadata: str,
-    walls: str | None,
-    colour: str,
-    **_: Any,
-) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
-    for name, values in scalars.items():
+    for name, values in content.scalars.items():
         if len(values) == surface.n:
             finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
             data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
@@ -58,9 +48,9 @@ def write(
     turned = turned - place[:3, 3]
     scene = trimesh.Scene()
     shades = None
-    if colour:
-        shades, least, most = scalar_colors(scalars[colour])
-        scene.metadata["pcmc colours"] = {"scalar": colour, "least": least, "most": most}
+    if content.colour:
+        shades, least, most = scalar_colors(content.scalars[content.colour])
+        scene.metadata["pcmc colours"] = {"scalar": content.colour, "least": least, "most": most}
     for k, color, used, faces in patch_meshes(surface):
         name = surface.patches[k].name
         mesh = trimesh.Trimesh(turned[used], faces, process=False)
@@ -73,9 +63,9 @@ def write(
             rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
             mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
-    scene.metadata["pcmc"] = metadata
-    if walls is not None:
-        scene.metadata[WALLS] = walls
+    scene.metadata["pcmc"] = content.metadata
+    if content.walls is not None:
+        scene.metadata[WALLS] = content.walls
     if path.suffix.lower() == ".glb":
         path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
     else:

@@ -23,6 +23,7 @@ from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.geometry import file_origin
+from .formats import Content
 from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
@@ -40,24 +41,16 @@ NUMBERS = {  # in the property set of the certificate, by the name there
 }
 
 
-def write(
-    path: Path,
-    surface: Surface,
-    certificate: Mapping[str, Any],
-    walls: str | None,
-    units: Units,
-    metadata: str,
-    **_: Any,
-) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """The whole file; without a unit of length, its lengths are metres."""
     load_library("ifcopenshell", "ifc")
-    model = _Model(surface, units or Units("m"), metadata)
+    model = _Model(surface, content.units or Units("m"), content.metadata)
     roof = model.add_roof()
-    if certificate:
-        model.add_properties("Pcmc_Certificate", roof, _findings(certificate))
-    texts = {"Description": metadata} | ({} if walls is None else {"Walls": walls})
+    if content.certificate:
+        model.add_properties("Pcmc_Certificate", roof, _findings(content.certificate))
+    texts = {"Description": content.metadata} | ({} if content.walls is None else {"Walls": content.walls})
     model.add_properties("Pcmc_Surface", roof, {name: ("IfcText", text) for name, text in texts.items()})
-    areas = patch_areas(surface) * length_factor(units.length, "m") ** 2
+    areas = patch_areas(surface) * length_factor(content.units.length, "m") ** 2
     parts = [
         model.add_part(k, color, used, faces, float(areas[k]), roof.ObjectPlacement)
         for k, color, used, faces in patch_meshes(surface)

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
 from ..base.units import NO_UNITS, Units
 from ..base.validate import names_from_file
@@ -25,6 +25,7 @@ from .mesh_data import FREE, ROUNDING, SLIDING, MeshData, coincident, given_supp
 
 DAMAGED = (ValueError, KeyError, TypeError, IndexError, AttributeError)
 CHANGED = "the surface has changed since it was written"
+PARTS = ("cables", "rooms", "lines", "planes", "slides")
 
 
 def metadata_text(
@@ -45,13 +46,12 @@ def metadata_text(
     bare : the patches whose tension and pressure of 1 stand for none.
     """
 
-    def where(vertices: Ints) -> Any:
+    def where(chosen: Ints | Bools) -> Any:
+        vertices = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return (vertices if joined else surface.vertices[vertices]).tolist()
 
     given, plain = given_support(surface), support_of(surface)
-    slides = [np.flatnonzero((given == kind) & (plain != kind)) for kind in (FREE, SLIDING)]
-    guides = [(guide, np.flatnonzero(along)) for guide, along in surface.given_supports.on_line]
-    planes = [(plane, np.flatnonzero(mask)) for plane, mask in surface.on_planes]
+    guides, planes = surface.given_supports.on_line, surface.on_planes
     values: dict[str, object] = {
         "patches": [row_of(patch) for patch in surface.patches],
         "plane": (surface.plane.point, surface.plane.normal),
@@ -62,9 +62,9 @@ def metadata_text(
         "bare": [patch.name for patch in surface.patches if patch.name in bare],
         "cables": [[cable.name, cable.tension, where(cable.edges)] for cable in surface.cables],
         "rooms": [astuple(room) for room in surface.rooms],
-        "lines": [[astuple(guide), where(own)] for guide, own in guides if len(own)],
-        "planes": [[astuple(plane), where(own)] for plane, own in planes if len(own)],
-        "slides": [where(own) for own in slides] if planes else (),
+        "lines": [[astuple(guide), where(own)] for guide, own in guides if own.any()],
+        "planes": [[astuple(plane), where(own)] for plane, own in planes if own.any()],
+        "slides": [where((given == kind) & (plain != kind)) for kind in (FREE, SLIDING)] if planes else (),
     }
     return json.dumps(values | {key: part for key, part in parts.items() if part and key not in without})
 
@@ -75,18 +75,15 @@ def row_of(patch: Patch) -> tuple[object, ...]:
     return row if patch.snow else row[:-1] if patch.weight else row[:-2]
 
 
-PARTS = ("cables", "rooms", "lines", "planes", "slides")
-
-
 @dataclass(frozen=True)
 class Metadata:
-    """The same read back: patches by name (bare ones are None), plane, counts, units, other parts."""
+    """The same read back."""
 
-    patches: Mapping[str, Patch | None] = field(default_factory=dict)
+    patches: Mapping[str, Patch | None] = field(default_factory=dict)  # by name; bare ones are None
     plane: Plane | None = None
     counts: tuple[int, int] | None = None
     units: Units = NO_UNITS
-    parts: Mapping[str, Any] = field(default_factory=dict)
+    parts: Mapping[str, Any] = field(default_factory=dict)  # those of ``PARTS``
 
     def mesh_data(
         self, X: Floats, F: Ints, patch: Ints, names: Sequence[str], notes: Sequence[str] = (), **more: Any
@@ -132,14 +129,15 @@ def parse_metadata(text: str | None) -> Metadata:
         values = json.loads(text)
         patches = [Patch(*p) for p in values["patches"]]
         point, normal = map(tuple, values["plane"])
-        plane = Plane(point, normal)
-        counts = (int(values["counts"][0]), int(values["counts"][1]))
-        units = Units(*values.get("units", ()))
-        known = {p.name: None if p.name in values.get("bare", ()) else p for p in patches}
+        return Metadata(
+            {p.name: None if p.name in values.get("bare", ()) else p for p in patches},
+            Plane(point, normal),
+            (int(values["counts"][0]), int(values["counts"][1])),
+            Units(*values.get("units", ())),
+            {key: values[key] for key in PARTS if key in values},
+        )
     except DAMAGED:
         raise _damaged(text) from None
-    parts = {key: values[key] for key in PARTS if key in values}
-    return Metadata(known, plane, counts, units, parts)
 
 
 def _damaged(text: str) -> FileError:
@@ -153,70 +151,65 @@ def with_parts(data: MeshData) -> MeshData:
     Those whose vertices are no longer there are left out, with a note; what they hold stays fixed.
     """
     try:
-        return _Placed(data).result if data.parts else data
+        return _with_parts(data) if data.parts else data
     except DAMAGED:
         raise _damaged(str(dict(data.parts))) from None
 
 
-class _Placed:
-    """The parts of metadata on the vertices of a mesh."""
+def _with_parts(data: MeshData) -> MeshData:
+    X, parts, lost = data.vertices, data.parts, dict[str, None]()
+    keep: Ints = np.arange(len(X))
+    group: Ints = keep
 
-    def __init__(self, data: MeshData) -> None:
-        parts, n = data.parts, len(data.vertices)
-        self.X, self.lost = data.vertices, dict[str, None]()
-        self.keep: Ints = np.arange(n)
-        self.group: Ints = self.keep
-        cables = [
-            Cable(name, pull, self.keep[ends])
-            for name, pull, where in parts.get("cables", ())
-            if (ends := self.groups(where, f"cable {name!r} was left out")) is not None
-        ]
-        lines = [
-            (Circle(*row) if len(row) == 3 else Line(*row), np.isin(self.group, own))
-            for row, where in parts.get("lines", ())
-            if (own := self.groups(where, "what slides along a line is fixed", exact=True)) is not None
-        ]
-        what = "what slides on a plane is fixed"
-        planes = [
-            (Plane(*row), np.isin(self.group, own))
-            for row, where in parts.get("planes", ())
-            if (own := self.groups(where, what, exact=True)) is not None
-        ]
-        support = data.support
-        if support is not None and planes and what not in self.lost:
-            support = support.copy()
-            for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
-                if len(where) and (own := self.groups(where, what)) is not None:
-                    support[np.isin(self.group, own)] = kind
-        self.result = replace(
-            data,
-            vertices=self.X,
-            support=support,
-            cables=tuple(cables),
-            rooms=tuple(Room(*row) for row in parts.get("rooms", ())),
-            lines=tuple(lines),
-            planes=() if what in self.lost else tuple(planes),
-            notes=(*data.notes, *([f"{', '.join(self.lost)}: {CHANGED}"] if self.lost else [])),
-        )
-
-    def groups(self, where: Any, what: str, exact: bool = False) -> Ints | None:
+    def groups(where: Any, what: str, exact: bool = False) -> Ints | None:
         """The groups of vertices at one place that are meant, by number or position.
 
         None, and ``what`` is lost, if one is gone. With ``exact`` the vertices get the positions of the
         metadata, to the last digit.
         """
+        nonlocal X, keep, group
         given = np.array(where)
         if given.dtype.kind in "iu":
-            return within(given, "metadata", len(self.X))
-        if self.keep is self.group:  # positions: at one place there may be several vertices
-            self.keep, self.group = coincident(self.X)
+            return within(given, "metadata", len(X))
+        if keep is group:  # positions: at one place there may be several vertices
+            keep, group = coincident(X)
         points = given.astype(np.float64).reshape(-1, 3)
-        distance, near = map(np.asarray, cKDTree(self.X[self.keep]).query(points))
-        if (distance > ROUNDING * bounding_size(self.X)).any():
-            self.lost[what] = None
+        distance, near = map(np.asarray, cKDTree(X[keep]).query(points))
+        if (distance > ROUNDING * bounding_size(X)).any():
+            lost[what] = None
             return None
         if exact:
-            positions = self.X[self.keep]
+            positions = X[keep]
             positions[near] = points
-            self.X = positions[self.group]
+            X = positions[group]
         return near.reshape(given.shape[:-1])
+
+    def sliding(key: str, what: str) -> list[tuple[Any, Bools]]:
+        return [
+            (row, np.isin(group, own))
+            for row, where in parts.get(key, ())
+            if (own := groups(where, what, exact=True)) is not None
+        ]
+
+    cables = [
+        Cable(name, pull, keep[ends])
+        for name, pull, where in parts.get("cables", ())
+        if (ends := groups(where, f"cable {name!r} was left out")) is not None
+    ]
+    lines = sliding("lines", "what slides along a line is fixed")
+    planes, support = sliding("planes", off := "what slides on a plane is fixed"), data.support
+    if support is not None and planes and off not in lost:
+        support = support.copy()
+        for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
+            if len(where) and (own := groups(where, off)) is not None:
+                support[np.isin(group, own)] = kind
+    return replace(
+        data,
+        vertices=X,
+        support=support,
+        cables=tuple(cables),
+        rooms=tuple(Room(*row) for row in parts.get("rooms", ())),
+        lines=tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines),
+        planes=() if off in lost else tuple((Plane(*row), own) for row, own in planes),
+        notes=(*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else [])),
+    )

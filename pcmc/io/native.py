@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats
 from ..base.errors import FileError, PcmcError
 from ..surface import HeldCurve, Surface
+from .formats import Content
 from .libraries import translated_errors
 from .mesh_data import MeshData, numeric, support_of, within
 from .metadata import DAMAGED, parse_metadata
@@ -33,24 +33,20 @@ INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million
 ROOM = 64_000_000  # bytes that any file may become
 
 
-def write(
-    path: Path,
-    surface: Surface,
-    scalars: Mapping[str, Floats],
-    certificate: Mapping[str, Any],
-    metadata: str,
-    **_: Any,
-) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """The archive; the same surface gives the same bytes."""
-    tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
+    tables = {k: v for k, v in content.certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
+    version = 5 if surface.snows.any() else 4 if surface.weights.any() else 1
+    if surface.rooms or surface.on_planes or surface.cables or surface.given_supports.on_line:
+        version = 6
     meta = {
         "format": FORMAT,
-        "version": _version(surface),
-        "description": metadata,
+        "version": VERSION if surface.held_curves else version,
+        "description": content.metadata,
         "curves": [one.plain() for one in surface.held_curves],
-        "certificate": {k: v for k, v in certificate.items() if k not in tables},
+        "certificate": {k: v for k, v in content.certificate.items() if k not in tables},
     }
-    arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
+    arrays: dict[str, Any] = {f"scalar {name}": value for name, value in content.scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
     with path.open("wb") as file:
         np.savez_compressed(
@@ -66,8 +62,12 @@ def write(
 
 def read(path: Path) -> MeshData:
     """All of it."""
-    with translated_errors("pcmc"):
-        _check_size(path)
+    with translated_errors("pcmc"), zipfile.ZipFile(path) as packed:
+        size, given = sum(item.file_size for item in packed.infolist()), path.stat().st_size
+        most = INFLATED * given + ROOM
+        if size > most:  # it was made to fill the memory
+            text = f"its {given} bytes would become {size} in memory, and {most} at most are read"
+            raise FileError(text, where="size", found=size, expected=most)
     with translated_errors("pcmc"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(str(arrays.pop("meta")))
@@ -94,15 +94,6 @@ def read(path: Path) -> MeshData:
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
-
-
-def _version(surface: Surface) -> int:
-    """The oldest version of the format that can hold a surface."""
-    if surface.held_curves:
-        return VERSION
-    if surface.rooms or surface.on_planes or surface.cables or surface.given_supports.on_line:
-        return 6
-    return 5 if surface.snows.any() else 4 if surface.weights.any() else 1
 
 
 def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:
@@ -137,16 +128,6 @@ def _older_parts(meta: Mapping[str, Any], arrays: dict[str, Any]) -> dict[str, A
         "planes": [[(*row, about["name"], about["mirror"]), own] for (row, own), about in planes],
     }
     return {key: part for key, part in parts.items() if part}
-
-
-def _check_size(path: Path) -> None:
-    """Refuse an archive that becomes far larger than any surface does: it was made to fill the memory."""
-    with zipfile.ZipFile(path) as archive:
-        size = sum(item.file_size for item in archive.infolist())
-    most = INFLATED * path.stat().st_size + ROOM
-    if size > most:
-        text = f"its {path.stat().st_size} bytes would become {size} in memory, and {most} at most are read"
-        raise FileError(text, where="size", found=size, expected=most)
 
 
 def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -16,6 +15,7 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..base.validate import parsed
 from ..surface import Surface
+from .formats import Content
 from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import triangulate
@@ -29,11 +29,11 @@ POINT = re.compile(r"^[^\S\n]*p[^\S\n]+(\d[\d \t]*)$", re.M)
 CORNER = re.compile(r"[-+]?[0-9]{1,18}(/\S*)?")
 
 
-def write(path: Path, surface: Surface, metadata: str, **_: Any) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """Vertices with all digits, supports, then the faces group by group; a backslash would join lines."""
     support = support_of(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"{MARK}{metadata}\n")
+        file.write(f"{MARK}{content.metadata}\n")
         file.write(format_rows("v %r %r %r\n", *surface.vertices.T))
         for name, kind in HELD.items():
             held = np.flatnonzero(support == kind) + 1

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..surface import Surface
+from .formats import Content
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import from_polygons
@@ -34,12 +34,12 @@ TYPES = {
 NAMES = {"u1": "uchar", "i4": "int", "f8": "double"}
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata: str, **_: Any) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """Little-endian binary."""
     vertex = {c: surface.vertices[:, d].astype("<f8") for d, c in enumerate("xyz")}
     vertex["support"] = support_of(surface).astype("u1")
     face = {"patch": surface.patch_of_face.astype("<i4")}
-    for name, values in scalars.items():
+    for name, values in content.scalars.items():
         columns = vertex if len(values) == surface.n else face
         columns[re.sub(r"\s+", "_", name)] = np.asarray(values, dtype="<f8")
     announced = [
@@ -47,7 +47,7 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata:
         for columns in (vertex, face)
     ]
     header = (
-        f"ply\nformat binary_little_endian 1.0\n{MARK}{metadata}\n"
+        f"ply\nformat binary_little_endian 1.0\n{MARK}{content.metadata}\n"
         f"element vertex {surface.n}\n{announced[0]}element face {surface.m}\n"
         f"property list uchar int vertex_indices\n{announced[1]}end_header\n"
     )

@@ -91,15 +91,11 @@ def from_polygons(
     metadata: Metadata,
     default: str,
 ) -> MeshData:
-    """The mesh of polygons, with supports, patches and scalars from the data on its points and cells.
+    """The mesh of polygons as in ``triangulate``, with data on its points and cells.
 
-    Parameters
-    ----------
-    X : (n,3) points. corners : vertex indices, polygon after polygon. counts : corners of each polygon.
-    point_data : "support" holds supports; other data of one number each are scalars.
-    cell_data : the first of LABELS holds patches; other data of one number each are scalars.
-    metadata : names the patches; else they are "patch 1", "patch 2", ...
-    default : the name of the only patch where there are no labels.
+    "support" of the points holds supports, the first of LABELS of the cells patches; other data of one number
+    each are scalars. The metadata name the patches; else they are "patch 1", "patch 2", ..., and without
+    labels the only patch has the name ``default``.
     """
     if not len(counts):
         raise FileError("the file has no faces", where="faces", found=0)

@@ -6,6 +6,7 @@ a mesh that is wrong can crash it.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -21,12 +22,9 @@ def meshlab_arrays(path: str) -> dict[str, Any]:
 
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(path)
-    parts = [meshes.mesh(k) for k in range(meshes.mesh_number())] if meshes.mesh_number() else []
+    parts = [meshes.mesh(k) for k in range(meshes.mesh_number())]
     return {
-        "meshes": [
-            {"points": part.transformed_vertex_matrix(), "faces": part.face_matrix(), "name": part.label()}
-            for part in parts
-        ]
+        "meshes": [(part.label(), part.transformed_vertex_matrix(), part.face_matrix()) for part in parts]
     }
 
 
@@ -37,7 +35,7 @@ def repaired_arrays(path: str) -> dict[str, Any]:
     with np.load(path, allow_pickle=False) as data:
         X, F, patch = data["points"], data["faces"], data["patch"]
         weld, holes, edge_length = float(data["weld"]), int(data["holes"]), float(data["edge_length"])
-    changes: dict[str, int] = {}
+    changes: Any = Counter()
     X, F, patch = _cleaned(X, F, patch, weld, changes)
     size = int(F.max()) + 1
     keys, count = np.unique(_edge_keys(F, size), return_counts=True)
@@ -53,11 +51,10 @@ def repaired_arrays(path: str) -> dict[str, Any]:
             meshes = _meshset(X, vertex[local])
             meshes.meshing_remove_unreferenced_vertices()
             length = pymeshlab.PureValue(edge_length)
-            meshes.meshing_isotropic_explicit_remeshing(
-                iterations=ROUNDS, targetlen=length, checksurfdist=False
-            )
+            options = {"iterations": ROUNDS, "targetlen": length, "checksurfdist": False}
+            meshes.meshing_isotropic_explicit_remeshing(**options)
             X, F = meshes.current_mesh().vertex_matrix(), meshes.current_mesh().face_matrix()
-            return {"points": X, "faces": F, "patch": np.full(len(F), number), "changes": changes}
+            return {"points": X, "faces": F, "patch": np.full(len(F), number), "changes": dict(changes)}
         first = np.zeros(len(vertex), dtype=bool)
         first[np.unique(vertex, return_index=True)[1]] = True
         new = np.where(first, vertex, 0)
@@ -72,7 +69,7 @@ def repaired_arrays(path: str) -> dict[str, Any]:
         "points": np.concatenate(points)[used],
         "faces": inverse.reshape(-1, 3),
         "patch": np.concatenate(owner),
-        "changes": changes,
+        "changes": dict(changes),
     }
 
 
@@ -84,7 +81,7 @@ def _meshset(X: Any, F: Any, **data: Any) -> Any:
     return meshes
 
 
-def _cleaned(X: Any, F: Any, patch: Any, weld: float, changes: dict[str, int]) -> Any:
+def _cleaned(X: Any, F: Any, patch: Any, weld: float, changes: Any) -> Any:
     """Without points that are no numbers, near copies of vertices, and repeated triangles."""
     import pymeshlab
 
@@ -123,12 +120,8 @@ def _area_vectors(X: Any, F: Any) -> Any:
     return 0.5 * np.cross(b - a, c - a)
 
 
-def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: dict[str, int]) -> tuple[Any, Any]:
+def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: Any) -> tuple[Any, Any]:
     """Triangles (m,3) of a patch, and the vertex of the whole mesh (n,) that each of its vertices is."""
-
-    def add(what: str, number: Any) -> None:
-        changes[what] = changes.get(what, 0) + int(number)
-
     used, local = np.unique(F, return_inverse=True)
     meshes = _meshset(X[used], local.reshape(-1, 3), v_scalar_array=used.astype(float))
     before = _flat(X, F)
@@ -137,25 +130,26 @@ def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: dict[str, 
         mesh = meshes.current_mesh()
         vertex, faces = _vertices(mesh), mesh.face_matrix()
         flat = _flat(mesh.vertex_matrix(), faces)
-        add("triangles without area left out", np.count_nonzero(flat))
-        add("triangles without area flipped away", max(np.count_nonzero(before) - np.count_nonzero(flat), 0))
+        changes["triangles without area left out"] += np.count_nonzero(flat)
+        away = np.count_nonzero(before) - np.count_nonzero(flat)
+        changes["triangles without area flipped away"] += max(away, 0)
         meshes = _meshset(mesh.vertex_matrix(), faces[~flat], v_scalar_array=vertex.astype(float))
     mesh = meshes.current_mesh()
     count = np.unique(_edge_keys(mesh.face_matrix(), mesh.vertex_number()), return_counts=True)[1]
-    add("edges of three or more triangles of one patch split", np.count_nonzero(count > 2))
+    changes["edges of three or more triangles of one patch split"] += np.count_nonzero(count > 2)
     if (count > 2).any():
         meshes.meshing_repair_non_manifold_edges(method="Split Vertices")
     old = _area_vectors(meshes.current_mesh().vertex_matrix(), meshes.current_mesh().face_matrix())
     meshes.meshing_re_orient_faces_coherently()
     mesh = meshes.current_mesh()
     turned = np.einsum("ij,ij->i", old, _area_vectors(mesh.vertex_matrix(), mesh.face_matrix())) < 0.0
-    add("triangles turned", min(np.count_nonzero(turned), np.count_nonzero(~turned)))
+    changes["triangles turned"] += min(np.count_nonzero(turned), np.count_nonzero(~turned))
     faces = mesh.face_matrix()
     size = len(faces)
     if holes >= 3:
         meshes.meshing_close_holes(maxholesize=holes, newfaceselected=True, selfintersection=False)
         mesh = meshes.current_mesh()
-        faces = _without_large_fills(mesh, size, _vertices(mesh), single, add)
+        faces = _without_large_fills(mesh, size, _vertices(mesh), single, changes)
     points = meshes.current_mesh().vertex_matrix()
     up = _area_vectors(points, faces)[:, 2]
     if abs(up.sum()) > 0.01 * np.abs(up).sum() and up.sum() < 0.0:  # a roof that looks down
@@ -174,7 +168,7 @@ def _flat(X: Any, F: Any) -> Any:
     return np.linalg.norm(_area_vectors(X, F), axis=1) <= FLAT * edges.max(axis=1) ** 2
 
 
-def _without_large_fills(mesh: Any, size: int, vertex: Any, single: Any, add: Any) -> Any:
+def _without_large_fills(mesh: Any, size: int, vertex: Any, single: Any, changes: Any) -> Any:
     """The faces without fills of what is no small hole: a curve where another patch is, an outer edge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -194,6 +188,6 @@ def _without_large_fills(mesh: Any, size: int, vertex: Any, single: Any, add: An
     length = np.where(rim, np.linalg.norm(X[fill] - X[np.roll(fill, -1, axis=1)], axis=2), 0.0).sum(axis=1)
     reach = np.sqrt(np.linalg.norm(_area_vectors(X, faces[:size]), axis=1).sum())
     good = (np.bincount(part, ~whole, count) == 0) & (np.bincount(part, length, count) <= reach)
-    add("holes closed", np.count_nonzero(good))
-    add("triangles added in holes", np.count_nonzero(good[part]))
+    changes["holes closed"] += np.count_nonzero(good)
+    changes["triangles added in holes"] += np.count_nonzero(good[part])
     return np.concatenate([faces[:size], fill[good[part]]])

@@ -12,12 +12,10 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, OptionError, PcmcError
 from ..base.files import as_path
 from ..base.units import NO_UNITS, Units
@@ -37,22 +35,13 @@ TURNS = {"x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]], "y": [[1, 0, 0], [0, 0, -1], [
 
 @dataclass(frozen=True, eq=False)
 class Repaired:
-    """A repaired mesh.
+    """A repaired mesh; ``write`` takes it like a Surface, and keeps what is bare."""
 
-    Attributes
-    ----------
-    surface : a patch per group of the file, its boundary fixed; tensions and pressures are the file's, or 1.
-    changes : what was done and how often, as in {"vertices welded": 12}; empty if the mesh was clean.
-    notes : other changes, a sentence each, as that the mesh was cut into new triangles.
-    units : of its numbers; no unit where the file has none and none was given.
-    bare : the patches whose tension and pressure of 1 stand for none; ``write`` keeps this of a Repaired.
-    """
-
-    surface: Surface
-    changes: Mapping[str, int]
-    notes: Sequence[str] = ()
-    units: Units = NO_UNITS
-    bare: Sequence[str] = ()
+    surface: Surface  # a patch per group of the file, its boundary fixed
+    changes: Mapping[str, int]  # what was done and how often, as in {"vertices welded": 12}
+    notes: Sequence[str] = ()  # other changes, as that the mesh was cut into new triangles
+    units: Units = NO_UNITS  # of its numbers; no unit where the file has none and none was given
+    bare: Sequence[str] = ()  # the patches whose tension and pressure of 1 stand for none
 
     def __str__(self) -> str:
         """The changes and notes in one line."""
@@ -125,25 +114,29 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     finite = X[np.isfinite(X).all(axis=1)]
     size = float(np.linalg.norm(np.ptp(finite, axis=0))) if len(finite) else 0.0
     several = len(data.patches) > 1
-    values: dict[str, Any] = {
-        "points": X,
-        "faces": F,
-        "patch": data.patch_of_face,
-        "weld": WELD * size if weld is None else weld,
-        "holes": holes,
-        "edge_length": 0.0 if edge_length is None or several else edge_length,
-    }
     if edge_length is not None:
-        _refuse_too_many(X, F, edge_length)
+        a, b, c = (X[corner] for corner in F.T)
+        area = 0.5 * float(np.nansum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
+        least = math.sqrt(area / (math.sqrt(0.1875) * MOST))
+        if edge_length < least:
+            text = f"edge_length = {edge_length:g} would make more than {MOST} triangles"
+            text = f"{text}; use {1.01 * least:.2g} or more"
+            raise OptionError(text, what="edge_length", found=edge_length, expected=least)
     with tempfile.TemporaryDirectory() as folder:
         request = Path(folder) / "mesh.npz"
-        np.savez(request, **values)
+        np.savez(
+            request,
+            points=X,
+            faces=F,
+            patch=data.patch_of_face,
+            weld=WELD * size if weld is None else weld,
+            holes=holes,
+            edge_length=0.0 if edge_length is None or several else edge_length,
+        )
         answer = read_arrays("io/reading_meshes.py", "repaired_arrays", request)
     kept, patch = np.unique(answer["patch"], return_inverse=True)  # one may have vanished
-    clean = MeshData(
-        answer["points"], answer["faces"], patch, tuple(data.patches[k] for k in kept), plane=data.plane
-    )
-    surface = to_surface(clean)
+    patches = tuple(data.patches[k] for k in kept)
+    surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
     given = {"supports": data.support is not None, "cables": data.cables, "rooms": data.rooms}
     given |= {"planes": data.planes, "lines": data.lines}
@@ -156,17 +149,6 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
             surface = remesh(surface, edge_length)
         notes = (*notes, f"{len(F)} triangles became {surface.m}")
     return Repaired(surface, changes, notes, data.units, data.bare)
-
-
-def _refuse_too_many(X: Floats, F: Ints, edge_length: float) -> None:
-    """Refuse an edge length that would make more than ``MOST`` triangles, with the least possible one."""
-    a, b, c = (X[corner] for corner in F.T)
-    area = 0.5 * float(np.nansum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
-    least = math.sqrt(area / (math.sqrt(0.1875) * MOST))
-    if edge_length < least:
-        message = f"edge_length = {edge_length:g} would make more than {MOST} triangles"
-        text = f"{message}; use {1.01 * least:.2g} or more"
-        raise OptionError(text, what="edge_length", found=edge_length, expected=least)
 
 
 def _read(path: Path) -> MeshData:
@@ -189,5 +171,5 @@ def read(path: Path) -> MeshData:
     """Every mesh of the file; meshes of one name are one patch."""
     require("pymeshlab", extra="repair")
     found = enumerate(read_arrays("io/reading_meshes.py", "meshlab_arrays", path)["meshes"], 1)
-    meshes = [(Path(m["name"]).stem or f"mesh {k}", m["points"], m["faces"]) for k, m in found]
+    meshes = [(Path(name).stem or f"mesh {k}", X, F) for k, (name, X, F) in found]
     return Metadata().of_meshes(meshes, path.stem)

@@ -23,6 +23,7 @@ from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
 from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import bounding_size
+from .formats import Content
 from .libraries import load_library, read_arrays, require
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, parse_metadata
@@ -36,14 +37,14 @@ CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255), "cable": (128, 0, 128, 255)}
 
 
-def write(path: Path, surface: Surface, walls: str | None, units: Units, metadata: str, **_: Any) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """A layer per patch, in the unit of the surface; in metres if there is none."""
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
-    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[units.length or UNIT].rhino)
+    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[content.units.length or UNIT].rhino)
     for k, color, used, faces in patch_meshes(surface):
         rgba = (*(round(255 * float(c)) for c in color), 255)
-        attributes = _layer(rhino, model, surface.patches[k].name, rgba, metadata)
+        attributes = _layer(rhino, model, surface.patches[k].name, rgba, content.metadata)
         mesh = rhino.Mesh()
         mesh.Vertices.UseDoublePrecisionVertices = True
         for point in surface.vertices[used].tolist():  # the library takes them one by one
@@ -52,8 +53,8 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, metadat
             mesh.Faces.AddFace(*corners)
         mesh.Normals.ComputeNormals()
         model.Objects.AddMesh(mesh, attributes)
-    if walls is not None:
-        model.Layers[0].SetUserString(WALLS, walls)  # of the whole model, so once
+    if content.walls is not None:
+        model.Layers[0].SetUserString(WALLS, content.walls)  # of the whole model, so once
     support = support_of(surface)
     for name, kind in HELD.items():
         held = surface.vertices[support == kind]
@@ -61,7 +62,7 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, metadat
             cloud = rhino.PointCloud()
             for point in held.tolist():
                 cloud.Add(rhino.Point3d(*point))
-            model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], metadata))
+            model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], content.metadata))
     _add_curves(rhino, model, surface)
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")

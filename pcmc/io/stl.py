@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.geometry import area_vectors, file_origin
+from .formats import Content
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata
@@ -29,7 +29,7 @@ FACET = (
 )
 
 
-def write(path: Path, surface: Surface, **_: Any) -> str:
+def write(path: Path, surface: Surface, _: Content) -> str:
     """Coordinates with nine digits, more than readers of STL keep; returns a note if they are shifted."""
     middle = file_origin(surface.vertices, surface.size)
     moved = bool(middle.any())

@@ -9,7 +9,6 @@ primvars; tensions, pressures, plane and walls without height are custom data of
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,11 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra
-from ..base.units import Units, length_factor
+from ..base.units import length_factor
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
+from .formats import Content
 from .mesh_data import support_of
 from .patch_meshes import patch_meshes
 
@@ -28,16 +28,7 @@ ROOF = "/Roof"
 SUPPORT = "support"
 
 
-def write(
-    path: Path,
-    surface: Surface,
-    scalars: Mapping[str, Floats],
-    walls: str | None,
-    units: Units,
-    metadata: str,
-    colour: str,
-    **_: Any,
-) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """One layer."""
     try:
         from pxr import Sdf, Usd, UsdGeom, Vt
@@ -46,18 +37,18 @@ def write(
 
     stage: Any = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
-    UsdGeom.SetStageMetersPerUnit(stage, length_factor(units.length, "m"))
+    UsdGeom.SetStageMetersPerUnit(stage, length_factor(content.units.length, "m"))
     roof: Any = UsdGeom.Xform.Define(stage, ROOF)
     stage.SetDefaultPrim(roof.GetPrim())
-    roof.GetPrim().SetCustomDataByKey("pcmc", metadata)
-    if walls is not None:
-        roof.GetPrim().SetCustomDataByKey("walls", walls)
+    roof.GetPrim().SetCustomDataByKey("pcmc", content.metadata)
+    if content.walls is not None:
+        roof.GetPrim().SetCustomDataByKey("walls", content.walls)
     middle = file_origin(surface.vertices, surface.size)
     if middle.any():
         roof.AddTranslateOp().Set(tuple(middle.tolist()))
     at_vertices = {SUPPORT: support_of(surface).astype(float)}
-    at_vertices |= {name: values for name, values in scalars.items() if len(values) == surface.n}
-    shades = linear(scalar_colors(scalars[colour])[0]) if colour else None
+    at_vertices |= {name: values for name, values in content.scalars.items() if len(values) == surface.n}
+    shades = linear(scalar_colors(content.scalars[content.colour])[0]) if content.colour else None
     for k, patch_color, used, faces in patch_meshes(surface):
         color = linear(patch_color)
         mesh: Any = UsdGeom.Mesh.Define(stage, f"{ROOF}/patch_{k}")

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Ints
 from ..base.errors import FileError
 from ..surface import Surface
+from .formats import Content
 from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
@@ -26,15 +27,15 @@ ITEMS = 100  # of an array, for each byte of a file; those of one value compress
 FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata: str, **_: Any) -> None:
+def write(path: Path, surface: Surface, content: Content) -> None:
     """Polygons in a .vtp, cells in a .vtu."""
     pyvista = load_library("pyvista")
     mesh = pyvista.PolyData.from_regular_faces(surface.vertices, surface.faces)
     mesh.point_data["support"] = support_of(surface)
     mesh.cell_data["patch"] = surface.patch_of_face
-    for name, values in scalars.items():
+    for name, values in content.scalars.items():
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
-    mesh.field_data["pcmc"] = [metadata]
+    mesh.field_data["pcmc"] = [content.metadata]
     if path.suffix.lower() == ".vtu":
         mesh = mesh.cast_to_unstructured_grid()
     library = load_library("vtkmodules.vtkIOXML")

@@ -19,7 +19,7 @@ from ..base.units import Units, as_units, length_factor
 from ..base.validate import checked_name, choice, refuse
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
-from .formats import FORMATS, format_of
+from .formats import FORMATS, Content, format_of
 from .mesh_data import scaled_surface
 from .metadata import metadata_text
 from .patch_meshes import encode_walls
@@ -100,22 +100,15 @@ def write(
         elif shown.m < surface.m:
             walls = encode_walls(surface, shown)
     bare = getattr(solved, "bare", ())
-    content: dict[str, Any] = {
-        "scalars": scalars,
-        "colour": colour,
-        "certificate": _values(certificate),
-        "walls": walls,
-        "units": units,
-        "metadata": metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare),
-        "bare": bare,
-    }
+    metadata = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
+    content = Content(metadata, scalars, colour, _values(certificate), walls, units, bare)
     with writing(path), atomic_write(path) as temporary:
         try:
             for name in carried:
                 if re.sub(r"\s+", "_", name) in form.reserved:
                     text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
                     raise FileError(text, where=name, found=name)
-            note = form.functions.write(temporary, shown, **content)
+            note = form.functions.write(temporary, shown, content)
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
     if lost:

@@ -12,7 +12,7 @@ from ..base.arrays import Floats
 from ..certificate import Verdict
 from ..continuation import Branch, Ending, follow
 from ..continuation.branch_point import ALONG
-from ..forces.weight import compressed, effective_tensions
+from ..forces.triangles import compressed, effective_tensions
 from ..meshing.quality import triangle_quality
 from ..solvers import solve
 from ..solvers.result import Callback, Progress

@@ -10,6 +10,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from ..surface.held_curve import EdgesOnCurves
+from ..surface.topology import SIDES, edge_places
 from .quality import edge_lengths
 from .refinement import (
     Projection,
@@ -20,45 +21,43 @@ from .refinement import (
     prolongation,
     refine,
 )
-from .sizes import SizeField, edges_between, place_between
+from .sizes import edges_between, place_between
 
 
 @dataclass(frozen=True, eq=False)
 class CurveMesh:
-    """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
-
-    ``support`` (n,c): as ``Surface.support_columns``.
-    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1. ``cable`` (c,): the number of
-    the cable on each of ``curves``, or -1. ``on``: where these are on curves that were drawn.
-    """
+    """A mesh whose curves stay: a patch for each face, edges of curves, and supports."""
 
     X: Floats
     F: Ints
     patch: Ints
-    curves: Ints
-    support: Bools
-    source: Ints
-    cable: Ints
-    on: EdgesOnCurves
+    curves: Ints  # (c,2) the edges of curves
+    support: Bools  # as ``Surface.support_columns``
+    source: Ints  # (n,) the number of each vertex in the mesh before MMG, or -1
+    cable: Ints  # (c,) the number of the cable on each of ``curves``, or -1
+    on: EdgesOnCurves  # where these are on curves that were drawn
 
 
-def cut_curves(
-    surface: Surface, size: Floats, along_curves: Floats, project: Projection | None = None
-) -> tuple[CurveMesh, SizeField]:
-    """The mesh with new vertices on its curves, about ``along_curves`` (n,) apart, and its sizes."""
-    first = surface.n
-    background = SizeField(surface.vertices, size)
-    counts = _pieces(surface, along_curves)
+def cut_curves(surface: Surface, along_curves: Floats, project: Projection | None = None) -> CurveMesh:
+    """The mesh with new vertices on its curves, about ``along_curves`` (n,) apart."""
+    first, counts = surface.n, _pieces(surface, along_curves)
     # 1→4 keeps the triangles' shape, cutting single edges does not
     while len(counts) and np.median(counts) >= 2.0:
         along_curves = prolongation(surface) @ along_curves
         surface = _refined_round(surface)
         counts = _pieces(surface, along_curves)
-    topo, stay = surface.topology, _curve_edges(surface)
-    X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
-    on = surface.edges_on_curves[stay]
-    cable, support = _cable_of_edge(surface)[stay], edge_columns(surface)[stay]
-    mesh = CurveMesh(X, F, patch, topo.edges[stay], surface.support_columns, number, cable, on)
+    stay, cable = _curve_edges(surface)
+    mesh = CurveMesh(
+        surface.vertices,
+        surface.faces,
+        surface.patch_of_face,
+        surface.topology.edges[stay],
+        surface.support_columns,
+        np.arange(surface.n),
+        cable[stay],
+        surface.edges_on_curves[stay],
+    )
+    support = edge_columns(surface)[stay]
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
     new = mesh.support[:, 0] & (np.arange(len(mesh.X)) >= first)
@@ -67,21 +66,16 @@ def cut_curves(
     if project is not None and new.any():
         X[new] = projected(project, X[new])
     onto_circles_of(surface, mesh.support & new[:, None], X)
-    return replace(mesh, X=X), background
+    return replace(mesh, X=X)
 
 
-def _curve_edges(surface: Surface) -> Bools:
-    """(e,) the edges that must stay: curves, cables, and edges held inside a patch."""
+def _curve_edges(surface: Surface) -> tuple[Bools, Ints]:
+    """(e,) the edges that must stay: curves, cables, held ones; the number of the cable on each, or -1."""
+    cable = np.full(len(surface.topology.edges), -1)
+    for index, each in enumerate(surface.cables):
+        cable[surface.topology.edge_numbers(each.edges)] = index
     fixed, sliding = held_midpoints(surface)
-    return surface.topology.curve_edge | fixed | sliding | (_cable_of_edge(surface) >= 0)
-
-
-def _cable_of_edge(surface: Surface) -> Ints:
-    """(e,) the number of the cable on each edge; -1 for none."""
-    out = np.full(len(surface.topology.edges), -1)
-    for index, cable in enumerate(surface.cables):
-        out[surface.topology.edge_numbers(cable.edges)] = index
-    return out
+    return surface.topology.curve_edge | fixed | sliding | (cable >= 0), cable
 
 
 def _refined_round(surface: Surface) -> Surface:
@@ -90,36 +84,32 @@ def _refined_round(surface: Surface) -> Surface:
     With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
     (a + b)/2 + (t_a - t_b)/8.
     """
-    chosen = np.flatnonzero(~_curve_edges(surface))
-    ends, normals = surface.topology.edges[chosen], _edge_normals(surface, chosen)
-    edge = (surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]])[:, None]
+    topo, n = surface.topology, surface.n
+    chosen = np.flatnonzero(~_curve_edges(surface)[0])
+    # the normals of each sheet at its vertices
+    corner = surface.patch_of_face[:, None].astype(np.int64) * n + surface.faces
+    key, place = np.unique(corner.ravel(), return_inverse=True)
+    total = np.zeros((len(key), 3))
+    np.add.at(total, place, np.repeat(area_vectors(surface.vertices[surface.faces]), 3, axis=0))
+    total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+    patch_of_edge = np.zeros(len(topo.edges), dtype=np.int64)
+    patch_of_edge[topo.edge_of_face] = surface.patch_of_face[:, None]
+    normals = total[np.searchsorted(key, patch_of_edge[chosen, None] * n + topo.edges[chosen])]
+    start, end = surface.vertices[topo.edges[chosen].T]
+    edge = (end - start)[:, None]
     across = edge - (edge * normals).sum(axis=2, keepdims=True) * normals
     rise = (across[:, 0] - across[:, 1]) / 8.0
     most = 0.2 * np.linalg.norm(edge[:, 0], axis=1)
     rise *= np.minimum(1.0, most / np.maximum(np.linalg.norm(rise, axis=1), 1e-300))[:, None]
     fine = refine(surface)
     X = fine.vertices.copy()
-    X[surface.n + chosen] += rise
+    X[n + chosen] += rise
     return fine.moved(X)
-
-
-def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
-    """(c,2,3) unit normals at the ends of edges inside sheets, of the edge's own sheet."""
-    X, F, topo = surface.vertices, surface.faces, surface.topology
-    vector = area_vectors(X[F])
-    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
-    key, place = np.unique(corner.ravel(), return_inverse=True)
-    total = np.zeros((len(key), 3))
-    np.add.at(total, place, np.repeat(vector, 3, axis=0))
-    total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
-    patch_of_edge = np.zeros(len(topo.edges), dtype=np.int64)
-    patch_of_edge[topo.edge_of_face] = surface.patch_of_face[:, None]
-    return total[np.searchsorted(key, patch_of_edge[chosen, None] * surface.n + topo.edges[chosen])]
 
 
 def _pieces(surface: Surface, size: Floats) -> Ints:
     """(c,) into how many pieces each curve edge is to be cut."""
-    chosen = _curve_edges(surface)
+    chosen, _ = _curve_edges(surface)
     start, end = size[surface.topology.edges[chosen]].T
     return np.maximum(1, np.rint(edges_between(edge_lengths(surface)[chosen], start, end))).astype(np.int64)
 
@@ -138,7 +128,7 @@ def _cut_once(
     at, points = on.between(share)
     points = np.where(on.drawn[:, None], points, start + share[:, None] * (end - start))
     number = len(mesh.X) + np.arange(len(ends))
-    F, patch = cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
+    F, patch = cut_triangles(mesh.F, mesh.patch, ends, number)
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
     X = np.concatenate([mesh.X, points])
     size = np.concatenate([size, size_start + share * (size_end - size_start)])
@@ -151,20 +141,16 @@ def _cut_once(
 
 
 def cut_triangles(
-    F: Ints, patch: Ints, ends: Ints, number: Ints, n: int, first: Ints | None = None
+    F: Ints, patch: Ints, ends: Ints, number: Ints, first: Ints | None = None
 ) -> tuple[Ints, Ints]:
     """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
 
-    The edges ``ends`` (k,2) get the vertices ``number`` (k,); old vertices are below n. With two cut sides
+    The edges ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides
     a line leads to the middle of one of them from the corner opposite: of the side opposite corner
     ``first`` (m,), where that is given.
     """
-    key = ends.min(axis=1).astype(np.int64) * n + ends.max(axis=1)
-    order = np.argsort(key)
-    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
-    wanted = side.min(axis=2) * n + side.max(axis=2)
-    place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
-    middle = np.where(key[order][place] == wanted, number[order][place], -1)
+    place = edge_places(F[:, SIDES], ends)
+    middle = np.where(place >= 0, number[place], -1)
     count = (middle >= 0).sum(axis=1)
     # turn each triangle so that its cut sides come first: opposite corners 0, then 0 and 1
     turn = np.argmax(middle >= 0, axis=1)

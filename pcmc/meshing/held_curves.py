@@ -7,11 +7,14 @@ is a mesh of another boundary; here they are put on a smooth curve through the p
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
-from .refinement import CORNER, held_midpoints
+from .refinement import CORNER, Projection, held_midpoints
 
+HALVINGS = 8  # of each edge of a curve that points are projected onto
+NEAREST = 3  # pieces of curve that are compared
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
 
 
@@ -39,10 +42,8 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | N
     >>> np.linalg.norm(smooth_midpoints(disc), axis=1).round(12).tolist() == [1.0] * 12
     True
     """
-    edges = held_edges(surface)
-    rises, arcs = arcs_over(surface.vertices, edges, corner, corners)
-    middle = surface.vertices[edges].mean(axis=1)
-    return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None]
+    X, edges = surface.vertices, held_edges(surface)
+    return _middles(X, edges, *_arcs_over(X, edges, corner, corners))
 
 
 def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Floats | None:
@@ -67,7 +68,7 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     [0.00067, 0.00104]
     """
     X, edges = surface.vertices, held_edges(surface)
-    rises, arcs = arcs_over(X, edges, corner, corners)
+    rises, arcs = _arcs_over(X, edges, corner, corners)
     two, one = arcs.all(axis=1), arcs[:, 0] != arcs[:, 1]
     square = ((X[edges[:, 1]] - X[edges[:, 0]]) ** 2).sum(axis=1)
     apart, heights = rises[:, 1] - rises[:, 0], np.linalg.norm(rises, axis=2)
@@ -84,7 +85,45 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     moves[one] = np.where(known[beside, None], guess, -rises[one].sum(axis=1))
     if np.all((moves**2).sum(axis=1) <= STRAIGHT**2 * square):
         return None
-    return smooth_midpoints(surface, corner, corners) + moves
+    return _middles(X, edges, rises, arcs) + moves
+
+
+def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Projection:
+    """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
+
+    The curves are those of ``smooth_midpoints``, as are ``corner`` and ``corners``, with each edge cut into
+    256. All meshes made with one such function, by ``refine``, ``remesh`` or ``check_mesh``, have the same
+    boundary.
+
+    >>> from pcmc import Patch
+    >>> angle = 2 * np.pi * np.arange(12) / 12
+    >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> disc = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
+    ...                [Patch("disc", 1.0)], fixed=range(1, 13))
+    >>> float(np.linalg.norm(onto_held_curves(disc)(np.array([[0.95, 0.1, 0.0]]))).round(5))
+    1.0
+    """
+    X, edges = surface.vertices, held_edges(surface)
+    corners = np.union1d(held_corners(surface, corner), np.empty(0, int) if corners is None else corners)
+    for _ in range(HALVINGS):
+        middle = _middles(X, edges, *_arcs_over(X, edges, corner, corners))
+        number = len(X) + np.arange(len(edges))
+        X = np.concatenate([X, middle])
+        edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
+    start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
+    tree = cKDTree(start + 0.5 * side)
+
+    def project(points: Floats) -> Floats:
+        if not len(start) or not len(points):
+            return points
+        near = tree.query(points, k=min(NEAREST, len(start)))[1].reshape(len(points), -1)
+        away, along = points[:, None] - start[near], side[near]
+        share = np.einsum("pnd,pnd->pn", away, along) / np.einsum("pnd,pnd->pn", along, along)
+        foot = start[near] + np.clip(share, 0.0, 1.0)[..., None] * along
+        nearest = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
+        return np.asarray(foot[np.arange(len(points)), nearest])
+
+    return project
 
 
 def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
@@ -103,7 +142,7 @@ def held_edges(surface: Surface) -> Ints:
     return np.asarray(surface.topology.edges[guessed])
 
 
-def arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
+def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
     """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2)."""
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond = _continuations(X, edges, corner)
@@ -113,6 +152,11 @@ def arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tu
     rises[edge, end] = _rises(X, edges[edge], beyond)
     arcs[edge, end] = True
     return rises, arcs
+
+
+def _middles(X: Floats, edges: Ints, rises: Floats, arcs: Bools) -> Floats:
+    """(e,3) half way between the middles of the arcs over edges (e,2)."""
+    return np.asarray(X[edges].mean(axis=1) + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None])
 
 
 def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints]:

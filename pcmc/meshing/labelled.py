@@ -14,8 +14,8 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..surface import Patch, Plane, Surface, checks
 from ..surface.geometry import area_vectors
-from ..surface.topology import components, topology
-from .planar import SIDES, twins
+from ..surface.topology import SIDES, components, one_sided_copies, topology
+from .planar import twins
 from .walls import EDGES, add_walls
 
 
@@ -65,7 +65,17 @@ def surface_from_labels(
     plane = Plane() if plane is None else plane
     X = checks.positions(vertices)
     F: Ints = checks.face_array(faces, len(X)).astype(np.int64)
-    X, F = _welded(X, F, weld)
+    validate.number("weld", weld, least=0.0)
+    if weld > 0.0:
+        label = components(cKDTree(X).query_pairs(weld, output_type="ndarray"), len(X))
+        F = np.unique(label, return_index=True)[1][label][F]
+    flat = (F[:, [1, 2, 0]] == F).any(axis=1)
+    if flat.any():
+        first = int(np.argmax(flat))
+        merged = f"when vertices nearer than weld={weld:g} are merged; use a smaller weld"
+        raise SurfaceError(f"faces[{first}] vanishes {merged}", what="faces", where=first)
+    used, F = np.unique(F, return_inverse=True)
+    X, F = X[used], F.reshape(-1, 3)
     names, patch = _names(labels, len(F))
     F = _oriented(X, F, patch, plane)
     edge = topology(F, patch, len(X)).on_boundary
@@ -74,23 +84,6 @@ def surface_from_labels(
     held, sliding = edge & (boundary == "fixed"), edge & (boundary == "sliding")
     surface = Surface(X, F, patch, patches, held, sliding, plane)
     return surface if walls is None else add_walls(surface, walls, bottom)
-
-
-def _welded(X: Floats, F: Ints, distance: float) -> tuple[Floats, Ints]:
-    """The mesh without unused vertices; vertices nearer than ``distance`` are merged."""
-    validate.number("weld", distance, least=0.0)
-    group = np.arange(len(X))
-    if distance > 0.0:
-        label = components(cKDTree(X).query_pairs(distance, output_type="ndarray"), len(X))
-        group = np.unique(label, return_index=True)[1][label]
-    F = group[F]
-    flat = (F[:, [1, 2, 0]] == F).any(axis=1)
-    if flat.any():
-        first = int(np.argmax(flat))
-        merged = f"when vertices nearer than weld={distance:g} are merged; use a smaller weld"
-        raise SurfaceError(f"faces[{first}] vanishes {merged}", what="faces", where=first)
-    used, inverse = np.unique(F, return_inverse=True)
-    return X[used], inverse.reshape(-1, 3)
 
 
 def _names(labels: npt.ArrayLike | None, m: int) -> tuple[list[str], Ints]:
@@ -121,32 +114,25 @@ def _by_name(value: Any, names: list[str], what: str) -> dict[str, float]:
 def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
     """Faces oriented so that neighbours in a patch agree, and the patch faces outwards.
 
-    Every face has two sides: a graph of 2 m nodes connects the sides that belong to the same side of
-    a patch, so its components are the sides of patches.
+    That is where its area projected along Π's normal, or in a closed mesh the volume seen from its centre,
+    is positive.
     """
     m, n = len(F), len(X)
     edge, place = F[:, SIDES].reshape(-1, 2), np.repeat(patch, 3)
     pairs = twins((place * n + edge.min(axis=1)) * n + edge.max(axis=1))
-    one, two = pairs.T // 3
     # two faces that run along their edge the same way are oriented differently
     same = edge[pairs[:, 0], 0] == edge[pairs[:, 1], 0]
-    ends = [np.where(same, two + m, two), np.where(same, two, two + m)]
-    side = components(np.stack([np.concatenate([one, one + m]), np.concatenate(ends)], axis=1), 2 * m)
+    one, two = pairs.T // 3
+    side = one_sided_copies(one, two, same, m)
     both = np.flatnonzero(side[:m] == side[m:])
     if len(both):
         problem = f"the patch of face {both[0]} has only one side (like a Möbius strip)"
         raise SurfaceError(f"{problem}; cut it into two patches", what="faces", where=int(both[0]))
     part = np.minimum(side[:m], side[m:])
     turned = side[:m] != part
-    weight = _outwardness(X, F, patch, plane) * np.where(turned, -1.0, 1.0)
-    flip = turned ^ (np.bincount(part, weight, 2 * m)[part] < 0.0)
-    return np.where(flip[:, None], F[:, ::-1], F)
-
-
-def _outwardness(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Floats:
-    """(m,) area projected along the normal of Π; in a closed mesh, volume seen from its centre."""
     corner = X[F] - X.mean(axis=0)
-    vector = area_vectors(corner)
-    if topology(F, patch, len(X)).boundary_edge.any():
-        return vector @ np.array(plane.normal)
-    return np.einsum("ij,ij->i", corner[:, 0], vector) / 3.0
+    outward = area_vectors(corner) @ np.array(plane.normal)
+    if not topology(F, patch, n).boundary_edge.any():
+        outward = np.einsum("ij,ij->i", corner[:, 0], area_vectors(corner)) / 3.0
+    flip = turned ^ (np.bincount(part, np.where(turned, -outward, outward), 2 * m)[part] < 0.0)
+    return np.where(flip[:, None], F[:, ::-1], F)

@@ -12,9 +12,10 @@ from ..base.errors import OptionError
 from ..contact.pinching import Walls, lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from ..surface.topology import edge_places
 from .curve_cutting import cut_triangles
 from .quality import edge_lengths
-from .refinement import Projection, new_vertices, with_vertices_on
+from .refinement import Projection, with_vertices_on
 from .remeshing import RAISED
 
 TALL = 4.0  # heights of a wall over the length of its top edge: a higher column does not come to rest
@@ -61,9 +62,9 @@ def refine_near(
     """
     places = np.atleast_2d(np.asarray(points, dtype=float))
     if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
-        expected = "finite places of shape (k, 3)"
-        message = f"points: expected {expected}, found an array of shape {np.shape(points)}"
-        raise OptionError(message, what="points", found=np.shape(points), expected=expected)
+        expected, found = "finite places of shape (k, 3)", np.shape(points)
+        message = f"points: expected {expected}, found an array of shape {found}"
+        raise OptionError(message, what="points", found=found, expected=expected)
     levels, radius = validate.integer("levels", levels), validate.positive("radius", radius)
     tree = cKDTree(places)
     for level in range(levels):
@@ -101,59 +102,41 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     >>> refine_faces(square, [0]).m
     6
     """
-    edge_of_face = surface.topology.edge_of_face
-    cut = np.zeros(len(surface.topology.edges), dtype=bool)
-    cut[edge_of_face[_face_mask(surface, chosen)]] = True
-    if not cut.any():
-        return surface
-    part = standing_part(surface)
-    surface = lift(surface, part.walls, part.resting, RAISED)
-    longest, columns = _longest_sides(surface), _wall_columns(surface, part.walls)
-    first = edge_of_face[np.arange(surface.m), longest]
-    count = 0
-    while count < cut.sum():
-        count = cut.sum()
-        cut[first[cut[edge_of_face].any(axis=1)]] = True
-        cut |= np.isin(columns, columns[cut & (columns >= 0)])
-    new = new_vertices(surface, cut, project)
-    ends, number = surface.topology.edges[cut], surface.n + np.arange(len(new.middle))
-    F, patch = cut_triangles(surface.faces, surface.patch_of_face, ends, number, surface.n, longest)
-    return with_vertices_on(surface, cut, F, patch, new)
-
-
-def _face_mask(surface: Surface, chosen: Bools | Ints) -> Bools:
-    """(m,) mask of triangles, from a mask or from indices."""
-    given = np.asarray(chosen)
-    mask = np.zeros(surface.m, dtype=bool)
-    is_mask = given.dtype == bool and given.shape == mask.shape
+    given, faces, topo = np.asarray(chosen), np.zeros(surface.m, dtype=bool), surface.topology
+    is_mask = given.dtype == bool and given.shape == faces.shape
     if not is_mask and given.size:
         indices = np.issubdtype(given.dtype, np.integer) and given.ndim == 1
         if not (indices and given.min() >= 0 and given.max() < surface.m):
             validate.refuse("chosen", chosen, f"a ({surface.m},) mask, or indices below {surface.m}")
-    mask[given if is_mask else given.astype(np.int64)] = True
-    return mask
-
-
-def _longest_sides(surface: Surface) -> Ints:
-    """(m,) the corner opposite each triangle's longest side; of equal ones, that of one edge for all."""
-    length = edge_lengths(surface).astype(np.float32)  # equal but for rounding counts as equal
-    rank = np.empty(len(length), dtype=np.int64)
-    rank[np.lexsort((np.arange(len(length)), length))] = np.arange(len(length))
-    return np.asarray(rank[surface.topology.edge_of_face].argmax(axis=1))
+    faces[given if is_mask else given.astype(np.int64)] = True
+    if not faces.any():
+        return surface
+    cut = np.zeros(len(topo.edges), dtype=bool)
+    cut[topo.edge_of_face[faces]] = True
+    part = standing_part(surface)
+    surface = lift(surface, part.walls, part.resting, RAISED)
+    # the corner opposite each longest side; of sides equal but for rounding, one edge for all triangles
+    length = edge_lengths(surface).astype(np.float32)
+    rank = np.argsort(np.argsort(length, kind="stable"))
+    longest = rank[topo.edge_of_face].argmax(axis=1)
+    columns, first = _wall_columns(surface, part.walls), topo.edge_of_face[np.arange(surface.m), longest]
+    count = 0
+    while count < cut.sum():
+        count = cut.sum()
+        cut[first[cut[topo.edge_of_face].any(axis=1)]] = True
+        cut |= np.isin(columns, columns[cut & (columns >= 0)])
+    number = surface.n + np.arange(count)
+    F, patch = cut_triangles(surface.faces, surface.patch_of_face, topo.edges[cut], number, longest)
+    return with_vertices_on(surface, cut, F, patch, project)
 
 
 def _wall_columns(surface: Surface, walls: Walls) -> Ints:
     """(e,) the low column below a top edge that an edge crosses, itself included; -1 for none."""
-    edges, n, X = surface.topology.edges, surface.n, surface.vertices
-    height = np.abs(surface.plane.height(X))[walls.top_edges].max(axis=1, initial=0.0)
-    low = walls.top_edges[height <= TALL * segment_lengths(X, walls.top_edges)]
-    above = np.full(n, -1, dtype=np.int64)  # the top vertex straight above
-    rows = walls.rows
+    rows, tops, X = walls.rows, walls.top_edges, surface.vertices
+    height = np.abs(surface.plane.height(X))[tops].max(axis=1, initial=0.0)
+    above = np.full(surface.n, -1, dtype=np.int64)  # the top vertex straight above
     for end in (0, 1):
         straight = rows.fraction == end
         above[rows.vertices[straight]] = rows.top_ends[straight, end]
-    above[walls.top_edges] = walls.top_edges
-    one, other = np.sort(above[edges], axis=1).T
-    key = np.where(one >= 0, one * n + other, -1)
-    tops = np.sort(low, axis=1).astype(np.int64) @ [n, 1]
-    return np.where(np.isin(key, tops), key, -1)
+    above[tops] = tops
+    return edge_places(above[surface.topology.edges], tops[height <= TALL * segment_lengths(X, tops)])

@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..surface.geometry import angles, cross_2d, segment_lengths
-from ..surface.topology import components
+from ..surface.topology import SIDES, components, edge_places
 from .angles import improve_angles
 
 CLEARANCE = 0.62  # of the edge length: distance of free points from the segments
@@ -21,23 +21,15 @@ GOOD_ANGLE = 30.0  # degrees; sharper triangles get more points
 ROUNDS = 12  # of relaxation
 OUTSIDE = -1
 SLACK = 1e-9  # of the size of a mesh: a point so far beside a triangle is at it
-SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle
 
 
 @dataclass(frozen=True, eq=False)
 class PlanarMesh:
-    """A conforming triangle mesh in the plane.
+    """A conforming triangle mesh in the plane."""
 
-    Attributes
-    ----------
-    points : (n,2); the given points come first, unchanged.
-    triangles : (t,3) counter-clockwise.
-    region : (t,) int from 0: the region of each triangle; segments separate regions.
-    """
-
-    points: Floats
-    triangles: Ints
-    region: Ints
+    points: Floats  # (n,2); the given points come first, unchanged
+    triangles: Ints  # (t,3) counter-clockwise
+    region: Ints  # (t,) from 0: the region of each triangle; segments separate regions
 
 
 def triangulate(
@@ -51,7 +43,7 @@ def triangulate(
     round instead removes points that crowd, or adds circumcentres of large or sharp triangles.
 
     The given points do not move, and no segment is split. Segments should be about ``edge_length``
-    long; near shorter ones the triangles are smaller. The same input gives the same mesh.
+    long; near shorter ones the triangles are smaller.
 
     Parameters
     ----------
@@ -76,20 +68,30 @@ def triangulate(
     fixed = np.asarray(points, dtype=float)
     segments = np.asarray(segments, dtype=np.int64)
     validate.positive("edge_length", edge_length)
-    _check(fixed, segments, edge_length)
+    near = cKDTree(fixed).query_pairs(1e-9 * edge_length)
+    if near:
+        i, j = min(near)
+        problem = f"points {i} and {j} coincide at {fixed[i].tolist()}; merge them"
+        raise SurfaceError(problem, what="points", where=(i, j))
+    if len(segments) < 3:
+        problem = f"segments: at least 3 are needed to enclose an area, found {len(segments)}"
+        raise SurfaceError(problem, what="segments", found=len(segments), expected=3)
     spacing = np.full(len(fixed), float(edge_length))  # at each point its shortest segment
     np.minimum.at(spacing, segments.ravel(), np.repeat(segment_lengths(fixed, segments), 2))
     everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
     mesh = _inside(everything, segments, holes, len(fixed))
     for step in range(ROUNDS):
-        X = mesh.points
+        X, T = mesh.points, mesh.triangles
         if step % 4 == 0 and step < ROUNDS - 4:
             wanted = _wanted(X, fixed, spacing, edge_length)
             X = X[_spaced_out(X, CROWDED * wanted, len(fixed))]
             if len(X) == len(mesh.points):
                 X = np.concatenate([X, _additions(mesh, segments, fixed, spacing, edge_length)])
         else:
-            X = _relaxed(mesh, len(fixed))
+            area, moment, weight = np.abs(signed_areas(X, T)), np.zeros_like(X), np.zeros(len(X))
+            np.add.at(moment, T.ravel(), np.repeat(area[:, None] * X[T].mean(axis=1), 3, axis=0))
+            np.add.at(weight, T.ravel(), np.repeat(area, 3))
+            X = np.concatenate([fixed, moment[len(fixed) :] / weight[len(fixed) :, None]])
         mesh = _inside(X, segments, holes, len(fixed))
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
@@ -122,17 +124,6 @@ def locate(mesh: PlanarMesh, points: Floats) -> Ints:
     return triangle
 
 
-def _check(points: Floats, segments: Ints, edge_length: float) -> None:
-    near = cKDTree(points).query_pairs(1e-9 * edge_length)
-    if near:
-        i, j = min(near)
-        problem = f"points {i} and {j} coincide at {points[i].tolist()}; merge them"
-        raise SurfaceError(problem, what="points", where=(i, j))
-    if len(segments) < 3:
-        problem = f"segments: at least 3 are needed to enclose an area, found {len(segments)}"
-        raise SurfaceError(problem, what="segments", found=len(segments), expected=3)
-
-
 def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
     """(p,2) lattice points clear of the segments, symmetric about the middle of the bounding box."""
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -155,9 +146,17 @@ def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats
 
 
 def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k: int) -> PlanarMesh:
-    """The triangulation inside the outline and outside the holes; points used elsewhere only go."""
+    """The triangulation inside the outline and outside the holes; points used elsewhere only go.
+
+    Segments separate the parts of it; a part with a side that no other triangle has is outside.
+    """
     T = _constrained(points, segments)
-    part, outer = _parts(T, segments, len(points))
+    sides = T[:, SIDES].reshape(-1, 2)
+    free = edge_places(sides, segments) < 0
+    pairs = twins(sides.min(axis=1) * len(points) + sides.max(axis=1))
+    part = components(pairs[free[pairs[:, 0]]] // 3, len(T))
+    free[pairs] = False
+    outer = np.unique(part[np.flatnonzero(free) // 3])
     located = locate(PlanarMesh(points, T, part), np.reshape(holes, (-1, 2)).astype(float))
     for place, triangle in enumerate(located):
         if triangle == OUTSIDE or part[triangle] in outer:
@@ -179,20 +178,6 @@ def twins(key: Ints) -> Ints:
     return order[np.stack([first[count == 2], first[count == 2] + 1], axis=1)]
 
 
-def _parts(T: Ints, segments: Ints, n: int) -> tuple[Ints, Ints]:
-    """(t,) the part of each triangle, where segments separate parts, and the parts outside."""
-    key = _edge_keys(T[:, SIDES].reshape(-1, 2), n)
-    free = ~np.isin(key, _edge_keys(segments, n))
-    pairs = twins(key)
-    part = components(pairs[free[pairs[:, 0]]] // 3, len(T))
-    free[pairs] = False
-    return part, np.unique(part[np.flatnonzero(free) // 3])
-
-
-def _edge_keys(edges: Ints, n: int) -> Ints:
-    return edges.min(axis=1).astype(np.int64) * n + edges.max(axis=1)
-
-
 def _constrained(points: Floats, segments: Ints) -> Ints:
     """(t,3) Delaunay triangles, counter-clockwise, with every segment an edge."""
     try:
@@ -201,24 +186,16 @@ def _constrained(points: Floats, segments: Ints) -> Ints:
         raise SurfaceError("the points lie on one line and enclose no area", what="points") from None
     area = signed_areas(points, T)
     T[area < 0] = T[area < 0][:, ::-1]
-    for a, b in segments[_absent(segments, T, len(points))]:
+    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0]:
         T = _with_segment(points, T, int(a), int(b))
-    lost = _absent(segments, T, len(points))
-    if len(lost):
-        raise _crossing(points, *segments[lost[0]].tolist())
+    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
+        raise _crossing(points, a, b)
     return T
 
 
-def _absent(segments: Ints, T: Ints, n: int) -> Ints:
-    """Numbers of the segments that are not edges of the triangles."""
-    present = _edge_keys(T[:, SIDES].reshape(-1, 2), n)
-    return np.flatnonzero(~np.isin(_edge_keys(segments, n), present))
-
-
 def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
-    crossed = "crosses another segment or passes through a point; split it there"
-    problem = f"segment {X[a].tolist()} - {X[b].tolist()} {crossed}"
-    return SurfaceError(problem, what="segments", where=(a, b))
+    problem = f"segment {X[a].tolist()} - {X[b].tolist()} crosses another segment or passes through a point;"
+    return SurfaceError(f"{problem} split it there", what="segments", where=(a, b))
 
 
 def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
@@ -260,18 +237,6 @@ def _delaunay_below(X: Floats, a: int, b: int, rim: list[int]) -> list[tuple[int
     c = rim[apex]
     left, right = _delaunay_below(X, a, c, rim[:apex]), _delaunay_below(X, c, b, rim[apex + 1 :])
     return [(a, b, c), *left, *right]
-
-
-def _relaxed(mesh: PlanarMesh, k: int) -> Floats:
-    """Free points moved to the area-weighted mean of the centroids around them."""
-    X, T = mesh.points, mesh.triangles
-    area = np.abs(signed_areas(X, T))
-    moment, weight = np.zeros_like(X), np.zeros(len(X))
-    np.add.at(moment, T.ravel(), np.repeat(area[:, None] * X[T].mean(axis=1), 3, axis=0))
-    np.add.at(weight, T.ravel(), np.repeat(area, 3))
-    moved = X.copy()
-    moved[k:] = moment[k:] / weight[k:, None]
-    return moved
 
 
 def _wanted(points: Floats, fixed: Floats, spacing: Floats, h: float) -> Floats:

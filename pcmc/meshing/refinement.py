@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -188,48 +187,33 @@ def projected(project: Projection, points: Floats) -> Floats:
     return moved
 
 
-class NewVertices(NamedTuple):
-    """New vertices on edges: positions (k,3), their ``support_columns`` (k,c), and their parameters (k,) on
-    the curves of their edges."""
-
-    middle: Floats
-    support: Bools
-    at: Floats
-
-
-def new_vertices(surface: Surface, cut: Bools, project: Projection | None = None) -> NewVertices:
-    """The new vertices on the edges ``cut`` (e,)."""
-    middle, support = midpoints(surface, surface.topology.edges[cut]), edge_columns(surface)[cut]
-    on = surface.edges_on_curves[cut]
-    if project is not None:
-        guessed = support[:, 0] & ~on.drawn
-        middle[guessed] = projected(project, middle[guessed])
-    onto_circles_of(surface, support, middle)
-    at, points = on.between()
-    middle[on.drawn] = points[on.drawn]
-    return NewVertices(middle, support, at)
-
-
 def _refine_once(surface: Surface, project: Projection | None) -> Surface:
-    every = np.ones(len(surface.topology.edges), dtype=bool)
-    new = new_vertices(surface, every, project)
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
-    patch = np.repeat(surface.patch_of_face, 4)
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-    return with_vertices_on(surface, every, F, patch, new)
+    every = np.ones(len(surface.topology.edges), dtype=bool)
+    return with_vertices_on(surface, every, F, np.repeat(surface.patch_of_face, 4), project)
 
 
-def with_vertices_on(surface: Surface, cut: Bools, F: Ints, patch: Ints, new: NewVertices) -> Surface:
-    """The surface of triangles ``F`` whose last k vertices are the new ones on the edges ``cut`` (e,)."""
-    ends, number = surface.topology.edges[cut], surface.n + np.arange(len(new.middle))
+def with_vertices_on(
+    surface: Surface, cut: Bools, F: Ints, patch: Ints, project: Projection | None = None
+) -> Surface:
+    """The surface of triangles ``F`` whose last k vertices are new ones on the edges ``cut`` (e,)."""
+    ends, on, support = surface.topology.edges[cut], surface.edges_on_curves, edge_columns(surface)[cut]
+    new, drawn = midpoints(surface, ends), on[cut].drawn
+    guessed = support[:, 0] & ~drawn
+    if project is not None:
+        new[guessed] = projected(project, new[guessed])
+    onto_circles_of(surface, support, new)
+    at, points = on[cut].between()
+    new[drawn] = points[drawn]
+    number = surface.n + np.arange(len(new))
     halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
-    curves = surface.edges_on_curves.cut(cut, new.at)
     return surface.with_mesh(
-        np.concatenate([surface.support_columns, new.support]),
-        vertices=np.concatenate([surface.vertices, new.middle]),
+        np.concatenate([surface.support_columns, support]),
+        vertices=np.concatenate([surface.vertices, new]),
         faces=F,
         patch_of_face=patch,
         cables=tuple(cable.cut(ends, number) for cable in surface.cables),
-        curves=curves.joined(np.concatenate([surface.topology.edges[~cut], *halves])),
+        curves=on.cut(cut, at).joined(np.concatenate([surface.topology.edges[~cut], *halves])),
     )

@@ -18,17 +18,12 @@ from ..contact.pinching import lift, standing_part
 from ..forces.curvature import mean_curvature
 from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
+from ..surface.topology import SIDES, edge_places
 from .angles import improve_angles
 from .curve_cutting import CurveMesh, cut_curves
 from .quality import edge_lengths
 from .refinement import Projection
-from .sizes import (
-    SizeField,
-    check_sizes,
-    equilateral_area,
-    limit_growth,
-    triangles_for,
-)
+from .sizes import check_sizes, limit_growth, sizes_at, triangles_for
 
 CHORD = 0.1  # of the edge length
 SHORTEST = 0.3  # of the edge length: no edge of MMG gets shorter
@@ -95,7 +90,11 @@ def remesh(
     """
     one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
     check_lengths(one, near_curves, growth, chord)
-    size = _wanted_sizes(surface, edge_length, growth)
+    if np.ndim(edge_length) == 0:
+        size = np.full(surface.n, edge_length, dtype=float)
+    else:
+        size = check_sizes(edge_length, surface.n)
+        size = limit_growth(surface.vertices, surface.topology.edges, size, growth)
     along_curves = size if near_curves is None else np.minimum(size, near_curves)
     _refuse_too_many(surface, size, "edge_length")
     _refuse_too_many(surface, along_curves, "near_curves")  # curves are cut with the mesh around them
@@ -103,12 +102,12 @@ def remesh(
         _refuse_flat_chord(surface, chord, float(size.min()))
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)
-    old, wanted = cut_curves(surface, size, along_curves, project)
-    chord = CHORD * float(wanted.size.max()) if chord is None else chord
-    candidates, mesh = [], old
+    mesh = old = cut_curves(surface, along_curves, project)
+    chord = CHORD * float(size.max()) if chord is None else chord
+    candidates = []
     for _ in range(PASSES):
-        size = _sizes(mesh, wanted, growth)
-        mesh = _remesh_with_mmg(mesh, size, growth, chord)
+        wanted = _sizes(mesh, sizes_at(mesh.X, surface.vertices, size), growth)
+        mesh = _remesh_with_mmg(mesh, wanted, growth, chord)
         mesh = replace(mesh, X=improve_angles(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
@@ -141,19 +140,9 @@ def check_lengths(
     validate.number("growth", growth, above=1.0)
 
 
-def _wanted_sizes(surface: Surface, edge_length: npt.ArrayLike, growth: float) -> Floats:
-    """(n,) the edge length wanted at each vertex."""
-    if np.ndim(edge_length) == 0:
-        size = np.full(surface.n, edge_length, dtype=float)
-    else:
-        size = check_sizes(edge_length, surface.n)
-        size = limit_growth(surface.vertices, surface.topology.edges, size, growth)
-    return size
-
-
 def _refuse_too_many(surface: Surface, size: Floats, name: str) -> None:
     """Refuse edge lengths (n,) that would make more triangles than ``MOST``, with the least possible one."""
-    count = triangles_for(face_areas(surface.vertices[surface.faces]), size[surface.faces].mean(axis=1))
+    count = triangles_for(face_areas(surface.vertices[surface.faces]), size[surface.faces].mean(axis=1)).sum()
     if count <= MOST:
         return
     found = float(size.min())
@@ -188,9 +177,8 @@ def _rounded_up(value: float) -> float:
     return float(f"{value:.1e}") if float(f"{value:.1e}") >= value else float(f"{1.05 * value:.1e}")
 
 
-def _sizes(mesh: CurveMesh, wanted: SizeField, growth: float) -> Floats:
-    """(n,) the edge length wanted at each vertex: a curve's own next to it, growing away from it."""
-    size = wanted.at(mesh.X)
+def _sizes(mesh: CurveMesh, size: Floats, growth: float) -> Floats:
+    """(n,) the edge lengths wanted, no longer than those of a curve next to it, which grow away from it."""
     if len(mesh.curves):
         length = segment_lengths(mesh.X, mesh.curves)
         spacing = np.zeros(len(mesh.X))
@@ -231,14 +219,18 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
     if not np.isin(patch, mesh.patch + 1).all():
         message = "MMG cannot remesh this surface; repair its triangles first, or choose another edge length"
         raise SurfaceError(message, what="surface")
-    place = np.append(-1, fixed)[reference]
-    known = place >= 0
+    origin = np.append(-1, fixed)[reference]
+    known = origin >= 0
     number = np.full(len(mesh.X), -1)
-    number[place[known]] = np.flatnonzero(known)
+    number[origin[known]] = np.flatnonzero(known)
     curves = number[mesh.curves]
-    _check_curves(mesh, curves, F, len(X))
-    source = np.where(known, mesh.source[place], -1)
-    support = known[:, None] & mesh.support[place]
+    lost = (curves < 0).any(axis=1) | (edge_places(curves, F[:, SIDES].reshape(-1, 2)) < 0)
+    if lost.any():
+        place = mesh.X[mesh.curves[np.argmax(lost), 0]].tolist()
+        message = f"MMG lost {lost.sum()} edges of curves, the first at {place}; choose a smaller edge length"
+        raise SurfaceError(message, what="surface", where=place)
+    source = np.where(known, mesh.source[origin], -1)
+    support = known[:, None] & mesh.support[origin]
     return CurveMesh(X, F.astype(np.int64), patch - 1, curves, support, source, mesh.cable, mesh.on)
 
 
@@ -249,20 +241,8 @@ def _corners_to_keep(mesh: CurveMesh, size: Floats) -> Ints:
     between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
     corners = mesh.X[mesh.F[between]]
     _, second, largest = np.sort(angles(corners), axis=1).T
-    small = face_areas(corners) <= LARGE * equilateral_area(size[mesh.F[between]].mean(axis=1))
+    small = triangles_for(face_areas(corners), size[mesh.F[between]].mean(axis=1)) <= LARGE
     return between[(second >= BLUNT) & (largest <= OBTUSE) & small]
-
-
-def _check_curves(before: CurveMesh, curves: Ints, F: Ints, n: int) -> None:
-    """Every curve edge must still be an edge of triangles."""
-    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
-    edges = side.min(axis=2) * n + side.max(axis=2)
-    lost = (curves < 0).any(axis=1)
-    lost |= ~np.isin(curves.min(axis=1) * n + curves.max(axis=1), edges)
-    if lost.any():
-        place = before.X[before.curves[np.argmax(lost), 0]].tolist()
-        message = f"MMG lost {lost.sum()} edges of curves, the first at {place}; choose a smaller edge length"
-        raise SurfaceError(message, what="surface", where=place)
 
 
 def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]) -> Surface:
@@ -271,7 +251,9 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     Vertices of ``old`` keep its positions: MMG scales the mesh, which changes the last digits.
     """
     meshes = [old, *candidates]
-    angle = np.array([_patch_angles(mesh, len(surface.patches)) for mesh in meshes])
+    angle = np.full((len(meshes), len(surface.patches)), 180.0)  # the smallest in each patch
+    for row, mesh in zip(angle, meshes, strict=True):
+        np.minimum.at(row, mesh.patch, angles(mesh.X[mesh.F]).min(axis=1))
     best = 1 + np.argmax(np.minimum(angle[1:], GOOD_ANGLE), axis=0)
     reached = angle[best, np.arange(len(best))]
     best[(reached < LEAST_ANGLE) & (reached < WORSE * angle[0])] = 0
@@ -310,10 +292,3 @@ def _onto_planes(surface: Surface, X: Floats, F: Ints, patch: Ints, new: Bools, 
         inside &= new
         X[inside] = plane.nearest(X[inside])
         support[inside, column] = True
-
-
-def _patch_angles(mesh: CurveMesh, count: int) -> Floats:
-    """(count,) the smallest angle in each patch, degrees."""
-    smallest = np.full(count, 180.0)
-    np.minimum.at(smallest, mesh.patch, angles(mesh.X[mesh.F]).min(axis=1))
-    return smallest

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,18 +16,11 @@ from ..base.errors import OptionError
 from ..surface.geometry import segment_lengths
 
 
-@dataclass(frozen=True, eq=False)
-class SizeField:
-    """Wanted edge lengths at points; elsewhere that of the nearest one holds."""
-
-    points: Floats
-    size: Floats
-
-    def at(self, X: Floats) -> Floats:
-        """(k,) the edge lengths wanted at positions (k,3)."""
-        if self.size.min() == self.size.max():
-            return np.full(len(X), self.size[0])
-        return self.size[cKDTree(self.points).query(X)[1]]
+def sizes_at(X: Floats, points: Floats, size: Floats) -> Floats:
+    """(k,) the edge lengths wanted at X (k,3), each as at the nearest of ``points``, where it is ``size``."""
+    if size.min() == size.max():
+        return np.full(len(X), size[0])
+    return np.asarray(size[cKDTree(points).query(X)[1]])
 
 
 def check_sizes(edge_length: npt.ArrayLike, n: int) -> Floats:
@@ -43,13 +35,11 @@ def check_sizes(edge_length: npt.ArrayLike, n: int) -> Floats:
     except (TypeError, ValueError):
         size = np.empty(0)
     if size.shape != (n,):
-        expected, found = f"a number, or an array of shape ({n},)", f"shape {np.shape(size)}"
-        message = f"edge_length: expected {expected}, found {found}"
-        raise OptionError(message, what="edge_length", found=np.shape(size), expected=(n,))
+        message = f"edge_length: expected a number, or an array of shape ({n},), found shape {size.shape}"
+        raise OptionError(message, what="edge_length", found=size.shape, expected=(n,))
     wrong = np.flatnonzero(~(np.isfinite(size) & (size > 0.0)))
     if len(wrong):
-        vertex, value = int(wrong[0]), float(size[wrong[0]])
-        expected = "a finite number > 0"
+        vertex, value, expected = int(wrong[0]), float(size[wrong[0]]), "a finite number > 0"
         message = f"edge_length of vertex {vertex}: expected {expected}, found {value}"
         raise OptionError(message, what="edge_length", where=vertex, found=value, expected=expected)
     return size
@@ -58,8 +48,7 @@ def check_sizes(edge_length: npt.ArrayLike, n: int) -> Floats:
 def limit_growth(X: Floats, edges: Ints, size: Floats, growth: float) -> Floats:
     """(n,) the largest sizes ≤ ``size`` that grow by at most ``growth`` - 1 per length along the edges.
 
-    h_i = min over j of size_j + (growth - 1) d_ij, with d_ij the distance along edges: the shortest ways
-    from an extra vertex that is size_j away from vertex j.
+    h_i = min over j of size_j + (growth - 1) d_ij: the shortest ways from a vertex more, size_j away from j.
 
     >>> X = np.array([[0, 0, 0], [1, 0, 0], [3, 0, 0.0]])
     >>> limit_growth(X, np.array([[0, 1], [1, 2]]), np.array([0.1, 9.0, 9.0]), 1.5).tolist()
@@ -75,9 +64,7 @@ def limit_growth(X: Floats, edges: Ints, size: Floats, growth: float) -> Floats:
 
 
 def edges_between(length: Floats, start: Floats, end: Floats) -> Floats:
-    """How many edges fit on a way of this length whose wanted edge length runs linearly from start to end.
-
-    The integral of ds / h is length · log(end / start) / (end - start), and length / h for a constant h.
+    """How many edges fit on a way whose wanted edge length h runs linearly from start to end: ∫ ds / h.
 
     >>> edges_between(np.array([3.0, 3.0]), np.array([1.0, 1.0]), np.array([1.0, 4.0])).round(6).tolist()
     [3.0, 1.386294]
@@ -100,15 +87,10 @@ def place_between(part: Floats, start: Floats, end: Floats) -> Floats:
     return np.where(near, part, bent)
 
 
-def equilateral_area(size: Floats) -> Floats:
-    """(m,) area of equilateral triangles with sides ``size`` (m,), length²."""
-    return np.asarray(math.sqrt(3.0) / 4.0 * size**2)
+def triangles_for(areas: Floats, size: Floats) -> Floats:
+    """(m,) how many equilateral triangles of side ``size`` (m,) cover triangles of these areas (m,).
 
-
-def triangles_for(areas: Floats, size: Floats) -> float:
-    """How many equilateral triangles of side ``size`` cover triangles of these areas; both (m,).
-
-    >>> round(triangles_for(np.array([1.0]), np.array([0.1])))
-    231
+    >>> triangles_for(np.array([1.0]), np.array([0.1])).round().tolist()
+    [231.0]
     """
-    return float((areas / equilateral_area(size)).sum())
+    return np.asarray(areas / (math.sqrt(3.0) / 4.0 * size**2))

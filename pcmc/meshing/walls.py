@@ -24,31 +24,24 @@ EDGES = ("fixed", "sliding", "free", "cable")
 
 @dataclass(frozen=True, eq=False)
 class UpperEdge:
-    """The upper edge of a wall: vertices (k,) along it, first = last if it is closed; the label of the
-    wall's faces; whether its bottom is held, or else slides on Π."""
+    """The upper edge of a wall."""
 
-    vertices: Ints
-    label: int
-    held: bool = False
+    vertices: Ints  # (k,) along it, first = last if it is closed
+    label: int  # of the wall's faces
+    held: bool = False  # whether its bottom is held, or else slides on Π
 
 
 @dataclass(frozen=True, eq=False)
 class WallMesh:
-    """Walls to append to a mesh: new vertices, faces with a label each, supports of the new vertices.
+    """Walls to append to a mesh."""
 
-    Attributes
-    ----------
-    feet : by the first two vertices of each upper edge, the vertices (k,) along its bottom on Π, if held.
-    uprights : the vertical lines that are held, below fixed vertices.
-    """
-
-    vertices: Floats
+    vertices: Floats  # the new ones
     faces: Ints
-    label: Ints
-    fixed: Bools
+    label: Ints  # of each face
+    fixed: Bools  # supports of the new vertices
     sliding: Bools
-    feet: Mapping[tuple[int, int], Ints]
-    uprights: tuple[HeldCurve, ...]
+    feet: Mapping[tuple[int, int], Ints]  # by an upper edge's first two vertices, those along its held bottom
+    uprights: tuple[HeldCurve, ...]  # the vertical lines that are held, below fixed vertices
 
 
 def add_walls(
@@ -86,12 +79,25 @@ def add_walls(
     validate.choice("bottom", bottom, BOTTOMS)
     names = [p.name for p in surface.patches]
     borders = [c for c in surface.topology.junctions if len(set(c.sheets)) == len(c.sheets) == 2]
-    chosen = _tensions(tension, {(names[a], names[b]) for a, b in (c.sheets for c in borders)})
+    pairs = {(names[a], names[b]) for a, b in (c.sheets for c in borders)}
+    given = tension if isinstance(tension, Mapping) else dict.fromkeys(pairs, tension)
+    chosen = dict[tuple[str, str], float]()
+    for (a, b), value in given.items():
+        pair = (a, b) if (a, b) in pairs else (b, a)
+        if pair not in pairs:
+            known = [f"{p}-{q}" for p, q in sorted(pairs)]
+            raise OptionError(unknown("border", f"{a}-{b}", known), what="tension", where=(a, b))
+        chosen[pair] = float(value)
     walled = [c for c in borders if (names[c.sheets[0]], names[c.sheets[1]]) in chosen]
     if not walled:
         return surface
     label, patches = _labels(surface, walled, chosen)
-    tops = [UpperEdge(_directed(surface, c), k, bottom == "held") for c, k in zip(walled, label, strict=True)]
+    tops = []
+    for border, number in zip(walled, label, strict=True):  # with its first patch on the left
+        chain = np.append(border.vertices, border.vertices[:1]) if border.closed else border.vertices
+        own = surface.faces[surface.patch_of_face == border.sheets[0]]
+        along = (own == chain[0]) & (own[:, [1, 2, 0]] == chain[1])
+        tops.append(UpperEdge(chain if along.any() else chain[::-1], number, bottom == "held"))
     if edge_length is None:
         edge_length = float(edge_lengths(surface)[surface.topology.seam_edge].mean())
     walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
@@ -231,8 +237,8 @@ def _labels(
 ) -> tuple[list[int], list[Patch]]:
     """A label for each border, and the labels' patches: one for each pair of patches.
 
-    Where a pair's borders cross (four quarters, a and b in turn), each border is a patch of its
-    own: a patch must not have four faces at an edge.
+    Where a pair's borders cross, as of four quarters, each is a patch of its own: a patch must not have four
+    faces at an edge.
     """
     kinds = []
     for place, border in enumerate(borders):
@@ -249,29 +255,3 @@ def _labels(
         pressure, snow = a.pressure - b.pressure, a.snow - b.snow
         patches.append(Patch(f"wall-{a.name}-{b.name}{suffix}", value, pressure, wall=True, snow=snow))
     return [names.index(kind) for kind in kinds], patches
-
-
-def _directed(surface: Surface, border: Curve) -> Ints:
-    """The vertices of a border with its first patch on the left; first = last if closed."""
-    chain = border.vertices
-    if border.closed:
-        chain = np.append(chain, chain[:1])
-    own = surface.faces[surface.patch_of_face == border.sheets[0]]
-    along = (own == chain[0]) & (own[:, [1, 2, 0]] == chain[1])
-    return chain if along.any() else chain[::-1]
-
-
-def _tensions(
-    tension: float | Mapping[tuple[str, str], float], borders: set[tuple[str, str]]
-) -> dict[tuple[str, str], float]:
-    """The tension of each border's wall, by its pair of names."""
-    if not isinstance(tension, Mapping):
-        return dict.fromkeys(borders, float(tension))
-    by_pair = {}
-    for (a, b), value in tension.items():
-        pair = (a, b) if (a, b) in borders else (b, a)
-        if pair not in borders:
-            known = [f"{p}-{q}" for p, q in sorted(borders)]
-            raise OptionError(unknown("border", f"{a}-{b}", known), what="tension", where=(a, b))
-        by_pair[pair] = float(value)
-    return by_pair

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -11,12 +11,11 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
-from ..curves.curves import Curve
 from ..curves.pieces import point_text
 from ..surface.topology import components
-from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap
+from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, overlap
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,20 +59,11 @@ class Arrangement:
 def arrange(
     lines: Sequence[Line], edge_length: float, required_points: Floats, cut_points: Floats
 ) -> Arrangement:
-    """Cut the lines at corners and where they meet, and divide them into edges.
+    """Cut the lines, the outline first, at corners and where they meet, and divide them into edges.
 
-    Parameters
-    ----------
-    lines : the outline first; then holes, dividers, supports, in any order.
-    edge_length : of the edges, about; shorter if corners or meetings are close together.
-    required_points : (p,3), on a line if one passes there, otherwise single vertices.
-    cut_points : (q,2) at which the lines through them are cut.
-
-    Raises
-    ------
-    PlanError
-        If an outline or hole is open or crosses itself, a hole is not inside the outline, lines run
-        along each other, or a divider ends inside a patch or is all outside. ``what`` is the line.
+    ``required_points`` (p,3) are vertices, on a line if one passes there; at ``cut_points`` (q,2) lines are
+    cut, too. PlanError if an outline or hole is open or crosses itself, a hole is not inside the outline,
+    lines run along each other, or a divider ends inside a patch or is all outside; ``what`` is the line.
     """
     snap = SNAP * edge_length
     for line in lines:
@@ -83,19 +73,19 @@ def arrange(
     for k, line in enumerate(lines):
         ends = [] if line.curve.closed else [0.0, float(len(line.curve.pieces))]
         meetings += [[(k, t)] for t in (*ends, *line.curve.corners.tolist())]
-    tree, contains = LineTree(lines), inside(lines)
-    meetings += [*tree.crossings(), *_ends(tree, contains, snap)]
+    tree = LineTree(lines)
+    meetings += [*tree.crossings(), *_ends(tree, snap)]
     xy = required_points[:, :2]
     passing = tree.at(xy, snap)
-    for point, places, within in zip(xy, passing, contains(xy), strict=True):
+    for point, places, within in zip(xy, passing, shapely.contains_xy(tree.area, xy), strict=True):
         if not places and not within:
             problem = f"the support or point at {point_text(point)} is outside the plan or in a hole"
             raise PlanError(problem, what="supports", where=tuple(point.tolist()))
     meetings += [*tree.at(cut_points, snap), *passing]
-    nodes = _nodes(lines, meetings, snap)
-    chains, points = _chains(lines, nodes, edge_length)
-    chains = _inside_plan(tree, chains, points[:, :2], contains, edge_length)
-    vertex = nodes.of_meeting[len(meetings) - len(passing) :]
+    nodes, of_meeting, stops = _nodes(lines, meetings, snap)
+    chains, points = _chains(lines, nodes, stops, edge_length)
+    chains = _inside_plan(tree, chains, points[:, :2], edge_length)
+    vertex = of_meeting[len(meetings) - len(passing) :]
     alone = np.array([not places for places in passing], dtype=bool)
     vertex[alone] = len(points) + np.arange(alone.sum())
     points = np.concatenate([points, required_points[alone]])
@@ -113,14 +103,15 @@ def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, 
     return [(point.x, point.y) for point in points]
 
 
-def _ends(tree: LineTree, contains: Callable[[Floats], Bools], snap: float) -> Iterator[Places]:
+def _ends(tree: LineTree, snap: float) -> Iterator[Places]:
     """Dividers end on other lines or outside the plan; supports may end anywhere."""
-    inner = [k for k, line in enumerate(tree.lines) if not (line.curve.closed or line.bounds)]
-    ends = [(k, t) for k in inner for t in (0.0, float(len(tree.lines[k].curve.pieces)))]
+    loose = [k for k, line in enumerate(tree.lines) if not (line.curve.closed or line.bounds)]
+    ends = [(k, t) for k in loose for t in (0.0, float(len(tree.lines[k].curve.pieces)))]
     at = np.array([tree.lines[k].curve.at(t)[0, :2] for k, t in ends]).reshape(-1, 2)
-    for end, xy, places, within in zip(ends, at, tree.at(at, snap), contains(at), strict=True):
+    within = shapely.contains_xy(tree.area, at)
+    for end, xy, places, inner in zip(ends, at, tree.at(at, snap), within, strict=True):
         one, passing = tree.lines[end[0]], [place for place in places if place[0] != end[0]]
-        if one.kind is Kind.DIVIDER and not passing and within:
+        if one.kind is Kind.DIVIDER and not passing and inner:
             others = [other for other in tree.lines if other is not one]
             gaps = [float(other.nearest(xy[None])[1][0]) for other in others]
             gap, nearest = min(gaps), others[int(np.argmin(gaps))]
@@ -129,35 +120,22 @@ def _ends(tree: LineTree, contains: Callable[[Floats], Bools], snap: float) -> I
         yield [end, *passing]
 
 
-@dataclass(frozen=True, eq=False)
-class _Nodes:
-    """The vertices where lines meet: of each place (p,) the line, the parameter there, and the node."""
-
-    line: Ints
-    t: Floats
-    node: Ints
-    of_meeting: Ints  # the node of each meeting, -1 for a meeting without places
-    points: Floats  # (k,3) of the nodes, with their heights
-
-    def along(self, number: int, curve: Curve) -> list[tuple[float, int]]:
-        """Parameters and nodes along a line, no node twice in a row; a closed line returns to its first."""
-        t, node = self.t[self.line == number], self.node[self.line == number]
-        stops = [(float(t[k]), int(node[k])) for k in np.lexsort((node, t))]
-        stops = [stop for k, stop in enumerate(stops) if k == 0 or stop[1] != stops[k - 1][1]]
-        if curve.closed and stops:
-            if len(stops) > 1 and stops[0][1] == stops[-1][1]:
-                stops.pop()
-            stops.append((stops[0][0] + len(curve.pieces), stops[0][1]))
-        return stops
+Stops = list[tuple[float, int]]  # parameters and nodes along a line
 
 
-def _nodes(lines: Sequence[Line], meetings: Sequence[Places], snap: float) -> _Nodes:
-    """The nodes of the meetings; those nearer to each other than ``snap`` are one."""
+def _nodes(
+    lines: Sequence[Line], meetings: Sequence[Places], snap: float
+) -> tuple[Floats, Ints, list[Stops]]:
+    """The vertices where lines meet, one for those nearer to each other than ``snap``.
+
+    Returns their points (k,3) with heights, the vertex of each meeting, -1 for one without places, and the
+    stops along each line, no vertex twice in a row; a closed line returns to its first.
+    """
     line = np.array([i for places in meetings for i, _ in places], dtype=np.int64)
     t = np.array([s for places in meetings for _, s in places])
     of_meeting = np.full(len(meetings), -1)
     if not len(line):
-        return _Nodes(line, t, line, of_meeting, np.zeros((0, 3)))
+        return np.zeros((0, 3)), of_meeting, [[] for _ in lines]
     where = np.empty((len(line), 3))
     for number in np.unique(line):
         where[line == number] = lines[number].curve.at(t[line == number])
@@ -172,24 +150,35 @@ def _nodes(lines: Sequence[Line], meetings: Sequence[Places], snap: float) -> _N
     leader = order[np.searchsorted(node[order], np.arange(node.max() + 1))]
     points = where[leader]
     points[kind[leader] == Kind.DIVIDER, 2] = np.nan
-    return _Nodes(line, t, node, of_meeting, points)
+    stops: list[Stops] = [[] for _ in lines]
+    for k in np.lexsort((node, t)).tolist():
+        along = stops[line[k]]
+        if not along or along[-1][1] != node[k]:
+            along.append((float(t[k]), int(node[k])))
+    for one, along in zip(lines, stops, strict=True):
+        if one.curve.closed and along:
+            if len(along) > 1 and along[0][1] == along[-1][1]:
+                along.pop()
+            along.append((along[0][0] + len(one.curve.pieces), along[0][1]))
+    return points, of_meeting, stops
 
 
-def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[list[Chain], Floats]:
+def _chains(
+    lines: Sequence[Line], nodes: Floats, stops: Sequence[Stops], edge_length: float
+) -> tuple[list[Chain], Floats]:
     """Each line's chains from node to node; the points (n,3) of the nodes, and of the chains between."""
     chains: list[Chain] = []
-    new, n = [nodes.points], len(nodes.points)
-    given = set(np.flatnonzero(~np.isnan(nodes.points[:, 2])).tolist())
+    new, n = [nodes], len(nodes)
+    given = set(np.flatnonzero(~np.isnan(nodes[:, 2])).tolist())
     direct: set[tuple[int, int]] = set()
-    for number, one in enumerate(lines):
+    for number, (one, along) in enumerate(zip(lines, stops, strict=True)):
         curve, divides = one.curve, one.kind is Kind.DIVIDER
         known = [1.0, 1.0, np.nan if divides else 1.0]
-        stops = nodes.along(number, curve)
-        if not stops:  # a closed line that meets nothing
+        if not along:  # a closed line that meets nothing
             start = float(curve.extremes[0]) if len(curve.extremes) else 0.0
             new.append(curve.at(start) * known)
-            stops, n = [(start, n), (start + len(curve.pieces), n)], n + 1
-        for (low, first), (high, last) in pairwise(stops):
+            along, n = [(start, n), (start + len(curve.pieces), n)], n + 1
+        for (low, first), (high, last) in pairwise(along):
             inner = curve.between(low, high, edge_length)
             ends = (min(first, last), max(first, last))
             # a second chord between the same nodes needs a point, and so does a divider between given
@@ -205,20 +194,14 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
     return chains, np.concatenate(new)
 
 
-def _inside_plan(
-    tree: LineTree,
-    chains: list[Chain],
-    points: Floats,
-    contains: Callable[[Floats], Bools],
-    edge_length: float,
-) -> list[Chain]:
+def _inside_plan(tree: LineTree, chains: list[Chain], points: Floats, edge_length: float) -> list[Chain]:
     """The chains inside the plan; the parts of lines outside or in holes are left out."""
     lines = tree.lines
     kept = np.array([lines[chain.line].bounds for chain in chains])
     inner = np.flatnonzero(~kept)
     middles = [chains[k].edges[len(chains[k].vertices) // 2 - 1] for k in inner]
     middle = points[np.reshape(middles, (-1, 2)).astype(int)].mean(axis=1)
-    kept[inner] = contains(middle)
+    kept[inner] = shapely.contains_xy(tree.area, middle)
     inner, middle = inner[kept[inner]], middle[kept[inner]]
     for number, xy, places in zip(inner, middle, tree.at(middle, SNAP * edge_length), strict=True):
         one = chains[number].line

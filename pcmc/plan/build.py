@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
-from ..curves.pieces import to_space
+from ..curves.curves import Curve, polyline
+from ..curves.pieces import Piece, to_space
 from ..forces.rooms import check_rooms
 from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
-from ..surface import Cable, Patch, Surface
+from ..surface import Cable, HeldCurve, Patch, Surface
 from .draft import Draft, drafted
-from .edges import (
-    HELD,
-    NONE,
-    check_pressures,
-    edge_cables,
-    mirror_planes,
-    raised_heights,
-    usual_cable,
-)
-from .heights import dome, harmonic_heights
-from .held_lines import held_lines
-from .lines import Kind
+from .edges import HELD, NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
+from .lines import SNAP, Kind, Line
 from .parts import PatchSpec, PlanData
 from .walls import Roof, rooms_of, upright_planes, walls_of
 
+RISE = 0.3  # of the radius of the largest circle without supports: a shallow dome
+FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper at its edge
+SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
+LEAST = 0.15  # of that slope: smallest slope, so that walls have room
+REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
+EXACT = 1e-9  # of the size: a vertex this near to its curve is on it
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
@@ -140,10 +140,7 @@ def _cables(draft: Draft, held: Bools) -> list[Cable]:
 def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     """The plan's patches and the patch (m,) of each triangle of its mesh.
 
-    Raises
-    ------
-    PlanError
-        Where the patches that are given and the parts between the dividers are not one to one.
+    PlanError where the patches that are given and the parts between the dividers are not one to one.
     """
     parts = int(mesh.region.max()) + 1
     area = signed_areas(mesh.points, mesh.triangles)
@@ -196,3 +193,121 @@ def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> 
         problem = f"the part of the plan around {place} has no patch ({len(bare)} such parts)"
         raise PlanError(f"{problem}; add one with at= inside it", what="patches", where=place)
     return owner
+
+
+def stiffness(points: Floats, triangles: Ints) -> csr_array:
+    """(n,n) cotangent matrix L of plane triangles: uᵀ L u = ∫ |∇u|² for u linear on each.
+
+    >>> L = stiffness(np.array([[0, 0], [1, 0], [0, 1.0]]), np.array([[0, 1, 2]]))
+    >>> L.toarray().tolist()
+    [[1.0, -0.5, -0.5], [-0.5, 0.5, 0.0], [-0.5, 0.0, 0.5]]
+    """
+    X = points[triangles]
+    opposite = X[:, [2, 0, 1]] - X[:, [1, 2, 0]]
+    area = signed_areas(points, triangles)
+    local = np.einsum("tik,tjk->tij", opposite, opposite) / (4.0 * area[:, None, None])
+    row, column = np.repeat(triangles, 3, axis=1), np.tile(triangles, (1, 3))
+    n = len(points)
+    return csr_array(coo_array((local.ravel(), (row.ravel(), column.ravel())), shape=(n, n)))
+
+
+def harmonic_heights(points: Floats, triangles: Ints, heights: Floats) -> Floats:
+    """(n,) the harmonic function with the given heights; NaN is unknown.
+
+    >>> square = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1.0]])
+    >>> fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    >>> harmonic_heights(square, fan, np.array([0, 0, 3, 3, np.nan])).tolist()
+    [0.0, 0.0, 3.0, 3.0, 1.5]
+    """
+    known = ~np.isnan(heights)
+    given = np.where(known, heights, 0.0)
+    if np.ptp(given[known]) == 0.0:
+        return np.full(len(points), given[known][0])
+    L = stiffness(points, triangles)
+    return _solve(L, -(L @ given), known) + given
+
+
+def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None) -> Floats:
+    """(n,) heights of an initial dome: 0 where held, at most ``rise``, never steep at the edge.
+
+    The shape is (u / max u)^0.75 for a membrane under pressure: Δu = -1, u = 0 at held vertices, free
+    edges elsewhere. ``rise`` is by default 0.3 of the radius of the largest circle without held
+    vertices. The height is between 0.12 and 0.8 times the distance from the held vertices; both
+    slopes grow with a larger rise.
+    """
+    area = np.abs(signed_areas(points, triangles))
+    load = np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), len(points)).astype(float)
+    u = np.maximum(_solve(stiffness(points, triangles), load, held), 0.0)
+    distance = np.asarray(cKDTree(points[held]).query(points)[0])
+    radius = float(distance.max())
+    rise = RISE * radius if rise is None else rise
+    slope = max(SLOPE, SLOPE / RISE * rise / radius)
+    full = rise * (u / u.max()) ** FULLNESS
+    return np.clip(full, LEAST * slope * distance, slope * distance)
+
+
+def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
+    """(n,) u with L u = load at the unknown vertices and u = 0 at the known ones."""
+    free = np.flatnonzero(~known)
+    u: Floats = np.zeros(len(load))
+    if len(free):
+        factor = splu(L[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A")
+        u[free] = factor.solve(load[free])
+    return u
+
+
+def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) -> list[HeldCurve]:
+    """The fixed edges of the outline and of holes, the lines of supports, and straight feet of walls.
+
+    ``X`` (n,3) are the vertices of the surface; ``feet``, by the first two vertices of the upper edge of a
+    wall, the vertices along its held bottom.
+    """
+    curves = []
+    supports = [Line("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
+    fixed = dict(zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", HELD), strict=True))
+    for chain in draft.drawn.chains:
+        line = draft.lines[chain.line]
+        if line.kind is Kind.DIVIDER:
+            continue
+        held = [line.kind is Kind.SUPPORT or fixed[tuple(ends)] for ends in chain.edges.tolist()]
+        turns = np.flatnonzero(np.diff([False, *held, False]))
+        for first, last in turns.reshape(-1, 2):  # stretches of fixed edges
+            V, at = chain.vertices[first : last + 1], chain.at[first : last + 1]
+            found = _on_curve(draft, line.curve, V, at, X)
+            for support in supports if found is None else ():
+                t, _ = support.nearest(draft.drawn.points[V])
+                way = slice(None) if t[0] < t[-1] else slice(None, None, -1)
+                if found is None and (np.diff(t[way]) > 0.0).all():
+                    found = _on_curve(draft, support.curve, V[way], t[way], X)
+            curves.append(found or HeldCurve(polyline(X[V]), V, np.arange(float(len(V)))))
+    down = np.diag([1.0, 1.0, 0.0])
+    for chain in draft.drawn.chains:
+        foot = feet.get((int(chain.vertices[0]), int(chain.vertices[1])))
+        if foot is not None:
+            curve = draft.lines[chain.line].curve.mapped(down, np.zeros(3))
+            found = _on_curve(draft, curve, foot, chain.at, X)
+            curves += [found] if found else []
+    return curves
+
+
+def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> HeldCurve | None:
+    """The vertices V (k,) of X (n,3) on a curve in the coordinates of Π, at parameters (k,); None if off it.
+
+    Where lines meet, their common vertex may be a little beside one of them: a straight piece leads there.
+    """
+    plane = draft.plan.plane
+    part, t = curve.part(at[0], at[-1], at)
+    part = part.mapped(plane.axes.T, np.array(plane.point))
+    there = part.at(t)
+    away = np.linalg.norm(X[V] - there, axis=1)
+    near = EXACT * float(np.linalg.norm(np.ptp(X, axis=0)))
+    if away[1:-1].max(initial=0.0) > near or away.max() > REACH * draft.plan.edge_length:
+        return None
+    pieces = list(part.pieces)
+    if away[0] > near:
+        pieces.insert(0, Piece(np.stack([X[V[0]], there[0]])))
+        t[1:] += 1.0
+    if away[-1] > near:
+        pieces.append(Piece(np.stack([there[-1], X[V[-1]]])))
+        t[-1] += 1.0
+    return HeldCurve(Curve(tuple(pieces)), V, t)

@@ -60,10 +60,7 @@ class Draft:
 def drafted(plan: PlanData) -> Draft:
     """Draw the lines of a plan and mesh what is between them.
 
-    Raises
-    ------
-    PlanError
-        For lengths that are probably mistakes, and lines that do not fit together.
+    PlanError for lengths that are probably mistakes, and lines that do not fit together.
     """
     lines, on_edge, drawn = _arranged(plan)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
@@ -104,19 +101,19 @@ def _part_count(plan: PlanData, drawn: Arrangement) -> int:
 
 def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
     """The lines in the coordinates of Π, the supports on the boundary, and the lines cut where they meet."""
-    _check_size(plan)
     lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
-    tree = LineTree(lines)
     lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
-    on_edge = []
-    for number, support in enumerate(plan.supports, start=1):
-        if isinstance(support, Curve):
-            local = support.local(plan.plane)
-            if all(tree.at(local.samples(0.5 * plan.edge_length)[:, :2], SNAP * plan.edge_length)):
-                on_edge.append(local)
-            else:
-                lines.append(Line(f"support {number}", Kind.SUPPORT, local))
+    curves = [(k, support) for k, support in enumerate(plan.supports, 1) if isinstance(support, Curve)]
+    supports = [Line(f"support {k}", Kind.SUPPORT, curve.local(plan.plane)) for k, curve in curves]
+    _check_size(plan, [*lines, *supports])
+    tree, on_edge = LineTree([line for line in lines if line.bounds]), []
+    for line in supports:
+        samples = line.curve.samples(0.5 * plan.edge_length)[:, :2]
+        if all(tree.at(samples, SNAP * plan.edge_length)):
+            on_edge.append(line.curve)
+        else:
+            lines.append(line)
     check_lines(plan, lines)
     points = [to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)]
     named = [np.array([*point, np.nan]) for point in plan.points.values()]  # vertices, but not held
@@ -128,17 +125,16 @@ def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
     return lines, on_edge, replace(drawn, required=drawn.required[: len(points)])
 
 
-def _check_size(plan: PlanData) -> None:
+def _check_size(plan: PlanData, lines: Sequence[Line]) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
-    parts = (*plan.holes, *plan.dividers, *plan.cables)
-    held = {f"support {k}": s for k, s in enumerate(plan.supports, 1) if isinstance(s, Curve)}
-    points = sum(len(c.dense) for c in (plan.outline, *(part.curve for part in parts), *held.values()))
+    points = sum(
+        len(curve.dense) for curve in (*(c.curve for c in plan.cables), *(one.curve for one in lines))
+    )
     if points > MAX_POINTS:
         problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
         raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
-    xy = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2]
-    _check_count(plan, xy, 0)
-    size = float(np.linalg.norm(np.ptp(xy, axis=0)))
+    _check_count(plan, lines[0].xy, 0)
+    size = float(np.linalg.norm(np.ptp(lines[0].xy, axis=0)))
     if plan.edge_length > size:
         problem = (
             f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to corner"
@@ -147,20 +143,17 @@ def _check_size(plan: PlanData) -> None:
     if plan.rise is not None and plan.rise > MAX_RISE * size:
         problem = f"rise={plan.rise:g} is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a"
         raise PlanError(f"{problem} smaller one", what="rise", found=plan.rise)
-    lines = {"the outline": plan.outline} | {hole.name: hole.curve for hole in plan.holes}
-    lines |= {f"divider {divider.name!r}": divider.curve for divider in plan.dividers}
-    for name, curve in (lines | held).items():
-        if curve.length > MAX_EDGES * plan.edge_length:
-            problem = f"{name} is {curve.length:.3g} long, more than {MAX_EDGES} edges of"
-            problem += f" {plan.edge_length:g}; draw it as long as the plan"
-            raise PlanError(problem, what=name, found=curve.length)
-    for hole in plan.holes:
-        xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
-        extent = float(np.ptp(xy, axis=0).max())
-        if extent <= SNAP * plan.edge_length:
-            problem = f"{hole.name} is only {extent:g} wide, too little for edges of length"
-            problem += f" {plan.edge_length:g}; leave it out, or use a smaller edge_length"
-            raise PlanError(problem, what=hole.name, found=extent)
+    for line in lines:
+        if line.curve.length > MAX_EDGES * plan.edge_length:
+            problem = f"is {line.curve.length:.3g} long, more than {MAX_EDGES} edges of {plan.edge_length:g};"
+            raise line.error(f"{problem} draw it as long as the plan", found=line.curve.length)
+    for line in lines:
+        extent = float(np.ptp(line.xy, axis=0).max())
+        if line.kind is Kind.HOLE and extent <= SNAP * plan.edge_length:
+            problem = (
+                f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g}; leave it"
+            )
+            raise line.error(f"{problem} out, or use a smaller edge_length", found=extent)
 
 
 def _check_count(plan: PlanData, outline: Floats, edges: int) -> None:

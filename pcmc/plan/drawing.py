@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.units import conversion_note, length_factor, size_note
+from ..base.units import conversion_note, size_note
 from ..curves.curves import Curve, polyline
 from ..curves.pieces import Piece, point_text, two_digits
 from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
@@ -74,7 +74,7 @@ def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawi
     PlanError : for a drawing that is no plan; ``what`` is the layer, ``where`` the place.
     MissingExtra : without the library that reads it.
     """
-    content = read_strokes(path)
+    content = read_strokes(path, units)
     try:
         return _Reader(content, units, gap).drawing(path)
     except PlanError as error:
@@ -86,15 +86,9 @@ class _Reader:
 
     def __init__(self, content: Strokes, units: str, gap: float | None) -> None:
         self.content, self.units = content, units or content.unit
-        factor = length_factor(content.unit, units)
         self.by_layer: dict[str, list[Stroke]] = {}
         for stroke in content.strokes:
-            if stroke.curve is None:
-                scaled = replace(stroke, point=factor * np.asarray(stroke.point))
-            else:
-                pieces = (replace(piece, points=factor * piece.points) for piece in stroke.curve.pieces)
-                scaled = replace(stroke, curve=Curve(tuple(pieces)))
-            self.by_layer.setdefault(stroke.layer, []).append(scaled)
+            self.by_layer.setdefault(stroke.layer, []).append(stroke)
         self.layers: dict[str, str] = {}
         self.notes: list[str] = []
         self.edge = [s for _, strokes in self.layers_of("outline") for s in strokes if s.curve is not None]
@@ -139,8 +133,8 @@ class _Reader:
             drawn += [*_points(strokes), *(path.curve for path in self._joined(strokes))]
         masts = self._masts(holes)
         edges = [outline, *holes.values()]
-        places, note = meet_edges([*drawn, *masts], edges, self.gap)
-        self.notes += [note] if note else []
+        places, notes = meet_edges([*drawn, *masts], edges, self.gap)
+        self.notes += notes
         dividers, cables = self._cables(edges)
         ridges = frozenset(dividers)
         self._add("divider", "divider {!r}".format, "wall", dividers)
@@ -184,18 +178,9 @@ class _Reader:
 
     def _joined(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
         """The paths of a layer; what was changed is noted."""
-        drawn = [stroke for stroke in strokes if stroke.curve is not None]
-        if not drawn:
-            return []
-        joined = join_strokes(drawn, self.gap)
-        where = f"layer {drawn[0].layer!r}"
-        if joined.closed_gaps:
-            number = f"{joined.closed_gaps} gap{'s' if joined.closed_gaps > 1 else ''}"
-            largest = f"up to {joined.largest_gap:.3g} long (closed are gaps up to {self.gap:.3g})"
-            self.notes.append(f"{where}: {number} closed, {largest}")
-        if joined.doubles:
-            self.notes.append(f"{where}: drawn twice or without length, left out: {listed(joined.doubles)}")
-        return list(joined.paths)
+        paths, notes = join_strokes(strokes, self.gap)
+        self.notes += notes
+        return paths
 
     def _loops(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
         """The closed curves of a layer; PlanError if one is open or forks."""
@@ -325,8 +310,8 @@ class _Reader:
 
     def _moved(self, curves: Mapping[str, Curve], edges: Sequence[Curve], what: str) -> dict[str, Curve]:
         """The curves with their ends moved over small gaps to the lines that they should reach."""
-        moved, note = meet_lines(curves, edges, self.gap, what)
-        self.notes += [note] if note else []
+        moved, notes = meet_lines(curves, edges, self.gap, what)
+        self.notes += notes
         return moved
 
     def _loose(self, outline: Curve, supports: Sequence[Any], masts: Sequence[Any], cables: bool) -> bool:

@@ -49,10 +49,7 @@ class Boundary:
 def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], drawn: Arrangement) -> Boundary:
     """The boundary of a plan cut into edges; those along the supports ``on_edge`` are fixed.
 
-    Raises
-    ------
-    PlanError
-        For a mirror that is no straight edge of the outline, and a cable that is not along the boundary.
+    PlanError for a mirror that is no straight edge of the outline, and a cable away from the boundary.
     """
     chains = [chain for chain in drawn.chains if lines[chain.line].bounds]
     chains.sort(key=lambda chain: chain.line)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
 from ..curves.curves import Curve
 from ..curves.pieces import point_text
@@ -117,12 +117,10 @@ class LineTree:
         """For each point (n,2) the lines that pass through it, to ``snap``, with their parameters there."""
         points = shapely.points(xy)
         point, chord = self.tree.query(points, predicate="dwithin", distance=snap + self.sag)
-        order = np.lexsort((shapely.distance(points[point], self.chords[chord]), self.owner[chord], point))
-        point, chord = point[order], chord[order]
-        owner = self.owner[chord]
-        first = np.ones(len(point), dtype=bool)  # the nearest chord of each line
-        first[1:] = (np.diff(point) != 0) | (np.diff(owner) != 0)
-        point, owner, chord = point[first], owner[first], self.chord[chord[first]]
+        near = np.argsort(shapely.distance(points[point], self.chords[chord]), kind="stable")
+        pair = point[near] * len(self.lines) + self.owner[chord[near]]
+        first = near[np.unique(pair, return_index=True)[1]]  # the nearest chord of each line
+        point, owner, chord = point[first], self.owner[chord[first]], self.chord[chord[first]]
         passing: list[Places] = [[] for _ in xy]
         t, distance = np.empty((2, len(point)))
         for number in np.unique(owner):
@@ -131,6 +129,14 @@ class LineTree:
         for k in np.flatnonzero(distance <= snap):
             passing[point[k]].append((int(owner[k]), float(t[k])))
         return passing
+
+    @cached_property
+    def area(self) -> Any:
+        """The polygon inside the outline and outside all holes."""
+        holes = [line.xy for line in self.lines if line.kind is Kind.HOLE]
+        area = shapely.Polygon(self.lines[0].xy, holes)
+        shapely.prepare(area)
+        return area
 
     def crossings(self) -> list[Places]:
         """The places where two lines cross that are not both of the boundary."""
@@ -204,13 +210,6 @@ def check_holes(lines: Sequence[Line]) -> None:
     for first, second in zip(i[i < j], j[i < j], strict=True):
         problem = f"and {holes[second].name} touch or overlap; join them into one"
         raise holes[first].error(problem, found=holes[second].name)
-
-
-def inside(lines: Sequence[Line]) -> Callable[[Floats], Bools]:
-    """A function that tests which points (n,2) are inside the outline and outside all holes."""
-    area = shapely.Polygon(lines[0].xy, [one.xy for one in lines if one.kind is Kind.HOLE])
-    shapely.prepare(area)
-    return lambda xy: np.asarray(shapely.contains_xy(area, xy))
 
 
 def crossing(one: Line, s: float, two: Line, t: float) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -40,18 +41,8 @@ class JoinedPath:
         return _ends(self.curve)
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
-    """Paths, the number of gaps closed, the largest of them, and the labels of strokes drawn twice."""
-
-    paths: Sequence[JoinedPath]
-    closed_gaps: int
-    largest_gap: float
-    doubles: tuple[str, ...]
-
-
-def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
-    """The paths that strokes make whose ends are nearer to each other than ``tolerance``.
+def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[JoinedPath], list[str]]:
+    """The paths that strokes make whose ends are nearer to each other than ``tolerance``; notes on changes.
 
     Paths end where one stroke ends or more than two meet. Where a gap is closed, an arc keeps its place and a
     line moves; of two alike each moves half of the way. Strokes drawn twice count once.
@@ -59,13 +50,22 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
     >>> from ..curves.curves import polyline
     >>> lines = [[[0, 0, 0], [4, 0, 0]], [[0, 3, 0], [0, 0.001, 0]], [[4, 0, 0], [0, 3, 0]]]
     >>> strokes = [Stroke("outline", f"LINE {k}", polyline(points)) for k, points in enumerate(lines)]
-    >>> joined = join_strokes(strokes, 0.01)
-    >>> joined.paths[0].curve.closed, joined.closed_gaps, joined.largest_gap
-    (True, 1, 0.001)
+    >>> (path,), notes = join_strokes(strokes, 0.01)
+    >>> path.curve.closed, notes
+    (True, ["layer 'outline': 1 gap closed, up to 0.001 long (closed are gaps up to 0.01)"])
     """
-    curves, labels, doubles = _once(strokes, tolerance)
+    drawn = [stroke for stroke in strokes if stroke.curve is not None]
+    curves = [stroke.curve for stroke in strokes if stroke.curve is not None]
+    if not drawn:
+        return [], []
+    layer, single = drawn[0].layer, _single(curves, tolerance)
+    curves, labels = list(compress(curves, single)), [stroke.label for stroke in compress(drawn, single)]
+    doubles = [stroke.label for stroke, alone in zip(drawn, single, strict=True) if not alone]
+    notes = (
+        [f"layer {layer!r}: drawn twice or without length, left out: {listed(doubles)}"] if doubles else []
+    )
     if not curves:
-        return Joined((), 0, 0.0, doubles)
+        return [], notes
     ends = np.concatenate([_ends(curve) for curve in curves])
     node = components(cKDTree(ends).query_pairs(tolerance, output_type="ndarray"), len(ends))
     count = int(node.max()) + 1
@@ -87,8 +87,11 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
         steps[np.linalg.norm(steps, axis=1) <= 1e-12 * curve.length] = 0.0
         closed = bool(np.linalg.norm(both[1] - both[0]) <= 1e-9 * curve.length)
         moved.append(replace(_with_ends(curve, steps), closed=closed))
-    paths = _walk(moved, strokes[0].layer, labels, node.reshape(-1, 2))
-    return Joined(paths, int(np.count_nonzero(gaps)), float(gaps.max()), doubles)
+    if gaps.any():
+        number = np.count_nonzero(gaps)
+        text = f"layer {layer!r}: {number} gap{'s' if number > 1 else ''} closed, up to {gaps.max():.3g} long"
+        notes.insert(0, f"{text} (closed are gaps up to {tolerance:.3g})")
+    return _walk(moved, layer, labels, node.reshape(-1, 2)), notes
 
 
 def _ends(curve: Curve) -> Floats:
@@ -96,30 +99,19 @@ def _ends(curve: Curve) -> Floats:
     return curve.at([0.0, float(len(curve.pieces))])
 
 
-def _once(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Curve], list[str], tuple[str, ...]]:
-    """The curves and labels of strokes, and the labels of those left out: doubles, or without length."""
-    drawn = [(stroke.curve, stroke.label) for stroke in strokes if stroke.curve is not None]
-    marks = np.array([c.at(c.parameter(c.length * np.linspace(0.0, 1.0, 5))) for c, _ in drawn])
-    shared, first, which = np.unique(
-        np.round(marks.reshape(len(drawn), -1) / tolerance, 3), axis=0, return_index=True, return_inverse=True
-    )
+def _single(curves: Sequence[Curve], tolerance: float) -> list[bool]:
+    """Which curves have a length and repeat no earlier one, by points at their quarters."""
+    marks = np.array([c.at(c.parameter(c.length * np.linspace(0.0, 1.0, 5))) for c in curves])
+    flat = np.round(marks.reshape(len(curves), -1) / tolerance, 3)
+    _, first, which = np.unique(flat, axis=0, return_index=True, return_inverse=True)
     ways = [way.reshape(len(first), -1) for way in (marks[first], marks[first][:, ::-1])]
     tree = cKDTree(ways[0])
     alike: list[Any] = [tree.query_ball_point(way, tolerance, p=np.inf) for way in ways]
-    curves, labels, doubles, taken = (
-        list[Curve](),
-        list[str](),
-        list[str](),
-        np.zeros(len(shared), dtype=bool),
-    )
-    for (curve, label), mark in zip(drawn, which.reshape(-1), strict=True):
-        if curve.length <= tolerance or taken[[*alike[0][mark], *alike[1][mark]]].any():
-            doubles.append(label)
-        else:
-            curves.append(curve)
-            labels.append(label)
-            taken[mark] = True
-    return curves, labels, tuple(doubles)
+    single, taken = [], np.zeros(len(first), dtype=bool)
+    for curve, mark in zip(curves, which.reshape(-1), strict=True):
+        single.append(curve.length > tolerance and not taken[[*alike[0][mark], *alike[1][mark]]].any())
+        taken[mark] |= single[-1]
+    return single
 
 
 def _walk(curves: Sequence[Curve], layer: str, labels: Sequence[str], nodes: Ints) -> list[JoinedPath]:
@@ -153,8 +145,8 @@ def _walk(curves: Sequence[Curve], layer: str, labels: Sequence[str], nodes: Int
 
 def meet_lines(
     curves: Mapping[str, Curve], edges: Sequence[Curve], tolerance: float, what: str
-) -> tuple[dict[str, Curve], str]:
-    """The curves with ends moved that just miss each other or a line, and a note; ``what`` names them.
+) -> tuple[dict[str, Curve], list[str]]:
+    """The curves with ends moved that just miss each other or a line, and notes; ``what`` names them.
 
     Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge that is as near.
     This point, and each other end, is moved onto the nearest line that it just misses. Only the course in
@@ -162,7 +154,7 @@ def meet_lines(
     """
     names = [name for name, curve in curves.items() if not curve.closed]
     if not names:
-        return dict(curves), ""
+        return dict(curves), []
     rims, corners = _rims(edges)
     drawn = np.concatenate([_ends(curves[name]) for name in names])[:, :2]
     points = np.concatenate([drawn, corners])
@@ -192,8 +184,8 @@ def meet_lines(
 
 def meet_edges(
     supports: Sequence[Floats | Curve], edges: Sequence[Curve], tolerance: float
-) -> tuple[list[Floats | Curve], str]:
-    """Points (3,), and curves by their ends and joints, moved in plan onto edges that they just miss; a note.
+) -> tuple[list[Floats | Curve], list[str]]:
+    """Points (3,), and curves by their ends and joints, moved in plan onto edges that they just miss; notes.
 
     A point within ``tolerance`` of a corner of an edge goes there, otherwise onto the nearest edge as near.
     """
@@ -240,11 +232,11 @@ def _steps(steps: Floats, tolerance: float) -> Floats:
     return np.pad(steps, ((0, 0), (0, 1)))
 
 
-def _note(steps: Floats, what: str, where: str) -> str:
+def _note(steps: Floats, what: str, where: str) -> list[str]:
     lengths = np.linalg.norm(steps, axis=1)
     moved = np.count_nonzero(lengths)
     what = what.format(s="s" if moved > 1 else "")
-    return f"{moved} {what} moved by up to {lengths.max():.3g} to {where}" if moved else ""
+    return [f"{moved} {what} moved by up to {lengths.max():.3g} to {where}"] if moved else []
 
 
 def _with_ends(curve: Curve, steps: Floats) -> Curve:

@@ -19,24 +19,8 @@ from ..curves.pieces import to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
 from ..surface.summary import listed
-from .parts import (
-    MOST,
-    Divider,
-    PatchSpec,
-    PlanData,
-    cable_of,
-    check_count,
-    check_keys,
-    curve_of,
-    divider_of,
-    edge_cable,
-    hole_of,
-    mirror_of,
-    patches_of,
-    points_of,
-    rooms_of,
-    support_of,
-)
+from . import parts
+from .parts import Divider, PatchSpec, PlanData, check_keys
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,16 +94,16 @@ class Plan(PlanData):
     """
 
     def __post_init__(self) -> None:
-        for key in MOST:
-            check_count(key, len(getattr(self, key)), OptionError)
-        parsed: dict[str, Any] = {"outline": curve_of(self.outline, "outline", closed=True)}
-        makers = {"dividers": divider_of, "holes": hole_of, "supports": support_of}
-        for key, maker in (makers | {"cables": cable_of, "mirrors": mirror_of}).items():
+        for key in parts.MOST:
+            parts.check_count(key, len(getattr(self, key)), OptionError)
+        parsed: dict[str, Any] = {"outline": parts.curve_of(self.outline, "outline", closed=True)}
+        makers = {"dividers": parts.divider_of, "holes": parts.hole_of, "supports": parts.support_of}
+        for key, maker in (makers | {"cables": parts.cable_of, "mirrors": parts.mirror_of}).items():
             parsed[key] = tuple(maker(spec, number) for number, spec in enumerate(getattr(self, key), 1))
-        parsed |= {"patches": patches_of(self.patches), "points": points_of(self.points)}
-        parsed["rooms"] = rooms_of(self.rooms, parsed["patches"])
+        parsed |= {"patches": parts.patches_of(self.patches), "points": parts.points_of(self.points)}
+        parsed["rooms"] = parts.rooms_of(self.rooms, parsed["patches"])
         validate.choice("edge of the outline", self.edge, EDGES)
-        parsed["cable"] = edge_cable(self.edge, self.cable, "the outline")
+        parsed["cable"] = parts.edge_cable(self.edge, self.cable, "the outline")
         for key, value in parsed.items():
             object.__setattr__(self, key, value)
         for key in ("pressure", "weight", "snow"):
@@ -148,7 +132,7 @@ class Plan(PlanData):
     def __repr__(self) -> str:
         """Size, outline, patches, dividers and holes, a line each."""
         width, depth = np.ptp(self.outline.at(self.outline.dense), axis=0)[:2].tolist()
-        parts = {
+        texts = {
             "patches": [_patch_text(patch) for patch in self.patches] or [f"all (tension {self.tension:g})"],
             "dividers": [_divider_text(divider) for divider in self.dividers],
             "holes": [f"{hole.name.removeprefix('hole ')} ({hole.edge})" for hole in self.holes],
@@ -162,7 +146,7 @@ class Plan(PlanData):
             edge += f"; {len(self.supports) - curves} points and {curves} curves are held"
         edge += f"; mirror images beyond {len(self.mirrors)} edges" if self.mirrors else ""
         lines = [f"Plan of {width:.4g} × {depth:.4g}, edge length {self.edge_length:g}", f"  outline: {edge}"]
-        return "\n".join([*lines, *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts)])
+        return "\n".join([*lines, *(f"  {name}: {listed(items)}" for name, items in texts.items() if items)])
 
     @property
     def corners(self) -> Floats:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ def parts_of(drawing: Drawing) -> list[Part]:
     lines = [_line(drawing.outline), *holes]
     lines += [_line(curve, 2e-3 * drawing.outline.length) for curve in drawing.dividers.values()]
     noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
-    roof = roof_area(drawing)
+    roof = _roof_area(drawing.outline, drawing.holes.values())
     polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     try:
         check_count("patches", len(polygons) - len(holes))
@@ -57,29 +58,20 @@ def parts_of(drawing: Drawing) -> list[Part]:
 
 
 def plan_area(plan: PlanData) -> Any:
-    """The plan on Π without its holes, as ``roof_area``."""
+    """The plan on Π without its holes, as a polygon; small level holes are filled."""
     holes = [hole.curve.local(plan.plane) for hole in plan.holes]
-    return _area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
+    return _roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
 
 
-def roof_area(drawing: Drawing, smallest: float = 0.0) -> Any:
+def _roof_area(outline: Curve, holes: Iterable[Curve], smallest: float = 0.0) -> Any:
     """The plan without its holes, as a polygon; level holes below a share of its area are filled."""
-    return _area(drawing.outline, list(drawing.holes.values()), smallest)
-
-
-def _area(outline: Curve, holes: Sequence[Curve], smallest: float) -> Any:
-    whole = shapely.make_valid(_polygon(outline))
-    area = whole
+    area = whole = shapely.make_valid(shapely.Polygon(_line(outline).coords))
     for curve in holes:
-        hole = shapely.make_valid(_polygon(curve))
+        hole = shapely.make_valid(shapely.Polygon(_line(curve).coords))
         level = curve.pieces[0].points.shape[1] == 2  # a raised one carries the roof
         if not level or hole.area > smallest * whole.area:
             area = shapely.difference(area, hole)
     return area
-
-
-def _polygon(curve: Curve) -> Any:
-    return shapely.Polygon(_line(curve).coords)
 
 
 def _line(curve: Curve, further: float = 0.0) -> Any:
@@ -117,15 +109,6 @@ def least_tension(area: Any, pressure: float = 1.0) -> float:
     return pressure * low
 
 
-def edge_length_for(parts: Sequence[Part], drawing: Drawing) -> float:
-    """An edge length that gives about 1500 triangles, more where parts or holes are small; two digits."""
-    area = sum(part.area.area for part in parts)
-    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
-    holes = [curve.length / 12.0 for curve in drawing.holes.values()]
-    wanted = min([most, *(part.radius / ACROSS for part in parts), *holes])
-    return float(f"{max(wanted, least):.2g}")
-
-
 def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The keys of a plan for a drawing: those ``given``, and values for all others.
 
@@ -140,14 +123,14 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     values = dict(given or {})
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     parts = parts_of(drawing)
-    areas = _areas(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
+    specs = _patches(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
     for key in ("pressure", "weight"):  # of all patches, which have their own tensions here
         if key in values:
             common = values.pop(key)
-            for area in areas:
-                area.setdefault(key, common)
-    tensions = [area["tension"] for area in areas]
-    edge_length = values.setdefault("edge_length", edge_length_for(parts, drawing))
+            for spec in specs:
+                spec.setdefault(key, common)
+    tensions = [spec["tension"] for spec in specs]
+    edge_length = values.setdefault("edge_length", _edge_length(parts, drawing))
     outline = Line("the outline", Kind.OUTLINE, drawing.outline)
     tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
@@ -160,26 +143,25 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
             entry.setdefault("tension", cable)
     dividers = _changed(drawing.dividers, values.pop("dividers", []), "divider", Divider)
     for entry in dividers:
-        if isinstance(entry, dict) and entry.get("name") in drawing.dividers:
-            name, curve = entry["name"], entry["curve"]
-            upright = entry.setdefault("upright", True) if name in drawing.upright else False
-            if sail or name in drawing.ridges:
-                entry.setdefault("wall", False)
-            else:
-                entry.setdefault("bottom", "held" if drawing.flat else "sloped")
-                most = most_in_corners(curve, outline, edge_length)
-                entry.setdefault("wall", wall_tension(curve, tree, tensions, near, most, upright))
-            if name in drawing.ridges:
-                entry.setdefault("cable", cable)
-    patches: dict[str, dict[str, Any]] = {}
-    for area in areas:
-        name = area.pop("name")
-        if sail:  # an edge that nothing holds closes no space for a pressure
-            area.setdefault("pressure", 0.0)
-        if name in patches:  # several parts of one name are one patch
-            patches[name]["at"] = [*_as_points(patches[name]["at"]), *_as_points(area["at"])]
+        if not isinstance(entry, dict) or entry.get("name") not in drawing.dividers:
+            continue
+        name, curve = entry["name"], entry["curve"]
+        upright = entry.setdefault("upright", True) if name in drawing.upright else False
+        if sail or name in drawing.ridges:
+            entry.setdefault("wall", False)
         else:
-            patches[name] = area
+            entry.setdefault("bottom", "held" if drawing.flat else "sloped")
+            most = most_in_corners(curve, outline, edge_length)
+            entry.setdefault("wall", _wall_tension(curve, tree, tensions, near, most, upright))
+        if name in drawing.ridges:
+            entry.setdefault("cable", cable)
+    patches: dict[str, dict[str, Any]] = {}
+    for spec in specs:
+        if sail:  # an edge that nothing holds closes no space for a pressure
+            spec.setdefault("pressure", 0.0)
+        same = patches.setdefault(spec.pop("name"), spec)
+        if same is not spec:  # several parts of one name are one patch
+            same["at"] = [*_as_points(same["at"]), *_as_points(spec["at"])]
     plan: dict[str, Any] = {
         "outline": drawing.outline,
         "edge_length": edge_length,
@@ -197,39 +179,58 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     return plan | values
 
 
-def _areas(
+def _edge_length(parts: Sequence[Part], drawing: Drawing) -> float:
+    """An edge length that gives about 1500 triangles, more where parts or holes are small; two digits."""
+    area = sum(part.area.area for part in parts)
+    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
+    holes = [curve.length / 12.0 for curve in drawing.holes.values()]
+    wanted = min([most, *(part.radius / ACROSS for part in parts), *holes])
+    return float(f"{max(wanted, least):.2g}")
+
+
+def _wall_tension(
+    curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], near: float, most: float, upright: bool
+) -> float:
+    """The tension of a wall between the parts near a curve; an upright one needs no difference of theirs."""
+    points = shapely.points(curve.at(len(curve.pieces) * (np.arange(SAMPLES) + 0.5) / SAMPLES)[:, :2])
+    neighbours: list[list[float]] = [[] for _ in points]
+    for point, part in zip(*parts.query(points, predicate="dwithin", distance=near), strict=True):
+        neighbours[point].append(tensions[part])
+    return balanced_wall([[min(t)] if upright and t else t for t in neighbours], most)
+
+
+def _patches(
     parts: Sequence[Part], drawing: Drawing, given: Mapping[str, Any], tension: float | None
 ) -> list[dict[str, Any]]:
     """For each part its patch's name, point and values: given, of the drawing, or proposed."""
     if not parts:
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
-    least = least_tension(roof_area(drawing, SMALL_HOLE))
+    least = least_tension(_roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE))
     default = float(f"{ROOM * least:.2g}") if tension is None else tension
-    names = _names(parts, drawing)
-    areas = []
+    labels, specs = _labels(parts, drawing), []
     for k, part in enumerate(parts):
         point = [_rounded(value, part.radius) for value in part.middle]
         point = point if shapely.contains_xy(part.area, *point) else list(part.middle)
-        label = names.get(k)
-        name = label.name if label else "roof" if len(parts) == 1 else f"patch {k + 1}"
-        own = default if label is None or label.tension is None else label.tension
-        areas.append({"name": name, "tension": own, "at": point})
+        label = labels.get(k) or Label("roof" if len(parts) == 1 else f"patch {k + 1}", (0.0, 0.0))
+        own = default if label.tension is None else label.tension
+        specs.append({"name": label.name, "tension": own, "at": point})
     for name, attributes in given.items():
         check_keys(attributes, PatchSpec, f"patch {name!r}")
-        if attributes.get("at") is not None:
-            at = [part for part in parts if _contains(part, attributes["at"])]
-            chosen = [area for part, area in zip(parts, areas, strict=True) if part in at]
+        if attributes.get("at") is None:
+            chosen = [spec for spec in specs if spec["name"] == name]
         else:
-            chosen = [area for area in areas if area["name"] == name]
+            points = _as_points(attributes["at"])
+            at = [any(shapely.contains_xy(part.area, *point) for point in points) for part in parts]
+            chosen = list(compress(specs, at))
         if not chosen:
             problem = unknown(
-                "patch of the drawing", name, dict.fromkeys(str(area["name"]) for area in areas)
+                "patch of the drawing", name, dict.fromkeys(str(spec["name"]) for spec in specs)
             )
             raise OptionError(f"{drawing.path}: {problem}", what="patches", where=name)
-        for area in chosen:
-            area |= {"name": name} | {key: value for key, value in attributes.items() if key != "at"}
-    return areas
+        for spec in chosen:
+            spec |= {"name": name} | {key: value for key, value in attributes.items() if key != "at"}
+    return specs
 
 
 def _rounded(value: float, radius: float) -> float:
@@ -241,16 +242,12 @@ def _rounded(value: float, radius: float) -> float:
     return round(value, 2 - math.floor(math.log10(radius))) + 0.0
 
 
-def _contains(part: Part, at: Any) -> bool:
-    return any(shapely.contains_xy(part.area, *point) for point in _as_points(at))
-
-
 def _as_points(at: Any) -> list[Any]:
     return list(at) if isinstance(at[0], list | tuple) else [at]
 
 
-def _names(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:
-    """The names that the drawing gives to parts."""
+def _labels(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:
+    """The names that the drawing gives to parts, by the number of the part."""
     owner: dict[int, Label] = {}
     for label in drawing.labels:
         inside = [k for k, part in enumerate(parts) if shapely.contains_xy(part.area, *label.point)]
@@ -258,12 +255,12 @@ def _names(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:
             x, y = label.point
             problem = f"{drawing.path}: the name {label.name!r} at ({x:.6g}, {y:.6g}) is outside the plan"
             raise PlanError(f"{problem}; move it into the part that it names", what="patch", where=label.name)
-        if inside[0] in owner and owner[inside[0]].name != label.name:
+        other = owner.setdefault(inside[0], label).name
+        if other != label.name:
             problem = (
-                f"{drawing.path}: {owner[inside[0]].name!r} and {label.name!r} name one part of the plan"
+                f"{drawing.path}: {other!r} and {label.name!r} name one part of the plan; draw a divider"
             )
-            problem += "; draw a divider between them, or delete one"
-            raise PlanError(problem, what="patch", where=label.name)
+            raise PlanError(f"{problem} between them, or delete one", what="patch", where=label.name)
         owner[inside[0]] = label
     return owner
 
@@ -275,25 +272,13 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
     }
     more = []
     for entry in given:
-        keys = entry.keys() if isinstance(entry, Mapping) else set()
-        if "name" not in keys or "curve" in keys:
+        if not isinstance(entry, Mapping) or "name" not in entry or "curve" in entry:
             more.append(entry)
             continue
-        if entry["name"] not in entries:
-            problem = f"{unknown(f'{what} of the drawing', entry['name'], entries)}; add one with curve = ..."
-            raise OptionError(problem, what=f"{what}s", found=entry["name"], expected=tuple(entries))
-        check_keys(entry, kind, f"{what} {entry['name']!r}")
-        entries[entry["name"]] |= entry
+        name = entry["name"]
+        if name not in entries:
+            problem = f"{unknown(f'{what} of the drawing', name, entries)}; add one with curve = ..."
+            raise OptionError(problem, what=f"{what}s", found=name, expected=tuple(entries))
+        check_keys(entry, kind, f"{what} {name!r}")
+        entries[name] |= entry
     return [*entries.values(), *more]
-
-
-def wall_tension(
-    curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], near: float, most: float, upright: bool
-) -> float:
-    """The tension of a wall between the parts near a curve; see ``balanced_wall``. An upright
-    one needs no difference of theirs."""
-    points = shapely.points(curve.at(len(curve.pieces) * (np.arange(SAMPLES) + 0.5) / SAMPLES)[:, :2])
-    neighbours: list[list[float]] = [[] for _ in points]
-    for point, part in zip(*parts.query(points, predicate="dwithin", distance=near), strict=True):
-        neighbours[point].append(tensions[part])
-    return balanced_wall([[min(found)] if upright and found else found for found in neighbours], most)

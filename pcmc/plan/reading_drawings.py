@@ -26,21 +26,20 @@ class Contents:
     """The entities of a drawing; refuses more than the limits."""
 
     def __init__(self, unit: int | str) -> None:
-        self.unit, self.count = unit, 0
+        self.points = 0
         self.entities: list[dict[str, Any]] = []
         self.others: dict[str, dict[str, int]] = {}
         self.hidden: dict[str, int] = {}
+        self.values = {"unit": unit, "entities": self.entities, "others": self.others, "hidden": self.hidden}
 
     def add(self, layer: str, kind: str, handle: str, **held: Any) -> None:
         """An entity that a plan may use."""
-        size = sum(len(piece[3] if piece[0] == "nurbs" else piece[1]) for piece in held.get("pieces", ()))
-        self.count += size
+        self.points += sum(len(piece[3 if piece[0] == "nurbs" else 1]) for piece in held.get("pieces", ()))
         if len(self.entities) >= MOST_ENTITIES:
             raise RuntimeError(f"more than {MOST_ENTITIES} entities; export the roof's layers alone")
-        if self.count > MOST_POINTS:
-            raise RuntimeError(
-                f"its curves have more than {MOST_POINTS} points; export the roof's layers alone"
-            )
+        if self.points > MOST_POINTS:
+            text = f"its curves have more than {MOST_POINTS} points; export the roof's layers alone"
+            raise RuntimeError(text)
         self.entities.append({"layer": layer, "kind": kind, "handle": handle, **held})
 
     def leave_out(self, layer: str, kind: str) -> None:
@@ -51,16 +50,6 @@ class Contents:
     def hide(self, layer: str) -> None:
         """An entity that its layer's state or its own hides."""
         self.hidden[layer] = self.hidden.get(layer, 0) + 1
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """All of it as plain values."""
-        return {
-            "unit": self.unit,
-            "entities": self.entities,
-            "others": self.others,
-            "hidden": self.hidden,
-        }
 
 
 def dxf_entities(path: str) -> dict[str, Any]:
@@ -226,8 +215,7 @@ def _rhino_pieces(rhino: Any, curve: Any) -> Iterator[tuple[Any, ...]]:
 
 def _rhino_arc(curve: Any, arc: Any) -> tuple[Any, ...]:
     """The piece of an arc or circle, from the start of its curve in the curve's direction."""
-    tangent = curve.TangentAt(curve.Domain.T0)
-    centre, start, along = (_xyz(p) for p in (arc.Center, curve.PointAtStart, tangent))
+    centre, start, along = map(_xyz, (arc.Center, curve.PointAtStart, curve.TangentAt(curve.Domain.T0)))
     length = math.hypot(*along) or 1.0
     quarter = [arc.Radius * value / length for value in along]
     return ("arc", [centre, [a - b for a, b in zip(start, centre, strict=True)], quarter], arc.AngleRadians)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError, MissingExtra, unknown
 from ..base.files import check_regular, system_error
-from ..base.units import unit_in_file
+from ..base.units import length_factor, unit_in_file
 from ..curves.curves import Curve
 from ..curves.pieces import Piece
 from ..io.libraries import read_arrays
@@ -53,8 +53,8 @@ class Strokes:
     note: str = ""
 
 
-def read_strokes(path: Path) -> Strokes:
-    """All strokes of a drawing.
+def read_strokes(path: Path, units: str = "") -> Strokes:
+    """All strokes of a drawing, in ``units``, such as "m", or in its own unit.
 
     Raises
     ------
@@ -71,23 +71,25 @@ def read_strokes(path: Path) -> Strokes:
     try:
         path.open("rb").close()
         contents = read_arrays("plan/reading_drawings.py", READERS[suffix], path)
-        strokes = [stroke for entity in contents["entities"] for stroke in _strokes(entity)]
+        unit, note = unit_in_file(contents["unit"])
+        factor = length_factor(unit, units)
+        strokes = [stroke for entity in contents["entities"] for stroke in _strokes(entity, factor)]
     except OSError as error:
         raise system_error(path, "read", error) from None
     except FileError as error:
         raise error.in_file(path, what=str(path)) from None
-    unit, note = unit_in_file(contents["unit"])
     return Strokes(unit, strokes, contents["others"], contents["hidden"], note)
 
 
-def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:
-    """The strokes of an entity: one, or several where its pieces do not follow each other."""
+def _strokes(entity: Mapping[str, Any], factor: float) -> list[Stroke]:
+    """The strokes of an entity, scaled: one, or several where its pieces do not follow each other."""
     label, layer = f"{entity['kind']} {entity['handle']}", entity["layer"]
     place = f"layer {layer!r}, {label}"
     if "point" in entity:
         text = entity.get("text")
         text = None if text is None else re.sub(r"\s+", " ", text).strip()[:200]
-        return [Stroke(layer, label, point=_coordinates([entity["point"]], layer, place)[0], text=text)]
+        point = factor * _coordinates([entity["point"]], layer, place)[0]
+        return [Stroke(layer, label, point=point, text=text)]
     runs: list[list[Piece]] = []
     before = np.zeros(3)
     for piece in (piece for raw in entity["pieces"] for piece in _pieces(raw, layer, place)):
@@ -96,9 +98,9 @@ def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:
         if not piece.sweep and np.ptp(piece.points, axis=0).max() <= 1e-14 * size:
             continue  # a point drawn twice in a polyline
         if runs and np.linalg.norm(before - ends[0]) <= ROUNDING * (size + 1.0):
-            runs[-1].append(piece)
+            runs[-1].append(replace(piece, points=factor * piece.points))
         else:
-            runs.append([piece])
+            runs.append([replace(piece, points=factor * piece.points)])
         before = ends[1]
     return [Stroke(layer, label, Curve(tuple(run))) for run in runs]
 

@@ -126,9 +126,8 @@ def finish(figure: Any, path: Path | None) -> Image:
         return image
     check_suffix(path)
     kind = os.path.splitext(path)[1].lower()
-    content = png(image) if kind == ".png" else _vector(figure, kind.removeprefix("."))
     with writing(path), atomic_write(path) as temporary:
-        temporary.write_bytes(content)
+        temporary.write_bytes(png(image) if kind == ".png" else _vector(figure, kind.removeprefix(".")))
     return image
 
 

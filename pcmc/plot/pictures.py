@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import math
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,11 +14,11 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.errors import MissingExtra
 from ..surface import Surface
 from ..surface.geometry import area_vectors
-from .colors import color_scale
-from .figure import INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new
-from .legend import add_legend
+from .colors import add_legend, color_scale
+from .figure import INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
 from .raster import paint
 from .scene import Drawing, View, mean_edge, scene, view_of
 
@@ -28,6 +30,7 @@ ViewName = str | tuple[float, float]
 MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
 EDGES_FROM = 9.0  # pixels: a mesh edge shorter than this is not drawn
 DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
+CELL_WIDTH = 700  # pixels of a picture in a notebook
 TALLEST = 1.1  # height of a picture at most, as a part of its width
 
 
@@ -37,18 +40,10 @@ def draw(
     *,
     view: ViewName = "diagonal",
     scalars: npt.ArrayLike | None = None,
-    label: str = "",
-    limits: tuple[float, float] | None = None,
-    cmap: str | None = None,
-    supports: bool = True,
-    edges: bool | None = None,
     numbers: npt.ArrayLike | None = None,
-    form: str = ".3f",
-    legend: bool = False,
-    patches: Sequence[str] | None = None,
     title: str = "",
     width: int = 900,
-    renderer: str = "auto",
+    **options: Any,
 ) -> Image:
     """A picture of a surface, in parallel projection.
 
@@ -78,24 +73,9 @@ def draw(
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
     """
-    return panel(
-        [surface],
-        path,
-        views=[view],
-        scalars=None if scalars is None else [scalars],
-        label=label,
-        limits=limits,
-        cmap=cmap,
-        supports=supports,
-        edges=edges,
-        patches=patches,
-        numbers=None if numbers is None else [numbers],
-        form=form,
-        legend=legend,
-        titles=[title] if title else (),
-        width=width,
-        renderer=renderer,
-    )
+    options |= {"scalars": None if scalars is None else [scalars], "titles": [title] if title else ()}
+    options["numbers"] = None if numbers is None else [numbers]
+    return panel([surface], path, views=[view], width=width, **options)
 
 
 def panel(
@@ -189,35 +169,36 @@ def _drawings(
     if not count:
         validate.refuse("surfaces", 0, "at least one surface")
     angles = isinstance(views, Sequence) and len(views) == 2 and not isinstance(views[0], str | Sequence)
-    if angles or isinstance(views, str):
-        views = [views] * count
+    given = {
+        "views": [views] * count if angles or isinstance(views, str) else views,
+        "titles": titles or [""] * count,
+        "scalars": [None] * count if scalars is None else scalars,
+        "numbers": [None] * count if numbers is None else numbers,
+        "patches": patches,
+    }
     if patches is None or all(isinstance(entry, str) for entry in patches):
-        patches = [patches] * count
-    columns = (
-        list(surfaces),
-        [view_of(*pair) for pair in zip(surfaces, _per_surface("views", views, count), strict=True)],
-        _per_surface("titles", titles, count) if len(titles) else [""] * count,
-        _arrays("scalars", scalars, surfaces, faces=True),
-        _arrays("numbers", numbers, surfaces, faces=False),
-        _per_surface("patches", patches, count),
-    )
-    return [Drawing(*row) for row in zip(*columns, strict=True)]
+        given["patches"] = [patches] * count
+    for name, entries in given.items():
+        if len(entries) != count:
+            validate.refuse(name, len(entries), f"{count}, one per surface")
+    drawings = []
+    for surface, view, title, *arrays, names in zip(surfaces, *given.values(), strict=True):
+        shapes = {"scalars": [(surface.n,), (surface.m,)], "numbers": [(surface.n,)]}
+        values = [None if array is None else np.asarray(array, dtype=float) for array in arrays]
+        for (name, allowed), array in zip(shapes.items(), values, strict=True):
+            if array is not None and array.shape not in allowed:
+                validate.refuse(name, array.shape, f"shape {' or '.join(map(str, allowed))}")
+        drawings.append(Drawing(surface, view_of(surface, view), title, values[0], values[1], names))
+    return drawings
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A rectangle of pixels and the picture coordinates in it.
+    """A rectangle of pixels and the picture coordinates in it."""
 
-    Attributes
-    ----------
-    size : width and height in pixels.
-    low : (2,) picture coordinates of the lower left corner.
-    scale : pixels per unit of length.
-    """
-
-    size: tuple[int, int]
-    low: Floats
-    scale: float
+    size: tuple[int, int]  # width and height in pixels
+    low: Floats  # (2,) picture coordinates of the lower left corner
+    scale: float  # pixels per unit of length
 
     def show(self, axes: Any, image: Image) -> None:
         """Place a painted scene on the axes, pixel on pixel."""
@@ -278,23 +259,18 @@ def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, for
         text.set_path_effects([withStroke(linewidth=1.4, foreground="white")])
 
 
-def _per_surface(name: str, entries: Any, count: int) -> list[Any]:
-    if len(entries) != count:
-        validate.refuse(name, len(entries), f"{count}, one per surface")
-    return list(entries)
+def cell_html(value: Any) -> str:
+    """A picture of a surface, or of the one in a result, above its ``repr``; without ``plot`` the text alone.
 
-
-def _arrays(
-    name: str, given: Sequence[npt.ArrayLike | None] | None, surfaces: Sequence[Surface], faces: bool
-) -> list[Floats | None]:
-    """One float array or None per surface, of length n (or m, where ``faces``)."""
-    if given is None:
-        return [None] * len(surfaces)
-    result: list[Floats | None] = []
-    for values, surface in zip(_per_surface(name, given, len(surfaces)), surfaces, strict=True):
-        array = None if values is None else np.asarray(values, dtype=float)
-        shapes = [(surface.n,), (surface.m,)] if faces else [(surface.n,)]
-        if array is not None and array.shape not in shapes:
-            validate.refuse(name, array.shape, f"shape {' or '.join(map(str, shapes))}")
-        result.append(array)
-    return result
+    >>> from pcmc import Patch
+    >>> one = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a<b", 1.0)], fixed=[0])
+    >>> "a&lt;b" in cell_html(one), cell_html(one).count("<img")
+    (True, 1)
+    """
+    text = f"<pre>{html.escape(repr(value))}</pre>"
+    try:
+        surface = value if isinstance(value, Surface) else value.surface
+        image = draw(surface, width=CELL_WIDTH, legend=True)
+    except MissingExtra:
+        return text
+    return f'<img alt="surface" src="data:image/png;base64,{b64encode(png(image)).decode()}">{text}'

@@ -20,7 +20,7 @@ from ..surface.geometry import area_vectors
 
 NO_VALUE = "#D9D9D9"
 FIXED_DOT, SLIDING_DOT = "#C8102E", "#1F4FBF"
-LINE = "#303030"
+LINE, MESH_LINE = "#303030", "#585858"
 
 VIEWS = {"diagonal": (-60.0, 28.0), "elevation": (-90.0, 0.0), "plan": (-90.0, 90.0)}
 CELLS_UP_TO = 20_000  # triangles; above, a vertex's own cell is smaller than a pixel or two
@@ -64,21 +64,14 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """One surface of a picture: where it is seen from and what is shown on it.
-
-    Attributes
-    ----------
-    values : (n,) or (m,), shown as colours.
-    numbers : (n,), printed at the vertices.
-    patches : the names of those to draw; None: all.
-    """
+    """One surface of a picture: where it is seen from and what is shown on it."""
 
     surface: Surface
     view: View
     title: str
-    values: Floats | None
-    numbers: Floats | None
-    patches: Sequence[str] | None
+    values: Floats | None  # (n,) or (m,), shown as colours
+    numbers: Floats | None  # (n,), printed at the vertices
+    patches: Sequence[str] | None  # the names of those to draw; None: all
 
     @property
     def shown(self) -> Bools:
@@ -98,23 +91,18 @@ class Drawing:
 class Scene:
     """Everything that a painter needs.
 
-    Attributes
-    ----------
-    corners : (t,3,3) triangles; colors : (t,3,3) RGB of their corners, 0..1.
-    segments : (s,2,3); widths (s,), in pixels; shades (s,3) RGB.
-    dots : (d,3); dot_colors (d,3) RGB.
-    order : (t + s + d,) indices into triangles, then segments, then dots, farthest first: a
-        triangle is as near as its middle, what lies on triangles as near as the nearest of them.
+    ``order`` (t + s + d,) numbers triangles, then segments, then dots, farthest first: a triangle is as near
+    as its middle, what lies on triangles as near as the nearest of them.
     """
 
     view: View
-    corners: Floats
-    colors: Floats
-    segments: Floats
-    widths: Floats
-    shades: Floats
-    dots: Floats
-    dot_colors: Floats
+    corners: Floats  # (t,3,3) triangles
+    colors: Floats  # (t,3,3) RGB of their corners, 0..1
+    segments: Floats  # (s,2,3)
+    widths: Floats  # (s,), in pixels
+    shades: Floats  # (s,3) RGB
+    dots: Floats  # (d,3)
+    dot_colors: Floats  # (d,3) RGB
     order: Ints
 
 
@@ -134,28 +122,41 @@ def scene(
     shown = np.ones(surface.m, dtype=bool)
     if patches is not None:
         shown = surface.patch_faces([surface.patch_index(name) for name in patches])
-    F = surface.faces[shown]
+    F, topo = surface.faces[shown], surface.topology
     P = surface.vertices[F]
     near = view.depth(P).mean(axis=1)
-    light = _light(_normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.08)
+    light = _light(surface, shown, view, 0.45 if values is None else 0.08, smooth=not edges)
     if values is None:
-        base = patch_colors(surface)[surface.patch_of_face[shown]]
-    elif len(values) == surface.m and surface.m != surface.n:
-        base = np.where(np.isnan(values), rgb(NO_VALUE), values)[shown]
+        colors = patch_colors(surface)[surface.patch_of_face[shown]][:, None] * light[..., None]
     else:
-        base = _mean_known(values, F)
-    colors, triangles_near = base[:, None] * light[..., None], near
-    if values is not None and len(values) == surface.n and len(F) <= CELLS_UP_TO:
+        of_vertices = len(values) == surface.n
         known = np.where(np.isnan(values), rgb(NO_VALUE), values)
-        P, colors = _cells(P, known[F], light)
-        triangles_near = np.tile(near, 6)
-    chosen, ends, widths, shades = _segments(surface, view, edges, shown)
-    held, points, kinds = _dots(surface, view, supports, F)
-    topo = surface.topology
-    edges_near = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
-    depth = np.concatenate([triangles_near, edges_near, _nearest(surface.n, F, near)[held]])
-    order = np.argsort(depth, kind="stable")
-    return Scene(view, P, np.clip(colors, 0.0, 1.0), ends, widths, shades, points, kinds, order)
+        if of_vertices and len(F) <= CELLS_UP_TO:
+            P, colors = _cells(P, known[F], light)
+        else:
+            base = _mean_known(values[F]) if of_vertices else known[shown]
+            colors = base[:, None] * light[..., None]
+    there = np.zeros(len(topo.edges), dtype=bool)
+    there[topo.edge_of_face[shown]] = True
+    chosen = np.flatnonzero(there & (topo.curve_edge | edges))
+    heavy = topo.curve_edge[chosen]
+    ends = surface.vertices[topo.edges[chosen]] + LIFT * surface.size * view.axes[2]
+    seen = np.zeros(surface.n, dtype=bool)
+    seen[F] = supports
+    held = np.flatnonzero(seen & surface.held)
+    edge_depth = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
+    depth = [np.tile(near, len(P) // max(len(F), 1)), edge_depth, _nearest(surface.n, F, near)[held]]
+    return Scene(
+        view,
+        P,
+        np.clip(colors, 0.0, 1.0),
+        ends,
+        np.where(heavy, 1.6, 0.6),
+        np.where(heavy[:, None], rgb(LINE), rgb(MESH_LINE)),
+        surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2],
+        np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT)),
+        np.argsort(np.concatenate(depth), kind="stable"),
+    )
 
 
 def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
@@ -165,28 +166,25 @@ def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
     return result
 
 
-def _light(normals: Floats, view: View, strength: float) -> Floats:
-    """(…) brightness of a matt sheet seen from either side, lit from above the viewer's left."""
-    seen = normals @ view.axes.T
-    seen = seen * np.where(seen[..., 2:] < 0.0, -1.0, 1.0)
-    source = np.array([-0.35, 0.50, 0.79])
-    lambert = np.maximum(seen @ (source / np.linalg.norm(source)), 0.0)
-    return 1.03 - strength * (1.0 - lambert)
+def _light(surface: Surface, shown: Bools, view: View, strength: float, smooth: bool) -> Floats:
+    """(t,3) brightness at the corners of a matt sheet seen from either side, lit from above the left.
 
-
-def _normals(surface: Surface, smooth: bool) -> Floats:
-    """(m,3,3) unit normals at the corners: the face's, or the mean at the vertex in its patch."""
-    X, F = surface.vertices, surface.faces
-    area = area_vectors(X[F])
+    The normals are the faces', or if ``smooth`` their means at each vertex in its patch.
+    """
+    F = surface.faces
+    area = area_vectors(surface.vertices[F])
+    normal = np.repeat(area[:, None], 3, axis=1)
     if smooth:
         key = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
         inverse = np.unique(key, return_inverse=True)[1].ravel()
         total = np.stack([np.bincount(inverse, np.repeat(a, 3)) for a in area.T], axis=1)
         normal = total[inverse].reshape(-1, 3, 3)
-    else:
-        normal = np.repeat(area[:, None], 3, axis=1)
     length = np.linalg.norm(normal, axis=2, keepdims=True)
-    return normal / np.where(length > 0.0, length, 1.0)
+    seen = (normal / np.where(length > 0.0, length, 1.0))[shown] @ view.axes.T
+    seen = seen * np.where(seen[..., 2:] < 0.0, -1.0, 1.0)
+    source = np.array([-0.35, 0.50, 0.79])
+    lambert = np.maximum(seen @ (source / np.linalg.norm(source)), 0.0)
+    return 1.03 - strength * (1.0 - lambert)
 
 
 def _cells(P: Floats, known: Floats, light: Floats) -> tuple[Floats, Floats]:
@@ -205,36 +203,12 @@ def _cells(P: Floats, known: Floats, light: Floats) -> tuple[Floats, Floats]:
     return np.concatenate(corners), np.concatenate(colors)
 
 
-def _mean_known(values: Floats, faces: Ints) -> Floats:
-    """(m,3) mean of the corners' colours that exist."""
-    corner = values[faces]
+def _mean_known(corner: Floats) -> Floats:
+    """(m,3) mean of the corners' colours (m,3,3) that exist."""
     there = ~np.isnan(corner[..., :1])
     count = there.sum(axis=1)
     total = np.where(there, corner, 0.0).sum(axis=1)
     return np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
-
-
-def _segments(surface: Surface, view: View, edges: bool, shown: Bools) -> tuple[Ints, Floats, Floats, Floats]:
-    """Indices of the edges to draw, their ends, widths and colours."""
-    topo = surface.topology
-    curve = topo.curve_edge
-    there = np.zeros(len(curve), dtype=bool)
-    there[topo.edge_of_face[shown]] = True
-    chosen = np.flatnonzero(there & (curve | edges))
-    ends = surface.vertices[topo.edges[chosen]] + LIFT * surface.size * view.axes[2]
-    heavy = curve[chosen]
-    shades = np.where(heavy[:, None], rgb(LINE), rgb("#585858"))
-    return chosen, ends, np.where(heavy, 1.6, 0.6), shades
-
-
-def _dots(surface: Surface, view: View, supports: bool, faces: Ints) -> tuple[Ints, Floats, Floats]:
-    """Indices of the supported vertices to draw, where, and their colours."""
-    there = np.zeros(surface.n, dtype=bool)
-    there[faces] = supports
-    held = np.flatnonzero(there & surface.held)
-    points = surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2]
-    colors = np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
-    return held, points, colors
 
 
 def mean_edge(surface: Surface) -> float:

@@ -1,38 +1,22 @@
 """A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
-Gives ``load``, ``opened``, ``designed`` and ``run`` to sweep, page and command. May import ``plot`` and the
-rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), its ``Start``, an ``Outcome``
-(``designed``), and files (``run``); each is a value, made once. A drawing or a mesh alone is a project, too.
+A file becomes a ``Project`` (``load``, which meshes nothing), its ``Start``, an ``Outcome`` (``designed``),
+and files (``run``); each is a value, made once. A drawing or a mesh alone is a project, too. Gives these to
+sweep, page and command. May import ``plot`` and the subpackages below it.
 
-``designed(path)`` is the roof that a project describes, from a cache if it was solved before.
-``opened(path)`` is what is in any file: the designed roof of a project, or a surface as it is.
+``sections()`` lists every key of a project file; ``reference()`` prints the list; ``opened(path)`` is what is
+in any file. A short one::
 
-``sections()`` lists every section and key of a project file; ``reference()`` prints the list::
-
-    units = "m"               # optional: of lengths; and of forces
-    force = "kN"
-
+    units = "m"
     [plan]
     edge_length = 1.0
     outline = [[0, 0], [8, 0], [8, 4], [0, 4]]
     patches = {roof = {tension = 3.0}}
-
-    [solve]                   # the solver and its options
-    target = "minimum"
-
-    [remesh]                  # optional
-    edge_length = 0.5
-    when = "after"            # solved, remeshed, solved again; or "before" solving
-
-    [targets]                 # optional
+    [targets]
     meet = [{quantity = "apex", of = "roof", value = 1.0}]
     vary = ["roof"]
-
     [output]
     files = ["roof.obj", "roof.glb"]
-    picture = "roof.png"
-    drawings = ["roof.dxf"]
-    report = "roof.pdf"
 """
 
 from .cache import cached_files
@@ -40,10 +24,9 @@ from .cache import clear as clear_cache
 from .cache import folder as cache_folder
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, load, project_of, read_data, with_rise
-from .keys import REQUIRED, Key, Section, sections
-from .manual import json_schema, reference
+from .keys import json_schema, reference, sections
 from .outcome import MOST_CHECKED, Outcome
-from .output import FileJobs, OnStep, check_outputs, paint, schedule_jobs, write_all
+from .output import OnStep, check_outputs, paint, schedule_jobs, write_all
 from .planning import drawing_reference, project_text, proposal_text
 from .running import designed, opened, run, run_project, surface_files, vertex_fields
 from .settings import (
@@ -62,16 +45,12 @@ from .varied import check_varied, digest, varied
 
 __all__ = [
     "AccuracyWanted",
-    "FileJobs",
-    "Key",
     "MOST_CHECKED",
     "OnStep",
     "Outcome",
     "Output",
     "Project",
-    "REQUIRED",
     "Remeshing",
-    "Section",
     "Start",
     "Structure",
     "build",

@@ -27,14 +27,13 @@ from ..base.files import atomic_write, read_bytes
 from ..base.units import Units
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
-from ..surface import Surface
 from ..surface.surface import FIELDS
 from .file import Project
 from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = (
+PARTS = [
     "plan",
     "mesh",
     "method",
@@ -45,7 +44,8 @@ PARTS = (
     "targets",
     "vary",
     "target_tolerance",
-)
+]
+NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a result
 
 
 def folder() -> Path | None:
@@ -63,10 +63,8 @@ def folder() -> Path | None:
 def cached_files() -> list[Path]:
     """The files of the cache, the one used longest ago first."""
     place = folder()
-    if place is None:
-        return []
     with suppress(OSError):
-        return sorted(place.glob("*.pcmc"), key=lambda path: path.stat().st_mtime_ns)
+        return sorted(place.glob("*.pcmc"), key=lambda path: path.stat().st_mtime_ns) if place else []
     return []
 
 
@@ -85,13 +83,23 @@ def cached(project: Project) -> Outcome | None:
     path = _path(project)
     if path is None or not path.is_file():
         return None
-    try:
+    with suppress(PcmcError, OSError, KeyError, ValueError, TypeError):
         data = io.load(path)
-        outcome = _outcome(project, data.certificate, to_surface(data))
+        values, surface = data.certificate, to_surface(data)
+        solve = {name: values[name] for name in NUMBERS}
+        result, design = Result(surface, Status[values["status"]], rows=(), **solve), None
+        if given := values.get("design"):
+            from ..design import Design, DesignStatus
+
+            targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
+            status, history = DesignStatus[given["status"]], pd.DataFrame()
+            design = Design(status, result, targets, parameters, given["solves"], history=history)
+        units = Units(*values["units"]) if project.plan is None else project.units
+        notes = values.get("notes", ())
+        outcome = Outcome(result, design=design, units=units, cached=True, notes=notes)
         os.utime(path)
-    except (PcmcError, OSError, KeyError, ValueError, TypeError):
-        return None
-    return outcome
+        return outcome
+    return None
 
 
 def keep(project: Project, outcome: Outcome) -> None:
@@ -99,52 +107,23 @@ def keep(project: Project, outcome: Outcome) -> None:
     path = _path(project)
     if path is None or not outcome.good:
         return
-    with suppress(OSError, PcmcError, LostWarning), warnings.catch_warnings():
-        warnings.simplefilter("error", LostWarning)  # a surface that the file cannot hold is not kept
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_write(path) as temporary:
-            io.write(temporary, outcome.surface, certificate=_values(outcome))
-            if not _same(outcome.surface, to_surface(io.load(temporary))):
-                raise FileError("the file does not hold all of the surface")
-        for old in cached_files()[:-MOST]:
-            old.unlink(missing_ok=True)
-
-
-def _same(one: Surface, other: Surface) -> bool:
-    """Whether two surfaces are equal to the last bit: the file holds all of it."""
-    return all(b"".join(_pieces(getattr(one, f))) == b"".join(_pieces(getattr(other, f))) for f in FIELDS)
-
-
-def _values(outcome: Outcome) -> dict[str, Any]:
-    """All of an outcome but its surface, as numbers and texts."""
-    result, design = outcome.solved, outcome.design
-    names = ("method", "energy", "iterations", "evaluations", "note")
-    values: dict[str, Any] = {name: getattr(result, name) for name in names}
-    values["status"] = result.status.name
-    values["notes"] = list(outcome.notes)
+    result, design, surface = outcome.solved, outcome.design, outcome.surface
+    values: dict[str, Any] = {name: getattr(result, name) for name in NUMBERS}
+    values |= {"status": result.status.name, "notes": list(outcome.notes)}
     values["units"] = [outcome.units.length, outcome.units.force]
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
-    return values
-
-
-def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outcome:
-    """The outcome again."""
-    names = ("method", "energy", "iterations", "evaluations")
-    solve = {name: values[name] for name in names}
-    result = Result(surface, Status[values["status"]], rows=(), note=values["note"], **solve)
-    design = None
-    if "design" in values:
-        from ..design import Design, DesignStatus
-
-        given = values["design"]
-        targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
-        status, solves = DesignStatus[given["status"]], given["solves"]
-        design = Design(status, result, targets, parameters, solves, history=pd.DataFrame())
-    notes = values.get("notes", ())
-    units = Units(*values["units"]) if project.plan is None else project.units
-    return Outcome(result, design=design, units=units, cached=True, notes=notes)
+    with suppress(OSError, PcmcError, LostWarning), warnings.catch_warnings():
+        warnings.simplefilter("error", LostWarning)  # a surface that the file cannot hold is not kept
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(path) as temporary:
+            io.write(temporary, surface, certificate=values)
+            back = to_surface(io.load(temporary))
+            if any(_bytes(getattr(surface, f)) != _bytes(getattr(back, f)) for f in FIELDS):
+                raise FileError("the file does not hold all of the surface")
+        for old in cached_files()[:-MOST]:
+            old.unlink(missing_ok=True)
 
 
 def _path(project: Project) -> Path | None:
@@ -155,8 +134,8 @@ def _path(project: Project) -> Path | None:
     sha = hashlib.sha256(_program().encode())
     try:
         for name in PARTS:
-            for part in _pieces(getattr(project, name)):
-                sha.update(part)
+            sha.update(_bytes(getattr(project, name)))
+        sha.update(_bytes(project.target_tolerance))
         if project.mesh is not None:
             sha.update(read_bytes(project.path.parent / project.mesh.file))
             sha.update(repr(project.units).encode())
@@ -170,6 +149,10 @@ def _program() -> str:
     """The version of pcmc, and the time of its newest file for those who change it."""
     newest = max(path.stat().st_mtime_ns for path in Path(__file__).parents[1].rglob("*.py"))
     return f"pcmc {version('pcmc-surfaces')} {newest}\n"
+
+
+def _bytes(value: Any) -> bytes:
+    return b"".join(_pieces(value))
 
 
 def _pieces(value: Any) -> Iterator[bytes]:

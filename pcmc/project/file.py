@@ -20,7 +20,7 @@ from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from .checking import check_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
@@ -122,7 +122,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
     elif project.drawing is None and project.plan is not None:
         corners = project.plan.outline.at(project.plan.outline.dense)
         width = float(np.ptp(corners, axis=0).max())
-        for note in filter(None, (size_note(width, project.units.length), mast_note(project.plan))):
+        for note in filter(None, (mast_note(project.plan), size_note(width, project.units.length))):
             warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 

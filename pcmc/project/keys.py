@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
@@ -19,7 +20,7 @@ from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 from ..surface import Plane
 from .settings import COLOURS, PATCH_KEYS, WHEN, AccuracyWanted, MeshFile, Output, Remeshing
 
@@ -82,6 +83,33 @@ _TYPES: dict[str, Any] = {
     "object": Mapping,
 }
 _KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}
+_NAMES_OF_KIND = {
+    "a curve": ("outline", "curve"),
+    "a list of curves or tables": ("dividers", "holes", "mirrors"),
+    "a list of points and curves": ("supports",),
+    "a list of tables": ("cables",),
+    "a table": ("plane", "rooms", "points", "patches", "wind", "accuracy"),
+    WALL: ("wall",),
+    "a point [x, y] or a list of points": ("at",),
+    "a list of names": ("files", "drawings"),
+    "a text": ("picture", "panels", "structure", "report"),
+    "a name or two angles": ("view",),
+    "a list of views": ("views",),
+    "a name or a point [x, y]": ("of",),
+    "a name or a list of names": ("patch",),
+}
+_KIND_OF_NAME = {name: kind for kind, names in _NAMES_OF_KIND.items() for name in names}
+_CHOICES: dict[str, Sequence[str]] = {
+    "edge": EDGES,
+    "bottom": BOTTOMS,
+    "units": LENGTHS,
+    "when": WHEN,
+    "colour": COLOURS,
+    "sheet": tuple(FORMATS),
+    "accuracy_of": ACCURACY_OF,
+    "target": ("minimum", "stationary"),
+    "armijo": ("printed", "sufficient"),
+}
 
 
 def fits(value: Any, schema: Schema) -> bool:
@@ -105,71 +133,49 @@ def fits(value: Any, schema: Schema) -> bool:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a project file.
-
-    Attributes
-    ----------
-    name : in its section.
-    kind : what its value may be, such as "a number"; one of ``KINDS``.
-    default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
-    help : what it means.
-    choices : the texts that are allowed; empty if any is.
-    unless : the keys that may stand for a required one.
-    """
+    """A key of a project file."""
 
     name: str
-    kind: str
-    default: Any
+    kind: str  # one of ``KINDS``
+    default: Any  # where the key is left out; ``REQUIRED`` if it must not be, None for none
     help: str
-    choices: tuple[str, ...] = ()
-    unless: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()  # the texts that are allowed; empty if any is
+    unless: tuple[str, ...] = ()  # the keys that may stand for a required one
 
 
 @dataclass(frozen=True)
 class Section:
-    """A table of a project file.
+    """A table of a project file."""
 
-    Attributes
-    ----------
-    name : as in TOML, such as "plan.holes"; NAME stands for any name, "" is the file itself.
-    help : what it is for.
-    keys : all that it may have.
-    condition : when these are its keys; empty for always.
-    """
-
-    name: str
+    name: str  # as in TOML, such as "plan.holes"; NAME stands for any name, "" is the file itself
     help: str
     keys: tuple[Key, ...] = field(repr=False)
-    condition: str = ""
+    condition: str = ""  # when these are its keys; empty for always
 
     def is_curve(self, table: Mapping[str, Any]) -> bool:
         """Whether the table of a divider or hole is a curve itself."""
         return self.name in OR_CURVE and "curve" not in table and any(name in CURVES for name in table)
 
 
-def _of_class(cls: Any, **about: str | Sequence[str]) -> tuple[Key, ...]:
+def _of_class(cls: Any, **special: str | Sequence[str]) -> tuple[Key, ...]:
     """A key for each field of a dataclass: its default, and its sentence from the docstring.
 
-    ``about`` has the kinds that types do not tell, and the choices of texts.
+    ``special`` are kinds and choices of names that have others elsewhere.
     """
     help_of: dict[str, str] = {}
     for entry in re.finditer(r"^([\w, ]+) : (.*(?:\n    .*)*)", cleandoc(cls.__doc__ or ""), re.M):
         help_of.update(dict.fromkeys(entry[1].split(", "), " ".join(entry[2].split())))
     keys = []
     for f in fields(cls):
-        given = about.get(f.name, ())
-        kind = (
-            given
-            if isinstance(given, str) and given
-            else _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"))
-        )
+        about = special.get(f.name) or _KIND_OF_NAME.get(f.name) or _CHOICES.get(f.name, ())
+        usual = _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"), "a value")
+        kind, choices = (about, ()) if isinstance(about, str) else (usual, tuple(about))
         default = None if f.default_factory is not MISSING else f.default
-        choices = () if isinstance(given, str) else tuple(given)
-        keys.append(Key(f.name, kind or "a value", default, help_of.get(f.name, ""), choices))
+        keys.append(Key(f.name, kind, default, help_of.get(f.name, ""), choices))
     return tuple(keys)
 
 
-def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
+def _rise_keys(how: str, names: Sequence[str] = RISES) -> tuple[Key, ...]:
     """Keys for the height of a roof, from which its tension is found."""
     meanings = {
         "rise": "the height over a level outline",
@@ -179,137 +185,59 @@ def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
     return tuple(Key(name, "a number", None, f"{meanings[name]}, {how}") for name in names)
 
 
-def _plan_keys() -> tuple[Key, ...]:
-    """The keys of [plan]: those of a Plan, and the drawing that may stand for its lines."""
-    curves, tables = "a list of curves or tables", "a list of tables"
-    outline, *others = _of_class(
-        Plan,
-        outline="a curve",
-        dividers=curves,
-        holes=curves,
-        patches="a table",
-        edge=EDGES,
-        supports="a list of points and curves",
-        plane="a table",
-        cables=tables,
-        mirrors=curves,
-        rooms="a table",
-        points="a table",
-    )
-    drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
-    gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
-    return (
-        replace(outline, unless=("drawing",)),
-        Key("drawing", "a text", None, drawing),
-        Key("gap", "a number", None, gap),
-        *others,
-        *_rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:]),
-    )
-
-
 @cache
 def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
-    area = _of_class(PatchSpec, at="a point [x, y] or a list of points")
-    mesh = _of_class(
-        MeshFile,
-        file="a text",
-        units=LENGTHS,
-        tension="a number",
-        patches="a table",
-        supports="a name or a list",
+    root = (
+        Key("units", "a text", None, "of lengths: plan, heights, files and pictures", LENGTHS),
+        Key("force", "a text", None, "of forces; tensions are in ``force`` / ``units``", FORCES),
+        Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan", unless=("mesh",)),
+        Key("mesh", "a name or a table", None, "the roof, by the triangles in a file beside it"),
+        Key("solve", "a table", None, "the solver and its options"),
+        Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
+        Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
+        Key("structure", "a table", None, "material, thickness and loads of the structural model"),
+        Key("output", "a table", None, "the files, the picture and the documents to write"),
     )
-    wall = Key("wall", "true or false", None, "whether it is a wall between rooms")
-    output = _of_class(
-        Output,
-        files="a list of names",
-        picture="a text",
-        view="a name or two angles",
-        views="a list of views",
-        colour=COLOURS,
-        drawings="a list of names",
-        sheet=tuple(FORMATS),
-        panels="a text",
-        structure="a text",
-        report="a text",
+    drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
+    gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
+    outline, *others = _of_class(Plan)
+    plan = [replace(outline, unless=("drawing",)), Key("drawing", "a text", None, drawing)]
+    plan += [Key("gap", "a number", None, gap), *others]
+    plan += _rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:])
+    specs = [key for key in _of_class(PatchSpec) if key.name != "name"]
+    patch = [replace(key, unless=RISES) if key.name == "tension" else key for key in specs]
+    patch += _rise_keys("instead of a tension, which is found")
+    plane = (
+        Key("point", "a point [x, y, z]", Plane().point, "a point of Π"),
+        Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
     )
+    mesh = [key for key in _of_class(MeshFile, supports="a name or a list") if key.name != "rises"]
+    mesh += _rise_keys("found by one tension of all patches under pressure")
+    mesh_patch = [replace(key, default=None) for key in specs if key.name in PATCH_KEYS]
+    mesh_patch.append(Key("wall", "true or false", None, "whether it is a wall between rooms"))
+    rooms, cables = _of_class(RoomData, patches="a list of names"), _of_class(CableLine)
+    help_of = {
+        "divider": "A line between patches, with a wall below it. A curve alone is a divider, too.",
+        "cable": "A part of the outline or of a hole that is free and carries a cable.",
+        "remesh": "Other triangles, before or after solving; [[remesh]] if there are several.",
+        "structure": "The structural model that `pcmc structure` writes, in the units of the surface.",
+        "output": "What to write: all of it, or nothing. Without it nothing is written.",
+    }
     return (
-        Section(
-            "",
-            "The file: a plan and what to do with it.",
-            (
-                Key("units", "a text", None, "of lengths: plan, heights, files and pictures", LENGTHS),
-                Key("force", "a text", None, "of forces; tensions are in ``force`` / ``units``", FORCES),
-                Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan", unless=("mesh",)),
-                Key("mesh", "a name or a table", None, "the roof, by the triangles in a file beside it"),
-                Key("solve", "a table", None, "the solver and its options"),
-                Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
-                Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
-                Key("structure", "a table", None, "material, thickness and loads of the structural model"),
-                Key("output", "a table", None, "the files, the picture and the documents to write"),
-            ),
-        ),
-        Section("plan", "The roof, by the lines of its plan.", _plan_keys()),
-        Section(
-            "plan.patches.NAME",
-            "A patch; NAME is its name.",
-            (
-                *(replace(k, unless=RISES) if k.name == "tension" else k for k in area if k.name != "name"),
-                *_rise_keys("instead of a tension, which is found", RISES),
-            ),
-        ),
-        Section(
-            "plan.dividers",
-            "A line between patches, with a wall below it. A curve alone is a divider, too.",
-            _of_class(Divider, curve="a curve", wall=WALL, bottom=BOTTOMS),
-        ),
-        Section(
-            "plan.holes",
-            "An opening. A curve alone is a hole, too.",
-            _of_class(Hole, curve="a curve", edge=EDGES),
-        ),
-        Section(
-            "plan.cables",
-            "A part of the outline or of a hole that is free and carries a cable.",
-            _of_class(CableLine, curve="a curve", tension="a number"),
-        ),
-        Section(
-            "plan.rooms.NAME",
-            "A room under several patches; NAME is its name.",
-            _of_class(RoomData, patches="a list of names"),
-        ),
-        Section(
-            "plan.plane",
-            "The plane Π.",
-            (
-                Key("point", "a point [x, y, z]", Plane().point, "a point of Π"),
-                Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
-            ),
-        ),
-        Section(
-            "mesh",
-            "The roof, by the triangles in a file.",
-            (
-                *(key for key in mesh if key.name != "rises"),
-                *_rise_keys("found by one tension of all patches under pressure", RISES),
-            ),
-        ),
-        Section(
-            "mesh.patches.NAME",
-            "A patch of the mesh; NAME is its name.",
-            (*(replace(key, default=None) for key in area if key.name in PATCH_KEYS), wall),
-        ),
-        Section(
-            "remesh",
-            "Other triangles, before or after solving; [[remesh]] if there are several.",
-            _of_class(Remeshing, when=WHEN),
-        ),
-        Section(
-            "structure",
-            "The structural model that `pcmc structure` writes, in the units of the surface.",
-            _of_class(Structure, young="a number", wind="a table"),
-        ),
-        Section("output", "What to write: all of it, or nothing. Without it nothing is written.", output),
+        Section("", "The file: a plan and what to do with it.", root),
+        Section("plan", "The roof, by the lines of its plan.", tuple(plan)),
+        Section("plan.patches.NAME", "A patch; NAME is its name.", tuple(patch)),
+        Section("plan.dividers", help_of["divider"], _of_class(Divider)),
+        Section("plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole)),
+        Section("plan.cables", help_of["cable"], cables),
+        Section("plan.rooms.NAME", "A room under several patches; NAME is its name.", rooms),
+        Section("plan.plane", "The plane Π.", plane),
+        Section("mesh", "The roof, by the triangles in a file.", tuple(mesh)),
+        Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", tuple(mesh_patch)),
+        Section("remesh", help_of["remesh"], _of_class(Remeshing)),
+        Section("structure", help_of["structure"], _of_class(Structure)),
+        Section("output", help_of["output"], _of_class(Output)),
     )
 
 
@@ -325,10 +253,9 @@ def solve_section(method: str) -> Section:
     help = "The solver and its options."
     if method not in METHODS:
         return Section("solve", help, keys)
-    target, armijo = ("minimum", "stationary"), ("printed", "sufficient")
-    keys += _of_class(find_method(method).options, target=target, armijo=armijo)
+    keys += _of_class(find_method(method).options)
     if method == "newton":
-        keys += _of_class(AccuracyWanted, accuracy="a table", accuracy_of=ACCURACY_OF)
+        keys += _of_class(AccuracyWanted)
     return Section("solve", help, keys, f'method = "{method}"')
 
 
@@ -340,8 +267,8 @@ def target_sections() -> tuple[Section, ...]:
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
     from ..design.targets import SHORT
 
-    wanted = _of_class(Target, of="a name or a point [x, y]", quantity=(*MEASURES, *SHORT))
-    changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)
+    wanted = _of_class(Target, quantity=(*MEASURES, *SHORT))
+    changing = _of_class(Parameter, kind=KINDS_OF_PARAMETER)
     return (
         Section(
             "targets",
@@ -382,3 +309,69 @@ def sections() -> tuple[Section, ...]:
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), CURVE)
+
+
+def reference() -> str:
+    """All sections and keys as Markdown, a table for each section."""
+    lines = []
+    for section in sections():
+        condition = f" with `{section.condition}`" if section.condition else ""
+        title = (
+            f"`{section.name}`"
+            if section is CURVE
+            else f"`[{section.name}]`"
+            if section.name
+            else "First lines"
+        )
+        lines += [f"## {title}{condition}", "", section.help, ""]
+        lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
+        for key in section.keys:
+            value = ", ".join(f'`"{c}"`' for c in key.choices) or key.kind
+            shown = json.dumps(key.default, ensure_ascii=False) if _has_default(key) else ""
+            default = "required" if key.default is REQUIRED else shown and f"`{shown}`"
+            meaning = key.help.replace("``", "`").replace("|", "\\|")
+            lines.append(f"| `{key.name}` | {value} | {default} | {meaning} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _has_default(key: Key) -> bool:
+    return key.default is not None and key.default is not REQUIRED and key.default != ()
+
+
+def json_schema() -> Schema:
+    """The JSON Schema of a project file, from which editors complete keys and show what they mean.
+
+    A key of [solve] may be that of any method.
+
+    >>> json_schema()["properties"]["plan"]["properties"]["edge_length"]["type"]
+    'number'
+    """
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "pcmc project", **_table("")}
+
+
+def _table(name: str) -> Schema:
+    """The schema of a section, with those below it."""
+    known = [section for section in sections() if section.name == name]
+    keys = [*(key for section in known for key in section.keys), *(CURVE.keys if name in OR_CURVE else ())]
+    properties: Schema = {}
+    for key in keys:
+        place = f"{name}.{key.name}".lstrip(".")
+        below = {section.name for section in sections()} & {place, f"{place}.NAME"}
+        entry = KINDS[key.kind]
+        for one in below:
+            inner = _table(one)
+            entry = _filled(entry, inner if one == place else TABLE | {"additionalProperties": inner})
+        entry = entry | {"description": key.help.replace("``", "`")}
+        entry |= {"enum": list(key.choices)} if key.choices else {}
+        properties[key.name] = entry | ({"default": key.default} if _has_default(key) else {})
+    return TABLE | {"description": known[0].help, "properties": properties, "additionalProperties": False}
+
+
+def _filled(schema: Schema, table: Schema) -> Schema:
+    """The schema of a kind, with the keys of the tables in it."""
+    if schema == TABLE:
+        return table
+    parts: Schema = {key: _filled(value, table) for key, value in schema.items() if key == "items"}
+    parts |= {key: [_filled(one, table) for one in value] for key, value in schema.items() if key == "anyOf"}
+    return schema | parts

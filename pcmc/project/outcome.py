@@ -203,30 +203,17 @@ class Outcome:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
         from ..drawings import drawing_set
 
-        surface, certificate = self.shown
-        return drawing_set(
-            surface,
-            self.units,
-            sheet=output.sheet,
-            tolerance=output.tolerance,
-            panel_sheets=output.panel_sheets,
-            name=self.name,
-            anyway=anyway,
-            certificate=certificate,
-            schedule=None if output.tolerance is None else self.panels(output.tolerance, anyway=anyway),
-            **options,
-        )
+        options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
+        return drawing_set(self.shown.surface, self.units, **self._about(output, anyway), **options)
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
         from ..report import roof_report
 
-        surface, certificate = self.shown
         return roof_report(
-            surface,
+            self.shown.surface,
             self.units,
-            name=self.name,
-            tolerance=output.tolerance,
+            **self._about(output, anyway),
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
             margins=self.margins,
@@ -234,11 +221,19 @@ class Outcome:
             targets=None if self.design is None else self.design.targets,
             files=files,
             date=output.date,
-            anyway=anyway,
-            certificate=certificate,
             figures=self.figures,
-            schedule=None if output.tolerance is None else self.panels(output.tolerance, anyway=anyway),
         )
+
+    def _about(self, output: Output, anyway: bool) -> dict[str, Any]:
+        """What drawings and report have in common."""
+        tolerance = output.tolerance
+        return {
+            "name": self.name,
+            "tolerance": tolerance,
+            "schedule": None if tolerance is None else self.panels(tolerance, anyway=anyway),
+            "certificate": self.shown.certificate,
+            "anyway": anyway,
+        }
 
     def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""

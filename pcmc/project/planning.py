@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import FileError, MissingExtra
+from ..base.errors import FileError
+from ..base.files import PathLike
 from ..curves.curves import Curve
 from ..plan import plan_from
 from .drawn import FALLBACK, LENGTHS, height_targets, read
@@ -17,8 +20,6 @@ from .start import surface_of
 
 if TYPE_CHECKING:
     from ..plan.drawing import Drawing
-
-DEFAULTS = {"bottom": "held"}
 
 
 def drawing_reference(drawing: Path, project: Path) -> str:
@@ -41,8 +42,8 @@ def drawing_reference(drawing: Path, project: Path) -> str:
 
 
 def project_text(
-    path: str | os.PathLike[str],
-    folder: str | os.PathLike[str] | None = None,
+    path: PathLike,
+    folder: PathLike | None = None,
     *,
     units: str = "",
     gap: float | None = None,
@@ -62,12 +63,8 @@ def project_text(
     ------
     FileError, PlanError : for a drawing that cannot be read, is no plan, or is outside the folder of a
         project that refers to it.
-    MissingExtra : without tomlkit or the library that reads the drawing.
+    MissingExtra : without the library that reads the drawing.
     """
-    try:
-        import tomlkit
-    except ModuleNotFoundError:
-        raise MissingExtra("tomlkit", "cad") from None
     from ..plan.proposal import proposed
 
     path = Path(path)
@@ -78,52 +75,47 @@ def project_text(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no project is written that cannot be meshed
         surface_of(Project(path, plan_from(values), drawing=drawing))
-    document = tomlkit.document()
-    document.add(tomlkit.comment(f"The roof of {drawing.path.name}, written by pcmc plan"))
-    for note in drawing.notes:
-        document.add(tomlkit.comment(note))
-    if drawing.units in LENGTHS:
-        document["units"] = drawing.units
-        document["units"].comment("of all lengths here")
-    else:
-        document.add(tomlkit.comment(f'units = "{FALLBACK}"  # the drawing has no unit of length'))
-    document.add(tomlkit.nl())
-    plan = tomlkit.table()
+    stem = drawing.path.stem
+    lines = [f"# The roof of {drawing.path.name}, written by pcmc plan", *(f"# {n}" for n in drawing.notes)]
+    unit = f'units = "{drawing.units}" # of all lengths here'
+    missing = f'# units = "{FALLBACK}"  # the drawing has no unit of length'
+    lines += [unit if drawing.units in LENGTHS else missing, "", "[plan]"]
     if refer:
-        plan["drawing"] = name
-        plan["drawing"].comment("its layers are the lines; save it, and the roof follows")
-        if gap is not None:
-            plan["gap"] = gap
-    plan["edge_length"] = values["edge_length"]
-    plan["edge_length"].comment("of the triangles")
-    if "plane" in values and not refer:
-        plan["plane"] = _inline(tomlkit, values["plane"])
+        lines.append(f"drawing = {_toml(name)} # its layers are the lines; save it, and the roof follows")
+        lines += [] if gap is None else [f"gap = {_toml(gap)}"]
+    lines.append(f"edge_length = {_toml(values['edge_length'])} # of the triangles")
     if not refer:
-        plan["outline"] = _curve(tomlkit, values["outline"], outline=True)
-        if values["supports"]:
-            plan["supports"] = _list(tomlkit, [_curve(tomlkit, s) for s in values["supports"]])
-        if "mirrors" in values:
-            plan["mirrors"] = _list(tomlkit, [_curve(tomlkit, m) for m in values["mirrors"]])
+        lines += [f"plane = {_toml(values['plane'])}"] if "plane" in values else []
+        lines.append(f"outline = {_curve(values['outline'], closed=True)}")
+        for key in ("supports", "mirrors"):
+            if values.get(key):
+                lines.append(f"{key} = {_list(map(_curve, values[key]))}")
         if "edge" in values:
-            plan["edge"], plan["cable"] = values["edge"], values["cable"]
-            plan["cable"].comment("tension of the cables along the outline, between its supports")
-    plan.add(tomlkit.nl())
-    patches = tomlkit.table()
-    patches.comment("a larger tension gives a flatter roof")
-    for name, area in values["patches"].items():
-        patches[name] = _inline(tomlkit, {k: v for k, v in area.items() if not (refer and k == "at")})
-    plan["patches"] = patches
+            comment = "tension of the cables along the outline, between its supports"
+            lines += [f"edge = {_toml(values['edge'])}", f"cable = {_toml(values['cable'])} # {comment}"]
+    lines += ["", "[plan.patches] # a larger tension gives a flatter roof"]
+    for patch, area in values["patches"].items():
+        lines.append(f"{_key(patch)} = {_toml({k: v for k, v in area.items() if not (refer and k == 'at')})}")
     for kind in ("holes", "dividers", "cables"):
-        if values.get(kind):
-            plan[kind] = _entries(tomlkit, values[kind], refer)
-    document["plan"] = plan
+        for entry in values.get(kind, ()):
+            lines += ["", f"[[plan.{kind}]]", f"name = {_toml(entry['name'])}"]
+            for key, value in entry.items():
+                if key == "name" or (key == "curve" and refer) or (key, value) == ("bottom", "held"):
+                    continue
+                comment = (
+                    " # tension of the wall; more gives a sharper valley" if key == "wall" and value else ""
+                )
+                lines.append(f"{key} = {_curve(value) if key == 'curve' else _toml(value)}{comment}")
     if len(drawing.heights) and not refer:
-        document["targets"] = _targets(tomlkit, drawing, list(values["patches"]))
-    output = tomlkit.table()
-    output["files"] = [f"{drawing.path.stem}-roof.3dm"]
-    output["picture"] = f"{drawing.path.stem}-roof.png"
-    document["output"] = output
-    return tomlkit.dumps(document), drawing
+        lines += ["", "[targets]", f"meet = {_list(height_targets(drawing))}"]
+        lines.append(f"vary = {_toml(list(values['patches']))} # the tensions that may change for it")
+    lines += [
+        "",
+        "[output]",
+        f"files = [{_toml(f'{stem}-roof.3dm')}]",
+        f"picture = {_toml(f'{stem}-roof.png')}",
+    ]
+    return "\n".join([*lines, ""]), drawing
 
 
 def proposal_text(project: Project) -> str:
@@ -152,60 +144,36 @@ def proposal_text(project: Project) -> str:
     return f"proposed: {', '.join(parts)}; {change}"
 
 
-def _targets(tomlkit: Any, drawing: Drawing, names: list[str]) -> Any:
-    table = tomlkit.table()
-    table["meet"] = _list(tomlkit, [_inline(tomlkit, entry) for entry in height_targets(drawing)])
-    table["vary"] = names
-    table["vary"].comment("the tensions that may change for it")
-    return table
+def _curve(curve: Any, closed: bool = False) -> str:
+    """A curve, or a point that stands for one, in TOML: a line for each of its parts.
 
-
-def _entries(tomlkit: Any, entries: Any, refer: bool) -> Any:
-    """The array of tables of dividers or holes; with ``refer`` without their curves."""
-    array = tomlkit.aot()
-    for entry in entries:
-        table = tomlkit.table()
-        table["name"] = entry["name"]
-        if not refer:
-            table["curve"] = _curve(tomlkit, entry["curve"])
-        for key, value in entry.items():
-            if key not in ("name", "curve") and DEFAULTS.get(key) != value:
-                table[key] = value
-                if key == "wall" and value:
-                    table[key].comment("tension of the wall; more gives a sharper valley")
-        array.append(table)
-    return array
-
-
-def _curve(tomlkit: Any, curve: Any, outline: bool = False) -> Any:
-    """A curve as plain data, a line for each of its parts."""
+    Where every curve is ``closed``, a polyline need not say it.
+    """
     from ..curves.curve_data import curve_data
 
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]
-    if outline and isinstance(data, Mapping) and data.get("closed"):
-        data = data["polyline"]  # an outline is closed anyway
-    if isinstance(data, list) and data and isinstance(data[0], Mapping):
-        return _list(tomlkit, [_inline(tomlkit, part) for part in data])
-    return _inline(tomlkit, data)
+    if closed and isinstance(data, Mapping) and data.get("closed"):
+        data = data["polyline"]
+    return _list(data) if isinstance(data, list) and isinstance(data[0], Mapping) else _toml(data)
 
 
-def _list(tomlkit: Any, items: Any) -> Any:
-    array = tomlkit.array()
-    for item in items:
-        array.append(item)
-    return array.multiline(True)
+def _list(items: Iterable[Any]) -> str:
+    """A list in TOML, a line for each item; texts are TOML already."""
+    return "[\n" + "".join(f"    {i if isinstance(i, str) else _toml(i)},\n" for i in items) + "]"
 
 
-def _inline(tomlkit: Any, value: Any) -> Any:
-    """Plain data in one line; long lists of points in several."""
+def _toml(value: Any) -> str:
+    """Plain data in TOML, in one line.
+
+    >>> _toml({"at": [1.0, 2.0], "süd": True})
+    '{at = [1.0, 2.0], "süd" = true}'
+    """
     if isinstance(value, Mapping):
-        table = tomlkit.inline_table()
-        for key, item in value.items():
-            table[key] = _inline(tomlkit, item)
-        return table
-    if isinstance(value, list):
-        array = tomlkit.array()
-        for item in value:
-            array.append(_inline(tomlkit, item))
-        return array
-    return value
+        return f"{{{', '.join(f'{_key(key)} = {_toml(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)

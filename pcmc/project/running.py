@@ -26,13 +26,8 @@ from .output import FileJobs, OnStep, check_outputs, ignore, paint, schedule_job
 from .solving import Changed, solve_from_start
 from .start import start_of
 
-CONTENTS = {
-    ".csv": "panels",
-    ".inp": "structural model",
-    ".dxf": "drawings",
-    ".pdf": "drawings",
-    ".svg": "drawing",
-}
+CONTENTS = {".csv": "panels", ".inp": "structural model", ".svg": "drawing"}
+CONTENTS |= {".dxf": "drawings", ".pdf": "drawings"}
 
 
 def opened(
@@ -46,18 +41,9 @@ def opened(
 ) -> Outcome:
     """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
 
-    Parameters
-    ----------
-    path : of the file, or a Project.
-    progress : called with a few words at each step.
-    units : the unit of length that the roof is to be in; see ``load``.
-    start : of a project, its start shape, which is not solved.
-    changed : applied to the surface of the file, or to the start shape.
-    use_cache : as of ``designed``.
-
-    Raises
-    ------
-    FileError, PlanError, OptionError, SurfaceError : as ``load`` and ``pcmc.read``.
+    ``units`` is the unit of length that the roof is to be in; with ``start`` a project has its start shape,
+    which is not solved; ``changed`` is applied to the surface of the file, or to the start shape. The others
+    are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
 
     >>> roof = opened("notebooks/roof.toml", start=True)
     >>> roof.result is None, roof.certificate.certified
@@ -95,21 +81,10 @@ def designed(
 
     Returns
     -------
-    Outcome
-        ``outcome.surface`` is the roof, ``outcome.good`` whether it is what the project asks for. With
-        ``whole = true`` ``outcome.shown`` is the whole roof.
+    Outcome : ``surface`` is the roof, ``good`` whether it is what the project asks for. With ``whole = true``
+        ``shown`` is the whole roof.
 
-    Raises
-    ------
-    FileError, PlanError, OptionError
-        As ``run``.
-    KeyboardInterrupt
-        For Ctrl-C; nothing is kept.
-
-    Warns
-    -----
-    BalanceWarning
-        Before solving, if the tensions at a junction cannot balance.
+    Errors and warnings as of ``run``; KeyboardInterrupt for Ctrl-C, and nothing is kept.
 
     Examples
     --------
@@ -143,18 +118,15 @@ def run(
 
     Returns
     -------
-    Outcome
-        Nothing is written, and ``files`` is empty, if the surface is not certified or misses a target.
+    Outcome : ``files`` is empty, and nothing is written, if the surface is not certified or misses a target.
 
     Raises
     ------
-    FileError, PlanError, OptionError
-        The message is one line and names the file. Nothing is written.
+    FileError, PlanError, OptionError : one line that names the file. Nothing is written.
 
     Warns
     -----
-    BalanceWarning
-        Before solving, if the tensions at a junction cannot balance.
+    BalanceWarning : before solving, if the tensions at a junction cannot balance.
     """
     project = load(path)
     project = project if out_dir is None else project.in_folder(out_dir)

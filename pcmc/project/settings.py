@@ -22,7 +22,7 @@ from ..meshing.remeshing import check_lengths
 from ..plot.figure import SUFFIXES, check_suffix
 from ..plot.scene import VIEWS
 from ..report.document import check_suffix as check_report
-from ..structure.wanted import Structure
+from ..structure.model import Structure
 
 PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of a mesh
 BOUNDARY, GROUND = "boundary", "ground"

@@ -25,6 +25,7 @@ DIGITS = 12  # of the values written
 KEYS = {kind: field for kind, (parts, field) in KINDS.items() if parts == "patches"}
 LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
 NO_POINTS = ("axes", "weights", "radius")  # of a curve
+USUAL = {"tension": 0.0, "pressure": 1.0, "weight": 0.0}  # of a patch where its table has none
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
@@ -76,10 +77,13 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
 def _by_name(surface: Surface) -> dict[Name, float]:
     """Every value by kind and name, also the pressures of walls; not the pressures that are results."""
     result = (surface.room_signs != 0.0).any(axis=0)
-    values = {(kind, name): v for kind, named in all_values(surface).items() for name, v in named.items()}
-    for p, computed in zip(surface.patches, result.tolist(), strict=True):
-        if computed:
-            del values["pressures", p.name]
+    computed = {p.name for p, r in zip(surface.patches, result.tolist(), strict=True) if r}
+    values = {
+        (kind, name): value
+        for kind, named in all_values(surface).items()
+        for name, value in named.items()
+        if kind != "pressures" or name not in computed
+    }
     for name, place in values_of(surface)["points"].items():
         values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
     return values
@@ -127,103 +131,15 @@ def with_values(
             labels = ", ".join(f"{kind.removesuffix('s')} of {name}" for kind, name in list(missing)[:5])
             raise OptionError(f"{path.name} cannot hold the {labels} of the surface shown", what="values")
         tried.append(missing)
-        # walls that a project leaves open follow its patches, so they come last
         if project.mesh is not None:
-            _put_on_mesh(data, missing)
-        else:
-            _put(data["plan"], project, start, asked, first or missing, shared=len(tried) == 1)
-
-
-def _put(
-    plan: dict[str, Any],
-    project: Project,
-    start: Surface,
-    asked: Surface,
-    values: Mapping[Name, float],
-    shared: bool,
-) -> None:
-    """Write values into the table of a plan; if ``shared``, one for all patches where all have the same."""
-    given = {kind: {name: v for (k, name), v in values.items() if k == kind} for kind, _ in values}
-    sources = None
-    for kind, wanted in given.items():
-        if kind == "points":
-            places = values_of(start)["points"], values_of(asked)["points"]
-            for name in {label.partition(" of ")[2] for label in wanted}:
-                old, new = (asked.plane.to_local(np.array([place[name]]))[0] for place in places)
-                for key in LINES & plan.keys():
-                    plan[key] = _with_point(plan[key], old, [_number(x) for x in new.tolist()], key)
-            continue
-        if kind == "volumes":
-            for name, value in wanted.items():
-                own = plan.get("patches", {}).get(name, {})
-                table = own if "volume" in own else plan["rooms"][name]
-                table["volume"] = _number(value)
-            continue
-        walls = {p.name for p in asked.patches if p.wall} & wanted.keys()
-        if kind == "cables" or walls:
-            sources = sources or sources_of(project.plan)
-            _put_on_lines(plan, project, asked, sources, kind, wanted)
-            wanted = {name: value for name, value in wanted.items() if name not in walls}
-        if kind != "cables" and wanted:
-            _put_on_patches(plan, asked, kind, wanted, shared)
-
-
-def _put_on_mesh(data: dict[str, Any], values: Mapping[Name, float]) -> None:
-    """Write values of patches into the table of a mesh; it holds no others."""
-    mesh = data["mesh"] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
-    for (kind, name), value in values.items():
-        if kind in KEYS:
-            mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
-            _drop(mesh, RISES if kind == "tensions" else ())
-
-
-def _put_on_patches(
-    plan: dict[str, Any], asked: Surface, kind: str, wanted: Mapping[str, float], shared: bool
-) -> None:
-    key, patches = KEYS[kind], [p for p in asked.patches if not p.wall]
-    whole = "drawing" not in plan and not plan.get("patches")  # the plan has one value for all patches
-    if shared and (whole or key in plan) and len({getattr(p, key) for p in patches}) == 1:
-        if key == "tension" and key not in plan:
-            _drop(plan, WHOLE)
-        plan[key] = _number(next(iter(wanted.values())))
-        return
-    tables = plan.setdefault("patches", {})
-    if whole:
-        if "tension" not in plan:
-            _drop(plan, WHOLE)
-        usual = {"tension": 0.0, "pressure": 1.0, "weight": 0.0, "snow": plan.get("snow", 0.0)}
-        for patch in patches:
-            own = {name: _number(getattr(patch, name)) for name in usual}
-            tables[patch.name] = {name: v for name, v in own.items() if v != usual[name]}
-        _drop(plan, ("tension", "pressure", "weight"))
-        return
-    for name, value in wanted.items():
-        table = tables.setdefault(name, {})
-        if key == "tension":
-            _drop(table, RISES)
-        table[key] = _number(value)
-
-
-def _with_point(value: Any, old: Floats, new: list[float], key: str = "") -> Any:
-    """Lines of a plan with another point wherever ``old`` is one of theirs; both in the coordinates of Π."""
-    if isinstance(value, Mapping):
-        return {k: v if k in NO_POINTS else _with_point(v, old, new, k) for k, v in value.items()}
-    if not isinstance(value, list):
-        return value
-    if len(value) in (2, 3) and all(isinstance(x, int | float) for x in value):
-        same = np.allclose(value[:2], old[:2], rtol=0.0, atol=SAME * (1.0 + float(np.abs(old).max())))
-        height = len(value) == 3 or (key == "supports" and new[2] != 0.0)
-        return (new if height else new[:2]) if same else value
-    return [_with_point(item, old, new, key) for item in value]
-
-
-def _drop(table: dict[str, Any], keys: Collection[str]) -> None:
-    for key in keys:
-        table.pop(key, None)
-
-
-def _number(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+            mesh = data["mesh"] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+            for (kind, name), value in missing.items():
+                if kind in KEYS:  # it holds no others
+                    mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
+                    _drop(mesh, RISES if kind == "tensions" else ())
+        else:  # walls that a project leaves open follow its patches, so they come last
+            writer = _Writer(data["plan"], project, start, asked)
+            writer.write(first or missing, shared=len(tried) == 1)
 
 
 class Source(NamedTuple):
@@ -234,7 +150,7 @@ class Source(NamedTuple):
     key: str
 
 
-def sources_of(plan: Plan | None) -> dict[Name, Source]:
+def sources_of(plan: Plan) -> dict[Name, Source]:
     """What gives each wall and cable of a plan its tension.
 
     The plan is built with another tension in each place, so that no rule of its names is repeated here.
@@ -243,7 +159,6 @@ def sources_of(plan: Plan | None) -> dict[Name, Source]:
     >>> sources_of(hall)
     {('tensions', 'wall 1'): Source(where='dividers', number=0, key='wall')}
     """
-    assert plan is not None
     numbers, known = count(1), dict[float, Source]()
 
     def mark(where: str, number: int, key: str, present: Any) -> Any:
@@ -267,69 +182,133 @@ def sources_of(plan: Plan | None) -> dict[Name, Source]:
     return walls | {("cables", c.name): known[c.tension] for c in built.cables}
 
 
-def _put_on_lines(
-    plan: dict[str, Any],
-    project: Project,
-    asked: Surface,
-    sources: Mapping[Name, Source],
-    kind: str,
-    wanted: Mapping[str, float],
-) -> None:
-    """Tensions of walls and cables, in the lines of the plan that carry them."""
-    values = _by_name(asked)
-    for name, value in wanted.items():
-        source = sources.get((kind, name))
-        if source is None:
-            continue
-        parts = [key for key, other in sources.items() if other == source]
-        if any(abs(values[part] - value) > SAME * abs(value) for part in parts):
-            if source.where == "cable":
-                _split_cables(plan, asked, [part for _, part in parts], values)
+class _Writer(NamedTuple):
+    """Writes values of the surface ``asked`` into the table of a plan, whose start shape is ``start``."""
+
+    plan: dict[str, Any]
+    project: Project
+    start: Surface
+    asked: Surface
+
+    def write(self, values: Mapping[Name, float], shared: bool) -> None:
+        """Write values; if ``shared``, one for all patches where all have the same."""
+        walls = {p.name for p in self.asked.patches if p.wall}
+        lines = {key: value for key, value in values.items() if key[0] == "cables" or key[1] in walls}
+        if lines:
+            self.write_lines(lines)
+        for kind in dict.fromkeys(kind for kind, _ in values):
+            wanted = {name: v for (k, name), v in values.items() if k == kind and (k, name) not in lines}
+            if kind == "points":
+                self.write_points({label.partition(" of ")[2] for label in wanted})
+            elif kind == "volumes":
+                for name, value in wanted.items():
+                    own = self.plan.get("patches", {}).get(name, {})
+                    table = own if "volume" in own else self.plan["rooms"][name]
+                    table["volume"] = _number(value)
+            elif wanted:
+                self.write_patches(KEYS[kind], wanted, shared)
+
+    def write_points(self, names: Collection[str]) -> None:
+        """Points that hold the roof, in all lines through them."""
+        for name in names:
+            places = (values_of(surface)["points"][name] for surface in (self.start, self.asked))
+            old, new = (self.asked.plane.to_local(np.array([place]))[0] for place in places)
+            for key in LINES & self.plan.keys():
+                self.plan[key] = _with_point(self.plan[key], old, [_number(x) for x in new.tolist()], key)
+
+    def write_patches(self, key: str, wanted: Mapping[str, float], shared: bool) -> None:
+        """Values of patches, in the table of each or in that of the plan."""
+        plan, patches = self.plan, [p for p in self.asked.patches if not p.wall]
+        whole = "drawing" not in plan and not plan.get("patches")  # the plan has one value for all patches
+        if shared and (whole or key in plan) and len({getattr(p, key) for p in patches}) == 1:
+            if key == "tension" and key not in plan:
+                _drop(plan, WHOLE)
+            plan[key] = _number(next(iter(wanted.values())))
+            return
+        tables = plan.setdefault("patches", {})
+        if whole:
+            _drop(plan, () if "tension" in plan else WHOLE)
+            usual = USUAL | {"snow": plan.get("snow", 0.0)}
+            for patch in patches:
+                own = {name: _number(getattr(patch, name)) for name in usual}
+                tables[patch.name] = {name: v for name, v in own.items() if v != usual[name]}
+            _drop(plan, USUAL)
+            return
+        for name, value in wanted.items():
+            table = tables.setdefault(name, {})
+            _drop(table, RISES if key == "tension" else ())
+            table[key] = _number(value)
+
+    def write_lines(self, wanted: Mapping[Name, float]) -> None:
+        """Tensions of walls and cables, in the lines of the plan that carry them."""
+        assert self.project.plan is not None
+        values, sources = _by_name(self.asked), sources_of(self.project.plan)
+        for (kind, name), value in wanted.items():
+            source = sources.get((kind, name))
+            if source is None:
                 continue
-            names = ", ".join(part for _, part in parts)
-            text = f"{names}: parts of one line, which has one tension in a project; give them the same"
-            raise OptionError(text, what=source.key, where=name, found=value)
-        if source.where == "cable":
-            plan["cable"] = _number(value)
-        else:
-            _entry(plan, project, source)[source.key] = _number(value)
+            parts = [key for key, other in sources.items() if other == source]
+            alike = all(abs(values[part] - value) <= SAME * abs(value) for part in parts)
+            if alike:
+                table = self.plan if source.where == "cable" else self.line(source)
+                table[source.key] = _number(value)
+            elif source.where == "cable":
+                self.split_cables([part for _, part in parts], values)
+            else:
+                names = ", ".join(part for _, part in parts)
+                text = f"{names}: parts of one line, which has one tension in a project; give them the same"
+                raise OptionError(text, what=source.key, where=name, found=value)
+
+    def split_cables(self, names: Collection[str], values: Mapping[Name, float]) -> None:
+        """Lines for the cables along the outline, which have one tension there, with a tension for each."""
+        for name in names:
+            ends, times = np.unique(self.asked.cables[self.asked.cable_index(name)].edges, return_counts=True)
+            tips = self.asked.plane.to_local(self.asked.vertices[ends[times == 1]])[:, :2]
+            if len(tips) != 2:
+                text = f"{name}: it has no two ends, so it cannot have a tension of its own in a project"
+                raise OptionError(text, what="cable", where=name)
+            curve = [[float(f"{x:.9g}") for x in point] for point in tips.tolist()]
+            line = {"name": name, "curve": curve, "tension": _number(values["cables", name])}
+            self.plan.setdefault("cables", []).append(line)
+
+    def line(self, source: Source) -> dict[str, Any]:
+        """The table of a line; one for a line of the drawing is added if it is missing."""
+        table: dict[str, Any]
+        entries: list[Any] = self.plan.setdefault(source.where, [])
+        drawing = self.project.drawing
+        drawn = [] if drawing is None else list(getattr(drawing, source.where, {}))
+        if source.number < len(drawn):
+            name = drawn[source.number]
+            for entry in entries:
+                if isinstance(entry, dict) and entry.get("name") == name and "curve" not in entry:
+                    return entry
+            entries.append(table := {"name": name})
+            return table
+        own = [k for k, e in enumerate(entries) if not drawn or not isinstance(e, Mapping) or "curve" in e]
+        place = own[source.number - len(drawn)]
+        table = entries[place]
+        if not isinstance(table, dict) or "curve" not in table:
+            entries[place] = table = {"curve": table}
+        return table
 
 
-def _split_cables(
-    plan: dict[str, Any], asked: Surface, names: Collection[str], values: Mapping[Name, float]
-) -> None:
-    """Lines for the cables along the outline, which have one tension there, with a tension for each."""
-    lines = plan.setdefault("cables", [])
-    for name in names:
-        edges = asked.cables[asked.cable_index(name)].edges
-        ends, times = np.unique(edges, return_counts=True)
-        tips = asked.plane.to_local(asked.vertices[ends[times == 1]])[:, :2]
-        if len(tips) != 2:
-            text = f"{name}: it has no two ends, so it cannot have a tension of its own in a project"
-            raise OptionError(text, what="cable", where=name)
-        lines.append({"name": name, "curve": _rounded(tips), "tension": _number(values["cables", name])})
+def _with_point(value: Any, old: Floats, new: list[float], key: str = "") -> Any:
+    """Lines of a plan with another point wherever ``old`` is one of theirs; both in the coordinates of Π."""
+    if isinstance(value, Mapping):
+        return {k: v if k in NO_POINTS else _with_point(v, old, new, k) for k, v in value.items()}
+    if not isinstance(value, list):
+        return value
+    if len(value) in (2, 3) and all(isinstance(x, int | float) for x in value):
+        same = np.allclose(value[:2], old[:2], rtol=0.0, atol=SAME * (1.0 + float(np.abs(old).max())))
+        height = len(value) == 3 or (key == "supports" and new[2] != 0.0)
+        return (new if height else new[:2]) if same else value
+    return [_with_point(item, old, new, key) for item in value]
 
 
-def _rounded(points: Floats) -> list[list[float]]:
-    return [[float(f"{x:.9g}") for x in point] for point in points.tolist()]
+def _drop(table: dict[str, Any], keys: Collection[str]) -> None:
+    for key in keys:
+        table.pop(key, None)
 
 
-def _entry(plan: dict[str, Any], project: Project, source: Source) -> dict[str, Any]:
-    """The table of a line in the data of a plan; one for a line of the drawing is added if it is missing."""
-    entries: list[Any] = plan.setdefault(source.where, [])
-    number = source.number
-    drawn = {} if project.drawing is None else getattr(project.drawing, source.where, {})
-    if number < len(drawn):
-        name = list(drawn)[number]
-        for entry in entries:
-            if isinstance(entry, dict) and entry.get("name") == name and "curve" not in entry:
-                return entry
-        added = {"name": name}
-        entries.append(added)
-        return added
-    own = [k for k, e in enumerate(entries) if not drawn or not isinstance(e, Mapping) or "curve" in e]
-    place = own[number - len(drawn)]
-    table = entries[place]
-    if not isinstance(table, dict) or "curve" not in table:
-        entries[place] = table = {"curve": table}
-    return table
+def _number(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")

@@ -4,31 +4,103 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .. import io
+from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
 from ..base.files import PathLike, as_path, read_bytes
 from ..forces.rooms import refuse_varied_pressure
-from ..surface import Surface
+from ..plan import Curve, Divider, Hole, Plan
+from ..surface import Plane, Surface
 from ..surface.values import KINDS, all_values
 from .checking import in_file
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, project_of, read_data
 from .keys import WALL, main_sections, solve_section
 from .settings import MeshFile
-from .shifts import AXES, shifted
 from .start import start_of
 
+AXES = ("x", "y", "z")
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
 Item = tuple[tuple[str, ...], KeyPath, Any]  # names, path and value of something in a file
+
+
+def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surface]:
+    """A project with some of its numbers replaced, and its initial surface.
+
+    Parameters
+    ----------
+    path : of a project (``.toml``), or of a surface, which has no keys.
+    values : by the dotted name of a number that the file has or may have, such as ``plan.edge_length``; by
+        ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall,
+        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of
+        a divider, a hole, a support or a named point of the plan: all of it is shifted by the value, so 0
+        leaves it where it is drawn. Numbers of the file are replaced, and lines are shifted, before the plan
+        is meshed, the others afterwards. Where several things have one name, put what is meant before it:
+        ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider 1``, ``wall 1``,
+        ``hole 1``, ``support 1``, …
+
+    Raises
+    ------
+    FileError, PlanError, OptionError
+        As in ``load`` and ``build``; for an unknown name.
+
+    Examples
+    --------
+    >>> project, surface = varied("notebooks/roof.toml", {"plan.edge_length": 2, "corner.tension": 9})
+    >>> project.plan.edge_length, surface.patches[0].tension
+    (2, 9.0)
+    """
+    source = _Source.of(path)
+    start = start_of(source.project(values))
+    return start.project, source.loaded(start.surface, values)
+
+
+def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
+    """Refuse every name and value that ``varied`` refuses; the file is read once.
+
+    A plan is meshed once for the names of patches, cables and rooms, and not at all without them.
+    """
+    source = _Source.of(path)
+    project = source.project({})
+    start = start_of(project) if project.mesh is not None else None
+    project = project if start is None else start.project
+    found_by_search: dict[str, str] = {}  # with what each is
+    for parameter in project.vary:
+        cable, table = parameter.kind == "cable", "mesh" if project.plan is None else "plan"
+        kind = "tension" if cable else parameter.kind
+        for one in parameter.names:
+            bare = one.removeprefix(CABLE) if cable else one
+            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]
+            if project.plan is None or not project.plan.patches:
+                names.append(f"{table}.{kind}")
+            found_by_search |= dict.fromkeys(names, parameter.label)
+    for name, given in values.items():
+        if label := found_by_search.get(name):
+            text = f"{path}: {name}: the {label} is found by the search for the targets, so the roof"
+            text += " would have another than the sweep's; sweep another number, or take it out of vary"
+            raise OptionError(text, what=name, where=label)
+        for value in given:
+            if isinstance(value, bool | str | None) or not math.isfinite(value):
+                text = f"{path}: {name} must be a finite number, found {value!r}"
+                raise OptionError(text, what=name, found=value)
+            if source.is_load(name):
+                start = start or start_of(project)
+                source.loaded(start.surface, {name: value})
+            else:
+                source.project({name: value})
 
 
 class _Source(NamedTuple):
@@ -39,15 +111,52 @@ class _Source(NamedTuple):
     data: Mapping[str, Any]
     keys: Mapping[str, KeyPath]
 
+    @classmethod
+    def of(cls, path: PathLike) -> _Source:
+        path = as_path(path)
+        text, data = read_data(path) if is_project(path) else ("", {})
+        return cls(path, text, data, numbers(data) if data else {})
+
     def is_load(self, name: str) -> bool:
         """Whether a name is neither a number of the file nor a shift of a line of its plan."""
         return name not in self.keys and (name.rpartition(".")[2] not in AXES or "plan" not in self.data)
 
+    def project(self, values: Mapping[str, float]) -> Project:
+        """The project with other numbers and shifted lines; loads are ignored."""
+        if not self.data:
+            return Project(self.path, mesh=MeshFile(self.path.name))
+        data: Any = deepcopy(self.data)
+        shifts: dict[str, dict[str, float]] = {}
+        for name, value in values.items():
+            stem, _, last = name.rpartition(".")
+            if name in self.keys:
+                table = data
+                for step in self.keys[name][:-1]:
+                    table = table.setdefault(step, {}) if isinstance(step, str) else table[step]
+                table[self.keys[name][-1]] = value
+            elif not self.is_load(name):
+                shifts.setdefault(stem, {})[last] = value
+        return project_of(self.path, data, self.text, partial(shifted, shifts=shifts))
 
-def _source(path: PathLike) -> _Source:
-    path = as_path(path)
-    text, data = read_data(path) if is_project(path) else ("", {})
-    return _Source(path, text, data, numbers(data) if data else {})
+    def loaded(self, surface: Surface, values: Mapping[str, float]) -> Surface:
+        """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
+        known = {f"{CABLE}{cable.name}.tension": ("cables", cable.name) for cable in surface.cables}
+        for kind, named in reversed(all_values(surface).items()):  # a patch comes after a cable of its name
+            known |= {f"{name}.{KINDS[kind][1]}": (kind, name) for name in named}
+        given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
+        for name in filter(self.is_load, values):
+            if name not in known:
+                # no coordinates, and patches have shorter names
+                keys = [k for k, at in self.keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
+                near = get_close_matches(name, self.keys, n=1, cutoff=0.8)  # a coordinate, perhaps
+                names = tuple(dict.fromkeys([*known, *keys, *near]))
+                text = f"{self.path}: {unknown('number', name, names)}"
+                raise OptionError(text, what=name, expected=names)
+            kind, part = known[name]
+            given[kind][part] = values[name]
+        with in_file(self.path, OptionError):
+            refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
+            return surface.retensioned(**given)
 
 
 def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
@@ -83,75 +192,56 @@ def _items(value: Any, names: tuple[str, ...], path: KeyPath) -> Iterator[Item]:
             yield from _items(item, (*names, own), (*path, key))
 
 
-def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surface]:
-    """A project with some of its numbers replaced, and its initial surface.
+def shifted(plan: Plan, shifts: Mapping[str, Mapping[str, float]]) -> Plan:
+    """The plan with dividers, holes, supports and points moved by lengths along x, y and z.
 
-    Parameters
-    ----------
-    path : of a project (``.toml``), or of a surface, which has no keys.
-    values : by the dotted name of a number that the file has or may have, such as ``plan.edge_length``; by
-        ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall,
-        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of
-        a divider, a hole, a support or a named point of the plan: all of it is shifted by the value, so 0
-        leaves it where it is drawn. Numbers of the file are replaced, and lines are shifted, before the plan
-        is meshed, the others afterwards. Where several things have one name, put what is meant before it:
-        ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider 1``, ``wall 1``,
-        ``hole 1``, ``support 1``, …
-
-    Raises
-    ------
-    FileError, PlanError, OptionError
-        As in ``load`` and ``build``; for an unknown name.
-
-    Examples
-    --------
-    >>> project, surface = varied("notebooks/roof.toml", {"plan.edge_length": 2, "corner.tension": 9})
-    >>> project.plan.edge_length, surface.patches[0].tension
-    (2, 9.0)
+    >>> plan = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], edge_length=1.0, tension=2.0)
+    >>> shifted(plan, {"wall 1": {"x": 1.0}}).dividers[0].curve.at(0.0).tolist()
+    [[5.0, 0.0]]
     """
-    source = _source(path)
-    start = start_of(_project(source, values))
-    return start.project, _retensioned(source, start.surface, values)
+    labels: dict[tuple[str, Any], str] = {("points", name): f"point {name}" for name in plan.points}
+    labels |= {("dividers", k): f"divider {part.name}" for k, part in enumerate(plan.dividers)}
+    labels |= {("holes", k): re.sub("['\"]", "", part.name) for k, part in enumerate(plan.holes)}
+    labels |= {("supports", k): f"support {k + 1}" for k in range(len(plan.supports))}
+    changed: dict[str, Any] = {}
+    for name, by in shifts.items():
+        found = [at for at, label in labels.items() if name in (label, label.partition(" ")[2])]
+        axis = next(iter(by))
+        if len(found) != 1:
+            several = " or ".join(f"{labels[at]}.{axis}" for at in found)
+            lost = unknown("number", f"{name}.{axis}", (f"{label}.{axis}" for label in labels.values()))
+            text = f"{name} is the name of several lines; type {several}" if found else lost
+            raise OptionError(text, what=f"{name}.{axis}")
+        field, key = found[0]
+        given = getattr(plan, field)
+        parts = changed.setdefault(field, dict(given) if isinstance(given, Mapping) else list(given))
+        try:
+            parts[key] = _moved(parts[key], np.array([by.get(axis, 0.0) for axis in AXES]), plan.plane)
+        except OptionError as error:
+            raise OptionError(f"{name}: {error}", what=f"{name}.{axis}") from None
+    return replace(plan, **changed)
 
 
-def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
-    """Refuse every name and value that ``varied`` refuses; the file is read once.
+def _moved(part: Any, by: Floats, plane: Plane) -> Any:
+    """A divider, hole, curve or point at another place; what is on Π rises above it."""
+    if by[2] and isinstance(part, Divider | tuple):
+        raise OptionError("only its place in plan counts; shift it along x or y", what="z")
+    if isinstance(part, Divider | Hole):
+        return replace(part, curve=_moved(part.curve, by, plane))
 
-    A plan is meshed once for the names of patches, cables and rooms, and not at all without them.
-    """
-    source = _source(path)
-    project = _project(source, {})
-    start = start_of(project) if project.mesh is not None else None
-    sought = _sought(project if start is None else start.project)
-    for name, given in values.items():
-        if name in sought:
-            text = f"{path}: {name}: the {sought[name]} is found by the search for the targets, so the roof"
-            text += " would have another than the sweep's; sweep another number, or take it out of vary"
-            raise OptionError(text, what=name, where=sought[name])
-        for value in given:
-            if isinstance(value, bool | str | None) or not math.isfinite(value):
-                text = f"{path}: {name} must be a finite number, found {value!r}"
-                raise OptionError(text, what=name, found=value)
-            if source.is_load(name):
-                start = start or start_of(project)
-                _retensioned(source, start.surface, {name: value})
-            else:
-                _project(source, {name: value})
+    def moved(points: Floats, of_arc: bool = False) -> Floats:
+        if by[2] and points.shape[1] == 2:
+            if plane != Plane():
+                raise OptionError("give it three coordinates, as the plane is not z = 0", what="z")
+            points = np.pad(points, ((0, 0), (0, 1)))
+        share = (
+            np.array([1.0, 0.0, 0.0]) if of_arc else np.ones(len(points))
+        )  # vectors follow an arc's centre
+        return points + share[:, None] * by[: points.shape[1]]
 
-
-def _sought(project: Project) -> dict[str, str]:
-    """The names of the numbers that the search for targets finds, with what each is."""
-    sought: dict[str, str] = {}
-    for parameter in project.vary:
-        for one in parameter.names:
-            bare = one.removeprefix(CABLE) if parameter.kind == "cable" else one
-            kind = "tension" if parameter.kind == "cable" else parameter.kind
-            table = "mesh" if project.plan is None else "plan"
-            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]
-            if project.plan is None or not project.plan.patches:
-                names.append(f"{table}.{kind}")
-            sought |= dict.fromkeys(names, parameter.label)
-    return sought
+    if not isinstance(part, Curve):
+        return moved(np.array([part]))[0].tolist()
+    return replace(part, pieces=tuple(replace(p, points=moved(p.points, bool(p.sweep))) for p in part.pieces))
 
 
 def digest(path: PathLike) -> str:
@@ -175,50 +265,3 @@ def digest(path: PathLike) -> str:
     for held, on in (*surface.on_planes, *surface.given_supports.on_line):
         sha.update(repr(vars(held)).encode() + on.tobytes())
     return sha.hexdigest()
-
-
-def _project(source: _Source, values: Mapping[str, float]) -> Project:
-    """The project with other numbers and shifted lines; loads are ignored."""
-    if not source.data:
-        return Project(source.path, mesh=MeshFile(source.path.name))
-    data: Any = deepcopy(source.data)
-    shifts: dict[str, dict[str, float]] = {}
-    for name, value in values.items():
-        stem, _, last = name.rpartition(".")
-        if name in source.keys:
-            table = data
-            for step in source.keys[name][:-1]:
-                table = table.setdefault(step, {}) if isinstance(step, str) else table[step]
-            table[source.keys[name][-1]] = value
-        elif not source.is_load(name):
-            shifts.setdefault(stem, {})[last] = value
-    return project_of(source.path, data, source.text, partial(shifted, shifts=shifts))
-
-
-def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float]) -> Surface:
-    """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
-    known = _names(surface)
-    given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
-    for name in filter(source.is_load, values):
-        if name not in known:
-            # no coordinates, and patches have shorter names
-            keys = [k for k, at in source.keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
-            near = get_close_matches(name, source.keys, n=1, cutoff=0.8)  # a coordinate, perhaps
-            names = tuple(dict.fromkeys([*known, *keys, *near]))
-            text = f"{source.path}: {unknown('number', name, names)}"
-            raise OptionError(text, what=name, expected=names)
-        kind, part = known[name]
-        given[kind][part] = values[name]
-    with in_file(source.path, OptionError):
-        refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
-        return surface.retensioned(**given)
-
-
-def _names(surface: Surface) -> dict[str, tuple[str, str]]:
-    """The names of what may vary besides numbers of the file: the kind of each, and its patch, cable or
-    room."""
-    values = reversed(
-        all_values(surface).items()
-    )  # where a patch and a cable share a name, the patch comes last
-    names = {f"{name}.{KINDS[kind][1]}": (kind, name) for kind, named in values for name in named}
-    return {f"{CABLE}{cable.name}.tension": ("cables", cable.name) for cable in surface.cables} | names

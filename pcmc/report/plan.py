@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
-from ..base.arrays import Floats
 from ..base.units import Units, length_factor
 from ..certificate import Certificate
 from ..drawings import views
@@ -21,19 +19,12 @@ AROUND = 1.0  # mm kept free around what is drawn
 
 @dataclass(frozen=True, eq=False)
 class PaperPlan:
-    """A plan on paper.
+    """A plan on paper; lines and texts in mm from the lower left corner."""
 
-    Attributes
-    ----------
-    scale : such as "1:200".
-    lines, texts : mm from the lower left corner.
-    size : width and height, mm.
-    """
-
-    scale: str
+    scale: str  # such as "1:200"
     lines: list[Line]
     texts: list[Text]
-    size: tuple[float, float]
+    size: tuple[float, float]  # width and height, mm
 
 
 def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> PaperPlan:
@@ -56,11 +47,13 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     marks, texts = sheet.drawn()
     lines += marks[len(sheet.lines) :]
     supports = zip(certificate.supports["support"], certificate.supports[["x", "y"]].to_numpy(), strict=True)
-    labels = [(name, at, "PCMC-RIDGE") for name, at in _labels("J", certificate.junctions)]
-    labels += [(name, at, "PCMC-SUPPORT") for name, at in supports]
+    labels = [(name, at, "PCMC-SUPPORT") for name, at in supports]
+    if len(certificate.junctions):
+        middles = certificate.junctions[["middle_x", "middle_y"]].to_numpy()
+        labels = [(f"J{k}", at, "PCMC-RIDGE") for k, at in enumerate(middles, start=1)] + labels
     names = [Text(factor * at + shift, name, layer=layer, align="C") for name, at, layer in labels]
     texts += place_labels(names, texts)
-    boxes = np.array([*(box(text) for text in texts), *(_extent(line) for line in lines)])
+    boxes = np.array([*(box(text) for text in texts), *([p.min(axis=0), p.max(axis=0)] for p, *_ in lines)])
     corner, top = boxes[:, 0].min(axis=0) - AROUND, boxes[:, 1].max(axis=0) + AROUND
     width, height = map(float, top - corner)
     return PaperPlan(
@@ -69,15 +62,3 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
         [text._replace(at=text.at - corner) for text in texts],
         (width, height),
     )
-
-
-def _labels(letter: str, table: pd.DataFrame) -> list[tuple[str, Floats]]:
-    """The number of each curve, and its middle in the plan."""
-    if not len(table):
-        return []
-    middles = table[["middle_x", "middle_y"]].to_numpy()
-    return [(f"{letter}{k}", at) for k, at in enumerate(middles, start=1)]
-
-
-def _extent(line: Line) -> Floats:
-    return np.array([line.points.min(axis=0), line.points.max(axis=0)])

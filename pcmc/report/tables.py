@@ -1,9 +1,9 @@
-"""The numbers of a roof as tables of texts: a head, and rows of equal length."""
+"""The blocks of a report, and the numbers of a roof as tables of texts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,12 +14,28 @@ from ..certificate import Certificate
 from ..panelling import Panels
 from ..quantities import Figure, dimension_of
 from ..surface import Surface
+from .plan import PaperPlan
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
 
 DIGITS = 4  # of the largest number of a column
+MIDDLE = ("middle_x", "middle_y", "middle_z")
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them
+
+
+class Heading(NamedTuple):
+    """A heading that stays with what follows it, perhaps on a new page."""
+
+    text: str
+    new_page: bool = False
+
+
+class Picture(NamedTuple):
+    """A picture across the page, as a PNG file, with its title above it."""
+
+    title: str
+    png: bytes
 
 
 class Table(NamedTuple):
@@ -29,6 +45,10 @@ class Table(NamedTuple):
     head: list[str]
     rows: list[list[str]]
     words: int = 1
+
+
+Block = str | Heading | Picture | Table | PaperPlan
+"""What the pages of a report are made of; a text alone is a paragraph."""
 
 
 def column(values: Iterable[float], digits: int = DIGITS) -> list[str]:
@@ -68,27 +88,23 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
     width, depth, _ = np.ptp(surface.vertices, axis=0).tolist()
     rows = [["size in the plan", f"{one(width)} × {one(depth)} {units.length}"]]
     for (quantity, owner), label in LISTED.items():
-        values = [
-            f.value for f in figures if (f.quantity, f.owner) == (quantity, owner) and f.value is not None
-        ]
+        found = [f.value for f in figures if (f.quantity, f.owner) == (quantity, owner)]
+        values = [value for value in found if value is not None]
         if values:
-            unit = units.behind(dimension_of(quantity)).strip()
-            rows.append([label, f"{one(sum(values))} {unit}"])
+            rows.append([label, f"{one(sum(values))} {units.behind(dimension_of(quantity)).strip()}"])
     rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
     return Table("Key figures", [], rows)
 
 
 def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
-    table, length = certificate.patches, units.length
-    loads = {"pressure": "pressure", "snow": "snow", "net": "net pressure"}
-    columns = {
-        f"tension, {units.tension}": column(table["tension"]),
-        **{f"{name}, {units.pressure}": column(table[key]) for key, name in loads.items() if key in table},
-        f"area, {units.area}": column(table["area"]),
-        f"mean curvature, 1/{length}": column(table["mean_H"]),
-        "its largest error": [small(x) for x in table["variational_max"].tolist()],
-    }
+    table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
+    pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]
+    columns = _numbers(table, ["tension"], units.tension) | _numbers(table, pressures, units.pressure)
+    columns |= _numbers(table, ["area"], units.area) | _numbers(
+        table, ["mean curvature"], f"1/{units.length}"
+    )
+    columns["its largest error"] = [small(x) for x in table["variational_max"].tolist()]
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
@@ -97,81 +113,55 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
     return _table("Patches", ["patch", "kind"], words, columns)
 
 
-def junction_table(certificate: Certificate, units: Units) -> Table | None:
-    """A row per junction, numbered as in the plan."""
-    table = certificate.junctions
-    if not len(table):
-        return None
-    words = [[f"J{k}", name] for k, name in enumerate(table["junction"], start=1)]
-    columns = {
-        f"length, {units.length}": column(table["length"]),
-        **_middles(table, units),
-        f"force left, {units.tension}": [small(x) for x in table["force_left"].tolist()],
-    }
-    return _table("Junctions", ["", "between"], words, columns)
-
-
-def support_tables(certificate: Certificate, units: Units) -> list[Table]:
-    """A row per support, numbered as in the plan, and how their sum balances the loads."""
-    table, force = certificate.supports, units.force or "force"
-    if not len(table):
-        return []
-    words = table[["support", "name", "kind"]].to_numpy(str).tolist()
-    words = [[label, "" if name == label else name, kind] for label, name, kind in words]
-    columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
-    columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
-    columns |= _vectors(table, "force", "R", force)
-    columns[f"largest, {units.tension}"] = column(table["per_length_max"])
-    listed = _table("Supports and their reactions", ["", "of", "kind"], words, columns)
-    balance, moment = certificate.balance, f"{force}·{units.length}"
-    columns = _vectors(balance, "force", "F", force) | _vectors(balance, "moment", "M", moment)
-    return [listed, _table("Balance", [""], [[part] for part in balance["of"]], columns)]
-
-
-def wall_table(certificate: Certificate, units: Units) -> Table | None:
-    """How far each wall leans from the vertical, and where."""
+def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
+    """Junctions and supports with their reactions, numbered as in the plan, and how far walls lean."""
+    table, force = certificate.junctions, units.force or "force"
+    if len(table):
+        words = [[f"J{k}", name] for k, name in enumerate(table["junction"], start=1)]
+        columns = _numbers(table, ["length", *MIDDLE], units.length)
+        columns[f"force left, {units.tension}"] = [small(x) for x in table["force_left"].tolist()]
+        yield _table("Junctions", ["", "between"], words, columns)
     table = certificate.leaning
-    if not len(table):
-        return None
-    columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
-    columns |= {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
-    return _table(
-        "Walls: the largest angle from the vertical", ["wall"], [[w] for w in table["wall"]], columns
-    )
-
-
-def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
-    """The cables with their forces, and what holds their ends."""
-    tables, force = [], units.force or "force"
-    if len(certificate.cables):
-        table = certificate.cables
+    if len(table):
         columns = {
-            f"force, {force}": column(table["tension"]),
-            f"length, {units.length}": column(table["length"]),
-            **_middles(table, units),
+            "lean, °": [f"{lean:.1f}" for lean in table["lean"]],
+            **_numbers(table, "xyz", units.length),
         }
-        tables.append(_table("Cables", ["cable"], [[name] for name in table["cable"]], columns))
-    if len(certificate.cable_ends):
-        table = certificate.cable_ends
+        words = [[wall] for wall in table["wall"]]
+        yield _table("Walls: the largest angle from the vertical", ["wall"], words, columns)
+    table = certificate.supports
+    if len(table):
+        words = table[["support", "name", "kind"]].to_numpy(str).tolist()
+        words = [[label, "" if name == label else name, kind] for label, name, kind in words]
+        columns = _numbers(table, "xyz", units.length)
+        columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
+        columns |= _vectors(table, "force", "R", force)
+        columns[f"largest, {units.tension}"] = column(table["per_length_max"])
+        yield _table("Supports and their reactions", ["", "of", "kind"], words, columns)
+        balance = certificate.balance
+        columns = _vectors(balance, "force", "F", force)
+        columns |= _vectors(balance, "moment", "M", f"{force}·{units.length}")
+        yield _table("Balance", [""], [[part] for part in balance["of"]], columns)
+
+
+def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
+    """The cables with their forces, what holds their ends, and the rooms of prescribed volume."""
+    table, force = certificate.cables, units.force or "force"
+    if len(table):
+        columns = {f"force, {force}": column(table["tension"])}
+        columns |= _numbers(table, ["length", *MIDDLE], units.length)
+        yield _table("Cables", ["cable"], [[name] for name in table["cable"]], columns)
+    table = certificate.cable_ends
+    if len(table):
         held = ["held" if held else "free" for held in table["held"]]
         words = [[name, end] for name, end in zip(table["cable"], held, strict=True)]
-        columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
-        columns |= _vectors(table, "force", "F", force)
-        tables.append(_table("Ends of cables, and the forces on them", ["cable", "end"], words, columns))
-    return tables
-
-
-def room_table(certificate: Certificate, units: Units) -> Table | None:
-    """The rooms of prescribed volume."""
+        columns = _numbers(table, "xyz", units.length) | _vectors(table, "force", "F", force)
+        yield _table("Ends of cables, and the forces on them", ["cable", "end"], words, columns)
     table = certificate.rooms
-    if not len(table):
-        return None
-    columns = {
-        f"volume, {units.volume}": column(table["volume"]),
-        f"prescribed, {units.volume}": column(table["prescribed"]),
-        f"pressure, {units.pressure}": column(table["pressure"]),
-    }
-    return _table("Rooms of prescribed volume", ["room"], [[name] for name in table["room"]], columns)
+    if len(table):
+        columns = _numbers(table, ["volume", "prescribed"], units.volume)
+        columns |= _numbers(table, ["pressure"], units.pressure)
+        yield _table("Rooms of prescribed volume", ["room"], [[name] for name in table["room"]], columns)
 
 
 def target_table(targets: pd.DataFrame, units: Units) -> Table:
@@ -207,8 +197,8 @@ def family_table(schedule: Panels, units: Units) -> Table:
     columns = {
         "panels": [str(count) for count in table["count"]],
         "turned over": [str(count) for count in table["mirrored"]],
-        **{f"{side}, {units.length}": column(table[side]) for side in "abc"},
-        f"area, {units.area}": column(table["area"]),
+        **_numbers(table, "abc", units.length),
+        **_numbers(table, ["area"], units.area),
     }
     return _table("", ["family"], [[f"F{k}"] for k in table["family"]], columns)
 
@@ -225,8 +215,8 @@ def _vectors(table: pd.DataFrame, kind: str, letter: str, unit: str) -> dict[str
     return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
-def _middles(table: pd.DataFrame, units: Units) -> dict[str, list[str]]:
-    return {f"middle {axis}, {units.length}": column(table[f"middle_{axis}"]) for axis in "xyz"}
+def _numbers(table: pd.DataFrame, keys: Iterable[str], unit: str) -> dict[str, list[str]]:
+    return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key in keys}
 
 
 def small(value: float) -> str:

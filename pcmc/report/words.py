@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
 from ..certificate.balance import balance_sentence
-from .tables import small
+from ..panelling import Panels
+from .tables import MOST_FAMILIES, one, small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -30,13 +31,13 @@ VERDICTS = {
 }
 """What each verdict means for those who build."""
 
-
 LEGEND = (
     "J1, J2 and so on number the junctions, B1, B2 and so on the supports along lines, S1, S2 and so on those"
     " at points, C1, C2 and so on the ends of cables on lines, as in the tables. Black: rims. Red: ridges."
     " Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels."
 )
 """How to read the plan."""
+ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes may be from the number."
 
 
 def verdict_sentences(
@@ -91,3 +92,21 @@ def about_forces(units: Units) -> str:
         f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on the"
         " roof: z is up, so a negative z holds the roof down."
     )
+
+
+def panel_text(schedule: Panels, units: Units) -> str:
+    """How many panels and families there are, how large, and how they meet."""
+    total, angles = schedule.edge_totals, schedule.edges["dihedral"].dropna()
+    text = (
+        f"{len(schedule.panels)} flat triangles in {schedule.count} families. Panels of a family differ"
+        f" by at most {schedule.tolerance:g} {units.length} in the length of each edge."
+        f" Together they have an area of {one(schedule.area)} {units.area}, and edges of"
+        f" {one(float(total['length'].sum()))} {units.length}."
+        f" The largest has {one(float(schedule.largest['area']))} {units.area}, the smallest"
+        f" {one(float(schedule.smallest['area']))} {units.area}."
+    )
+    if len(angles):
+        text += f" The angle between neighbours is from {angles.min():.1f}° to {angles.max():.1f}°."
+    if schedule.count > MOST_FAMILIES:
+        text += f" The table has the {MOST_FAMILIES} largest families."
+    return text

@@ -5,7 +5,8 @@ Gives ``solve``, ``find_method`` and ``METHODS`` to the rooms above. Imports ``c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base import validate
@@ -23,26 +24,7 @@ class Method(NamedTuple):
     options: type[Any]
 
 
-# Imported when first used: scipy's solvers take as long to import as all else.
-def _newton() -> Method:
-    from .newton import NewtonOptions, newton
-
-    return Method(newton, NewtonOptions)
-
-
-def _nesterov() -> Method:
-    from .nesterov import NesterovOptions, nesterov
-
-    return Method(nesterov, NesterovOptions)
-
-
-def _lbfgs() -> Method:
-    from .lbfgs import LbfgsOptions, lbfgs
-
-    return Method(lbfgs, LbfgsOptions)
-
-
-METHODS: Mapping[str, Callable[[], Method]] = {"newton": _newton, "nesterov": _nesterov, "lbfgs": _lbfgs}
+METHODS = ("newton", "nesterov", "lbfgs")
 
 
 def find_method(name: str) -> Method:
@@ -51,7 +33,8 @@ def find_method(name: str) -> Method:
     >>> find_method("lbfgs").options().memory
     10
     """
-    return METHODS[validate.choice("method", name, tuple(METHODS))]()
+    module = import_module(f".{validate.choice('method', name, METHODS)}", __name__)  # scipy's take long
+    return Method(getattr(module, name), getattr(module, f"{name.capitalize()}Options"))
 
 
 def solve(

@@ -11,6 +11,8 @@ import numpy as np
 from ..base import validate
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
+from ..stability.equilibrium import SecondVariation
+from ..stability.softness import clear_of_zero
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped
 from .state import State
@@ -75,16 +77,7 @@ class Log:
 class NewtonRun:
     """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
-    Attributes
-    ----------
-    state : the surface reached. stepper : what moves it.
-    status : why the run ended. note : a further finding, for the result's message.
-    rows : the history up to here, with those of the runs ``before``.
-    smooth_steps : descent steps to take before the next Newton step.
-    stuck : whether the last step failed: none lowers the residual or the energy.
-    best, steps_since_best : the least residual, and steps taken since it was last halved.
-    patience : how many steps down from a saddle may hardly lower E, if a minimum is sought.
-    before_descent : the positions where the present way down from a saddle began, and the version there.
+    ``rows`` are the history up to here, with those of the runs ``before``; ``status`` is why the run ended.
     """
 
     def __init__(
@@ -101,19 +94,22 @@ class NewtonRun:
         self.held = held
         self.state = State(surface, options.min_quality, held, options.backend)
         self.stepper = Stepper(self.state, options.target == "minimum")
-        self.status, self.note = Status.ITERATION_LIMIT, ""
+        self.status, self.note = Status.ITERATION_LIMIT, ""  # the note goes into the result's message
         self.first_quality = self.state.quality
         self._shown = self.state.at.X, self.state.version  # as in the last row
+        # how many steps down from a saddle may hardly lower E, if a minimum is sought
         self.patience = float(SLOW_DESCENT_STEPS[0]) if options.target == "minimum" else np.inf
         self._steps = 0
         self._descent: list[float] = []  # E after each step of the present way down from a saddle
-        self.before_descent = self._shown
+        self.before_descent = self._shown  # where that way began
+        self.clear: SecondVariation | None = None  # at rest, if it is clear of zero
         self._restart(smooth_steps)
 
     def _restart(self, smooth_steps: int = 0) -> None:
         """Measure progress from here."""
-        self.smooth_steps, self.stuck = smooth_steps, False
-        self.best, self.steps_since_best = self.state.at.residual, 0
+        self.smooth_steps = smooth_steps  # to take before the next Newton step
+        self.stuck = False  # by the last step: none lowers the residual or the energy
+        self.best, self.steps_since_best = self.state.at.residual, 0  # since it was last halved
 
     def run(self) -> NewtonRun:
         """Step until the end, or on from there; ``status`` then gives the reason."""
@@ -196,10 +192,14 @@ class NewtonRun:
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
-        if self.options.target == "minimum" and self.stepper.leave_saddle(self.state.at):
-            return True
+        if self.options.target == "minimum":
+            self.clear = clear_of_zero(self.state.at)
+            self.stepper.factorisations += self.clear is not None
+            if self.clear is None and self.stepper.leave_saddle(self.state.at):
+                return True
         if not self.state.resting.any():
             return False
+        self.clear = None
         self.stepper.free()  # at rest no factor is needed, and after a release another
         if self.state.lift_overpulled() or self.state.update_walls():
             self.stepper.kind = "release"

@@ -9,11 +9,10 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
-from ..forces import kernels
-from ..forces.flat_pieces import flat_pieces
+from ..forces import triangles
+from ..forces.flat_pieces import add_plane_forces, add_plane_volumes, flat_pieces
 from ..forces.functional import add_cables_and_weights, total
 from ..forces.motion_space import tension_forces
-from ..forces.plane_pieces import add_plane_forces, add_plane_volumes
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, dot, point, scaled, vector
@@ -38,9 +37,8 @@ class Point(NamedTuple):
 def converged_below(surface: Surface, tolerance: float | None) -> float:
     """‖∇E‖² up to which a run from a surface has converged, force²; 0 for none.
 
-    This is the tolerance wherever the norm F of the single triangles' forces, at the start, is 1 or more.
-    Where F is less, it is tolerance · F², or a surface small enough would be at rest in any shape. Nor is
-    it below (ROUNDING · F)², which rounding keeps a large surface from.
+    The tolerance, times F² where the norm F of the single triangles' forces at the start is below 1, or a
+    small surface would be at rest in any shape; at least (ROUNDING · F)², which rounding leaves.
 
     >>> from pcmc import Patch, Surface
     >>> corners, faces = [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]]
@@ -69,7 +67,7 @@ class Evaluator:
 
     def __init__(self, surface: Surface) -> None:
         self.count = 0
-        self._mesh = kernels.energy_mesh(surface)
+        self._mesh = triangles.energy_mesh(surface)
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
@@ -81,12 +79,11 @@ class Evaluator:
         """E, ∇E and ‖∇E‖² with the vertices at X (n,3); not finite rather than an error."""
         self.count += 1
         tension, pressure = self._mesh.tension, self._mesh.pressure
-        if self._single:  # the same sums as kernels.measure, without its overhead for threads
-            area, volume, G = np.zeros_like(tension), np.zeros_like(tension), np.zeros(X.shape)
-            m = len(self._mesh.faces)
-            kernels.measure_block(self._mesh, X, 0, m, area, volume, G)
+        if self._single:  # the same sums as triangles.measure, without its overhead for threads
+            (area, volume), G = np.zeros((2, len(tension))), np.zeros(X.shape)
+            triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), area, volume, G)
         else:
-            area, volume, G = kernels.measure(self._mesh, X)
+            area, volume, G = triangles.measure(self._mesh, X)
         if self._pieces:
             add_plane_volumes(self._surface, X, volume)
             add_plane_forces(self._surface, pressure, X, G)

@@ -20,7 +20,7 @@ from .result import Callback, Progress, Result, Status, until_stopped
 
 COLUMNS = ("evaluation", "energy", "gradient_squared")
 ORDINARY = 20  # powers of two from 1: NLopt's fixed numbers do no harm within
-NOISE = 1e-13  # of the energy: two energies closer than this are equal in floats
+SAME_ENERGY = 1e-13  # of the energy: two energies closer than this are equal in floats
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,9 @@ class LbfgsOptions:
 class Coordinates:
     """The unknowns of a surface: three for a free vertex, two along its plane for a sliding one.
 
-    They are displacements divided by √(4 α), α the largest tension. L-BFGS starts with the step 1,
-    here the move -∇E / (4 α): about the longest the stiffest vertex takes (Σ cot is 3.5 on an
-    equilateral mesh). Its later steps do not depend on the unit. NLopt bounds its steps by fixed numbers,
-    so where size · √α is far from 1, they are measured in a power of two near it.
+    They are displacements divided by √(4 α), α the largest tension. L-BFGS starts with the step 1, here
+    -∇E / (4 α): about the longest the stiffest vertex takes (Σ cot is 3.5 on an equilateral mesh). NLopt
+    bounds its steps by fixed numbers, so where size · √α is far from 1, they are in a power of two near it.
 
     >>> from pcmc import Patch, Surface
     >>> sail = Surface([[0, 0, 0], [1, 0, 0], [0, 0, 1]], [[0, 1, 2]], [0],
@@ -98,27 +97,18 @@ class Coordinates:
 
 
 class Objective:
-    """The function that NLopt calls. It measures, records, and remembers the best point.
-
-    Attributes
-    ----------
-    rows : of the history, as tuples of ``COLUMNS``.
-    best : the point of least energy; the converged one if there is one.
-    status : why the last point ends the run, or None.
-    raised : an exception of the callback or Ctrl-C, to be raised once NLopt has returned.
-    halt : makes NLopt stop.
-    """
+    """The function that NLopt calls. It measures, records, and remembers the best point."""
 
     def __init__(self, surface: Surface, options: LbfgsOptions, callback: Callback | None) -> None:
         self.surface, self.options, self.callback = surface, options, callback
         self.coordinates = Coordinates(surface)
         self.evaluate = Evaluator(surface)
         self.tolerance = converged_below(surface, options.tolerance)
-        self.rows: list[tuple[Any, ...]] = []
-        self.best: Point | None = None
-        self.status: Status | None = None
-        self.raised: BaseException | None = None
-        self.halt: Callable[[], object] = lambda: None
+        self.rows: list[tuple[Any, ...]] = []  # of ``COLUMNS``
+        self.best: Point | None = None  # of least energy; the converged one if there is one
+        self.status: Status | None = None  # why the last point ends the run
+        self.raised: BaseException | None = None  # by the callback, until NLopt has returned
+        self.halt: Callable[[], object] = lambda: None  # makes NLopt stop
 
     def __call__(self, s: Floats, out: Floats) -> float:
         """E at s, ∂E/∂s into ``out``; NLopt may call again after ``halt``, and must see no exception."""
@@ -159,15 +149,10 @@ class Objective:
 def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callback | None = None) -> Result:
     """Minimise E over the free coordinates with NLopt's LD_LBFGS (Nocedal 1980; Luksan's code).
 
-    The same energy and supports as in the paper's flow. NLopt shows only its evaluations, not which of
-    them end an iteration, so the history has a row for each, including trials of the line search.
-
-    Returns
-    -------
-    Result
-        The surface of least energy seen. ``history``: ``evaluation``, ``energy``, ``gradient_squared``; its
-        last row is the returned surface, measured once more where the last trial was not the best. Status
-        STALLED when NLopt's line search finds no step (NLopt reports this as an error with an empty message).
+    The same energy and supports as in the paper's flow. The ``history`` (``evaluation``, ``energy``,
+    ``gradient_squared``) has a row for each evaluation, trials of the line search included: NLopt shows no
+    more. The result is the surface of least energy seen, measured once more where the last trial was not
+    the best. Status STALLED when NLopt's line search finds no step, an error with an empty message there.
 
     Examples
     --------
@@ -221,6 +206,6 @@ def _optimize(objective: Objective) -> Status:
 
 def _better(new: Point, best: Point) -> bool:
     """Whether it has less energy, or the same to rounding and less force."""
-    if abs(new.energy - best.energy) > NOISE * abs(best.energy):
+    if abs(new.energy - best.energy) > SAME_ENERGY * abs(best.energy):
         return new.energy < best.energy
     return new.squared < best.squared

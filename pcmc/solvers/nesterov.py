@@ -87,12 +87,9 @@ def nesterov(
     smallest of them. Every vertex moves in all the directions its support allows, so the triangles
     may degrade while E falls.
 
-    Returns
-    -------
-    Result
-        ``history``: a row per iteration, row 0 the surface as given, with ``iteration``,
-        ``evaluation`` (of E and ∇E together, so far), ``energy``, ``gradient_squared``, ``t`` (NaN
-        in row 0) and ``armijo_held`` (False where the floor was taken although it failed).
+    The ``history`` has a row per iteration, row 0 the surface as given: ``iteration``, ``evaluation`` (of E
+    and ∇E together, so far), ``energy``, ``gradient_squared``, ``t`` (NaN in row 0) and ``armijo_held``
+    (False where the floor was taken although it failed).
 
     Examples
     --------

@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import SurfaceError
-from ..certificate.collapse import held_wall_down
-from ..certificate.slipping import describe_saddle, slipping_ends
+from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..contact.pinching import find_walls
 from ..forces.functional import energy
 from ..forces.rooms import check_rooms, room_pressures
@@ -49,7 +48,7 @@ def newton(
         end = _solve_level(surface, options, log, level, rows)
         if end.status is not Status.CONVERGED or level == options.levels:
             break
-        surface, rows = refine(end.state.result_surface()), end.rows
+        surface, rows, end.clear = refine(end.state.result_surface()), end.rows, None
     reached = end.state.result_surface()
     return Result(
         surface=reached,
@@ -60,6 +59,7 @@ def newton(
         evaluations=log.evaluations,
         rows=end.rows,
         note=end.note,
+        clear=[end.clear] if end.clear is not None else [],
         room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from ..certificate import Certificate
     from ..certificate.proof import Attempt, Proof
+    from ..stability.equilibrium import SecondVariation
 
 
 class Status(Enum):
@@ -68,15 +69,13 @@ class Result:
     status : why the solver stopped; ``message`` is its sentence.
     method : the solver's name.
     energy : E of ``surface``, force·length.
-    iterations, evaluations : steps taken; passes over the triangles made, for E, ∇E or its
-        derivative along a motion.
-    rows : the rows of ``history``, each a mapping of its columns.
-    history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
-        ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
+    iterations, evaluations : steps taken; passes over the triangles, for E, ∇E or its derivative.
+    rows : of ``history``, with at least ``evaluation``, ``energy`` and ``gradient_squared`` (‖∇E‖²).
     note : a further finding of the solver, shown in the message.
     proofs : why there is no equilibrium, where that was proved.
     tried : what the search has tried, the given start first, if it found none.
     room_changes : δ of each room of prescribed volume, by which its pressure has changed, force/length².
+    clear : the second variation factorised at rest, if it is clear of zero; used up by the first certificate.
     """
 
     surface: Surface
@@ -90,6 +89,7 @@ class Result:
     proofs: tuple[Proof, ...] = ()
     tried: tuple[Attempt, ...] = ()
     room_changes: tuple[float, ...] = ()
+    clear: list[SecondVariation] = field(default_factory=list)
 
     def __repr__(self) -> str:
         """How the solver ended, the verdict if the certificate was asked for, and the surface reached."""
@@ -127,6 +127,7 @@ class Result:
             evidence=evidence,
             tried=self.tried,
             whole=whole,
+            clear=self.clear.pop() if self.clear else None,
         )
 
     @cached_property
@@ -144,7 +145,7 @@ class Result:
     @cached_property
     def rooms(self) -> pd.DataFrame:
         """A row per room of prescribed volume: the certificate's, and the ``change`` of its pressure."""
-        from ..certificate.certificate import room_table
+        from ..certificate.tables import room_table
 
         return room_table(self.surface).assign(change=self.room_changes)
 
@@ -156,18 +157,11 @@ class Result:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """What a callback gets after each iteration.
+    """What a callback gets after each iteration."""
 
-    Attributes
-    ----------
-    iteration : its number; 0 is the start.
-    surface : call it for the surface reached.
-    row : the row just added to the history.
-    """
-
-    iteration: int
-    surface: Callable[[], Surface]
-    row: Mapping[str, Any]
+    iteration: int  # its number; 0 is the start
+    surface: Callable[[], Surface]  # call it for the surface reached
+    row: Mapping[str, Any]  # the row just added to the history
 
 
 Callback = Callable[[Progress], None]

@@ -1,4 +1,4 @@
-"""Smooth descent: the energy gradient in the metric of the α-weighted cotangent Laplacian.
+"""Smooth motions: the energy gradient in the metric of the α-weighted cotangent Laplacian L_α.
 
     L_α d = - B Bᵀ ∇E
 
@@ -12,10 +12,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import csr_array, triu
 
 from ..base.arrays import Bools, Floats, Ints
 from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
-from ..forces.pattern import hessian_pattern
+from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.second_variation import assemble
 from ..stability.factorisation import factoriser
 from ..surface import Surface
@@ -23,7 +24,6 @@ from ..surface.supports import apply_supports
 from ..surface.topology import SHEET
 
 FLOOR = 1e-2  # of the largest tension it is connected with: the least tension of any patch in L_α
-PIN = 1e8  # of a vertex's stiffness: the weight that makes it follow its prescribed motion
 ACROSS = 1e-9  # sine or cosine of an angle up to which directions count as parallel or at right angles
 SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports, too
 
@@ -40,27 +40,31 @@ class Smoother:
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
         floor = FLOOR * _largest_around(surface)
         tensions = {p.name: max(p.tension, least) for p, least in zip(surface.patches, floor, strict=True)}
-        moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
+        self._moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
-        all_faces = replace(classes, active=np.ones(surface.m, dtype=bool), **faces)
+        self._classes = replace(classes, active=np.ones(surface.m, dtype=bool), **faces)
         used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
         self._surface, self._axes = surface, _axes(surface)
-        free, self._number = _free_coordinates(surface, used, self._axes)
-        self._coordinates = [_Coordinate(moderated, all_faces, mask, backend) for mask in free]
-        self.factorisations = len(free)
+        self._free, self._number = _free_coordinates(surface, used, self._axes)
+        self._spaces = [_one_unknown_each(free) for free in self._free]
+        self._patterns = [hessian_pattern(self._classes, space) for space in self._spaces]
+        self._factorisers = [factoriser(pattern, backend) for pattern in self._patterns]
+        self.factorisations = len(self._free)
 
     def refresh(self, X: Floats) -> None:
         """Compute L_α at the positions X (n,3) and factorise it."""
-        for coordinate in self._coordinates:
-            coordinate.refresh(X)
+        self._factors = []
+        for space, pattern, solver in zip(self._spaces, self._patterns, self._factorisers, strict=True):
+            data = _laplacian(self._moderated, self._classes, space, pattern, X)
+            self._factors.append(solver.factor(data))
 
     def solve(self, forces: Floats) -> Floats:
         """L_α⁻¹ forces (n,3), zero where a support holds the coordinate."""
         local = forces @ self._axes.T
-        out = np.empty_like(local)
-        for number, coordinate in enumerate(self._coordinates):
-            columns = self._number == number
-            out[:, columns] = coordinate.solve(local[:, columns])
+        out = np.zeros_like(local)
+        for number, (free, factor) in enumerate(zip(self._free, self._factors, strict=True)):
+            place = np.ix_(free, self._number == number)
+            out[place] = factor.solve(local[place])
         out = out @ self._axes
         return apply_supports(self._surface, out) if self._surface.on_planes else out
 
@@ -112,33 +116,22 @@ def _one_unknown_each(vertices: Bools) -> MotionSpace:
     return MotionSpace.of(basis, vertices.astype(np.int64))
 
 
-class _Coordinate:
-    """L_α over the vertices whose coordinate is free."""
-
-    def __init__(self, surface: Surface, classes: VertexClasses, free: Bools, backend: str | None) -> None:
-        self._space = _one_unknown_each(free)
-        self._surface, self._classes, self._free = surface, classes, free
-        self._pattern = hessian_pattern(classes, self._space)
-        self._factoriser = factoriser(self._pattern, backend)
-
-    def refresh(self, X: Floats) -> None:
-        data = assemble(self._surface, self._classes, self._space, self._pattern, X, 0.0, stiffness=1.0)
-        data[self._pattern.indptr[:-1]] *= 1.0 + SHIFT
-        self._factor = self._factoriser.factor(data)
-
-    def solve(self, forces: Floats) -> Floats:
-        out = np.zeros_like(forces)
-        out[self._free] = self._factor.solve(forces[self._free])
-        return out
+def _laplacian(
+    surface: Surface, classes: VertexClasses, space: MotionSpace, pattern: Pattern, X: Floats
+) -> Floats:
+    """The values of L_α in the pattern."""
+    data = assemble(surface, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
+    data[pattern.indptr[:-1]] *= 1.0 + SHIFT
+    return data
 
 
 class HarmonicExtension:
     """Lets the inside of the sheets follow the motion of their curves.
 
-    The motion of curves and points is extended harmonically into the sheets: L_α w = 0 inside, w given on
-    the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape, as
-    far as its support lets it. ``prescribed`` (n,) are the vertices where w is given, in place of the curves
-    and the fixed ones.
+    The motion of curves and points is extended harmonically into the sheets: L w = 0 inside, w given on
+    the curves, L with equal tensions. With the inside i and the curves c,  L_ii w_i = -L_ic w_c. Each sheet
+    vertex takes the part of w along its sheet, which does not change the shape, as far as its support lets
+    it. ``prescribed`` (n,) are the vertices where w is given, in place of the curves and the fixed ones.
     """
 
     def __init__(
@@ -154,18 +147,21 @@ class HarmonicExtension:
         none = {cable.name: 0.0 for cable in surface.cables}
         equal = surface.retensioned({p.name: 1.0 for p in surface.patches}, cables=none)
         pattern = hessian_pattern(classes, space)
-        data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
-        diagonal = pattern.indptr[:-1]
-        data[diagonal] *= 1.0 + SHIFT
-        self._surface, self._used = surface, used
+        L = pattern.symmetric(_laplacian(equal, classes, space, pattern, X))
         curves = (classes.kind != SHEET) | surface.fixed
-        self._prescribed = curves if prescribed is None else prescribed
-        self._weight = np.where(self._prescribed[used], PIN * data[diagonal], 0.0)
-        data[diagonal] += self._weight
-        # scaled to a diagonal of ones, so that no pivot beside a prescribed vertex looks like zero
-        self._scale = 1.0 / np.sqrt(np.where(data[diagonal] > 0.0, data[diagonal], 1.0))
-        data *= np.repeat(self._scale, np.diff(pattern.indptr)) * self._scale[pattern.indices]
-        self._factor = factoriser(pattern, backend).factor(data)
+        self._surface, self._prescribed = surface, curves if prescribed is None else prescribed
+        self._inside, self._given = used & ~self._prescribed, used & self._prescribed
+        inside = self._inside[used]
+        self._coupling = csr_array(L[inside][:, ~inside])
+        upper = csr_array(triu(L[inside][:, inside]))
+        upper.sort_indices()
+        # scaled to a diagonal of ones, so that no weak pivot looks like zero
+        diagonal = upper.diagonal()
+        self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        data = upper.data * np.repeat(self._scale, np.diff(upper.indptr)) * self._scale[upper.indices]
+        self._factor = factoriser(
+            Pattern(upper.indptr, upper.indices, np.empty((0, 3), dtype=np.int32)), backend
+        ).factor(data)
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices following the curves."""
@@ -176,9 +172,7 @@ class HarmonicExtension:
 
     def harmonic(self, motion: Floats) -> Floats:
         """w (n,3), as ``motion`` where it is prescribed."""
-        given = np.where(self._prescribed[:, None], motion, 0.0)
-        w = np.zeros_like(motion)
-        right = (self._scale * self._weight)[:, None] * given[self._used]
-        w[self._used] = self._scale[:, None] * self._factor.solve(right)
-        w[self._prescribed] = given[self._prescribed]
+        w = np.where(self._prescribed[:, None], motion, 0.0)
+        scale, right = self._scale[:, None], self._coupling @ w[self._given]
+        w[self._inside] = -scale * self._factor.solve(scale * right)
         return w

@@ -25,6 +25,7 @@ from scipy.sparse import csc_array, csr_array
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 
+Entries = tuple[Ints, Ints, Floats]  # of a sparse matrix: where each row or column begins, numbers, values
 ROUNDING = 2.0**-53  # u: relative error of one operation
 UNDERFLOW = float(np.finfo(float).tiny)  # 2⁻¹⁰²²: far more than one product loses to underflow
 
@@ -55,24 +56,17 @@ def backward_error(lower: csc_array, upper: csc_array) -> float:
     gamma = terms * ROUNDING / (1.0 - terms * ROUNDING)
     sums, pivot = np.zeros(n), upper.diagonal()
     with np.errstate(over="ignore"):
-        _row_sums(rows.indptr, rows.indices, rows.data, lower.indptr, lower.indices, lower.data, gamma, sums)
+        entries = [(part.indptr, part.indices, part.data) for part in (rows, lower)]
+        _row_sums(entries[0], entries[1], gamma, sums)
         # all terms are positive: sums of n of them in three stages are off by γ_3n, relative
         lost = n * UNDERFLOW * (1.0 + np.abs(pivot).max(initial=0.0))
         return float((sums.max(initial=0.0) + lost) * (1.0 + 8.0 * (n + 8) * ROUNDING))
 
 
 @compiled
-def _row_sums(
-    u_start: Ints,
-    u_column: Ints,
-    u: Floats,
-    l_start: Ints,
-    l_row: Ints,
-    l: Floats,
-    gamma: Floats,
-    out: Floats,
-) -> None:
+def _row_sums(upper: Entries, lower: Entries, gamma: Floats, out: Floats) -> None:
     """out = |L| w, w_j = Σ_i γ_i |u_ji| + |u_ji - d_j l_ij| + rounding; indices sorted."""
+    (u_start, u_column, u), (l_start, l_row, l) = upper, lower
     for j in range(len(out)):
         a, b, weight = u_start[j], l_start[j], 0.0
         pivot = u[a] if a < u_start[j + 1] and u_column[a] == j else 0.0

@@ -59,7 +59,9 @@ def count_negative(matrix: csc_array, lu: Any, factorise: Callable[[csc_array], 
         return int(np.count_nonzero(lu.U.diagonal() < 0.0))
     weak, now = np.empty(0, dtype=np.int64), lu
     for _ in range(3):  # a pivot may turn out too small only after others before it are stronger
-        weak = np.union1d(weak, _weak_pivots(now))
+        largest = np.abs(now.L).max(axis=0).toarray().ravel()  # far more than the pivot, or it was exchanged
+        small = (largest[now.perm_c] > GROWTH) | (now.perm_r != now.perm_c)
+        weak = np.union1d(weak, np.flatnonzero(small))
         if not 0 < len(weak) <= MOST:
             break
         entries = matrix[:, weak].toarray()
@@ -103,13 +105,6 @@ def _doubt(matrix: csc_array, lu: Any) -> str:
         if np.max(left) < most:
             return ""
     return f"small pivots have spoiled the factors (refinement leaves {np.max(left):.0e}): inertia unknown"
-
-
-def _weak_pivots(lu: Any) -> Ints:
-    """The rows whose pivot is far smaller than its column, or had to be exchanged."""
-    largest = np.abs(lu.L).max(axis=0).toarray().ravel()
-    growing = largest[lu.perm_c] > GROWTH
-    return np.flatnonzero(growing | (lu.perm_r != lu.perm_c))
 
 
 @compiled

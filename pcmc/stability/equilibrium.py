@@ -31,8 +31,7 @@ from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from ..surface.supports import apply_supports
-from .bordered import BorderedFactor
-from .factorisation import Factor, Factoriser, SingularMatrix, factoriser
+from .factorisation import BorderedFactor, Factor, Factoriser, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 TINY = float(np.finfo(float).tiny)
@@ -82,6 +81,12 @@ class Equilibrium:
         if "unknowns" in known and np.array_equal(new.space.dimension, self.space.dimension):
             new.__dict__["unknowns"] = self.unknowns
         return new
+
+    def same_as(self, other: Equilibrium) -> bool:
+        """Whether both are of the same faces and patches, at the same positions."""
+        here, there = self.surface, other.surface
+        alike = np.array_equal(self.X, other.X) and np.array_equal(here.faces, there.faces)
+        return alike and here.patches == there.patches and here.rooms == there.rooms
 
     def release(self) -> None:
         """Give back the memory of the factoriser; another is made when it is asked for."""
@@ -294,7 +299,7 @@ class Equilibrium:
                 data = data.copy()
                 data[pattern.indptr[:-1]] -= shift
             with suppress(SingularMatrix):
-                found = SecondVariation(self, solver.factor(data), stiffness, added)
+                found = SecondVariation(self, pattern, solver.factor(data), stiffness, added)
                 if soften:
                     _ = found.negative  # which may be what rounding hides
                 return found
@@ -313,6 +318,7 @@ class SecondVariation:
     """
 
     of: Equilibrium
+    pattern: Pattern
     factor: Factor
     stiffness: float = 0.0
     added: float = 0.0
@@ -327,14 +333,14 @@ class SecondVariation:
         """(N,N) sparse symmetric A, without the shift, with what was added."""
         more = self.stiffness + self.added
         data = self.of._plain_matrix if more == 0.0 else self.of.matrix(1.0, more)
-        return self.of.unknowns.pattern.symmetric(data)
+        return self.pattern.symmetric(data)
 
     @cached_property
     def added_matrix(self) -> csr_array | None:
         """(N,N) what was added to a singular matrix; None if nothing was."""
         if not self.added:
             return None
-        return self.of.unknowns.pattern.symmetric(self.of.matrix(0.0, self.added))
+        return self.pattern.symmetric(self.of.matrix(0.0, self.added))
 
     @cached_property
     def bordered(self) -> Factor | BorderedFactor:

@@ -32,7 +32,7 @@ from ..base.errors import MissingExtra, PcmcError
 from ..forces.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
-__all__ = ("BACKENDS", "Factor", "Factoriser", "SingularMatrix", "available", "factoriser")
+__all__ = ("BACKENDS", "BorderedFactor", "Factor", "Factoriser", "SingularMatrix", "available", "factoriser")
 Ordering = Literal["MMD_AT_PLUS_A", "NATURAL"]
 BACKENDS = ("pardiso", "superlu")
 OUTDATED = (
@@ -109,25 +109,10 @@ def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | Non
     return plain if units is None else _Scaled(plain, pattern, units)
 
 
-def _finite(data: Floats) -> None:
-    if not np.isfinite(data).all():
-        raise SingularMatrix("the matrix has entries that are not finite")
-
-
-class _Scaled:
-    """Factorises U A U."""
-
-    def __init__(self, plain: Factoriser, pattern: Pattern, units: Floats) -> None:
-        self._plain, self._units = plain, units
-        rows = np.repeat(units, np.diff(pattern.indptr))
-        self._products = rows * units[pattern.indices]
-
-    def factor(self, data: Floats) -> Factor:
-        return _ScaledFactor(self._plain.factor(self._products * data), self._units)
-
-
 @dataclass(frozen=True, eq=False)
 class _ScaledFactor:
+    """Of A, from one of U A U."""
+
     plain: Factor
     units: Floats
 
@@ -140,12 +125,52 @@ class _ScaledFactor:
         return units * self.plain.solve(units * right)
 
 
+class _Scaled:
+    """Factorises U A U."""
+
+    def __init__(self, plain: Factoriser, pattern: Pattern, units: Floats) -> None:
+        self._plain, self._units = plain, units
+        self._products = np.repeat(units, np.diff(pattern.indptr)) * units[pattern.indices]
+
+    def factor(self, data: Floats) -> Factor:
+        return _ScaledFactor(self._plain.factor(self._products * data), self._units)
+
+
+class BorderedFactor:
+    """The inverse of [[A, -C], [Cᵀ, 0]], A factorised, C (N,r): by the Schur complement Cᵀ A⁻¹ C.
+
+    It exists where A is singular along C alone, as at a fold in the pressure. Near there the factor of A
+    loses digits, and the inverse is a preconditioner.
+
+    >>> pattern = Pattern(np.array([0, 1, 2]), np.array([0, 1]), np.empty((0, 3)))
+    >>> factor = factoriser(pattern, "superlu").factor(np.array([2.0, -1.0]))
+    >>> BorderedFactor(factor, np.array([[1.0], [0.0]])).solve(np.array([0.0, 1.0, 3.0])).tolist()
+    [3.0, -1.0, 6.0]
+    """
+
+    def __init__(self, factor: Factor, columns: Floats) -> None:
+        self._factor, self._columns = factor, columns
+        self._behind = factor.solve(columns)
+        self._schur = np.linalg.pinv(columns.T @ self._behind)
+
+    def solve(self, right: Floats) -> Floats:
+        """(s, μ) (N+r,) with A s - C μ and Cᵀ s as given in ``right`` (N+r,)."""
+        size = len(self._columns)
+        s = self._factor.solve(right[:size])
+        multipliers = self._schur @ (right[size:] - self._columns.T @ s)
+        return np.append(s + self._behind @ multipliers, multipliers)
+
+
+def _finite(data: Floats) -> None:
+    if not np.isfinite(data).all():
+        raise SingularMatrix("the matrix has entries that are not finite")
+
+
 class _SuperLU:
     """scipy's SuperLU in symmetric mode: pivots stay on the diagonal.
 
-    After refinement neighbours have numbers far apart, and the minimum-degree ordering then takes
-    several times as long as the factorisation. Rows in Cuthill-McKee order avoid this. The ordering is
-    computed for the first matrix and used for all later ones.
+    After refinement neighbours have numbers far apart, and the minimum-degree ordering takes several times
+    as long as the factorisation: rows in Cuthill-McKee order avoid this. The first matrix orders all.
     """
 
     def __init__(self, pattern: Pattern) -> None:
@@ -160,7 +185,6 @@ class _SuperLU:
         self._arrange(reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty)
 
     def _arrange(self, order: Ints) -> None:
-        """Take rows and columns in this order from now on."""
         arranged = csc_array(self._full[order][:, order])
         arranged.sort_indices()
         self._order = order
@@ -182,7 +206,6 @@ class _SuperLU:
 
 
 def _superlu(matrix: csc_array, ordering: Ordering = "MMD_AT_PLUS_A") -> Any:
-    """L and U with pivots on the diagonal, unless one is zero."""
     return splu(matrix, ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
 
 

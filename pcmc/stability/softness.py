@@ -14,24 +14,22 @@ from ..base.arrays import Floats
 from .equilibrium import Equilibrium, SecondVariation
 from .factorisation import SingularMatrix
 
+# |λ| size²/α up to which a certificate's detail names a fold. A mesh's own branch folds where the derivative
+# of the forces left is singular, which is not quite the second variation: at reported folds of coarse caps,
+# catenoids and pairs of caps |λ| is 0.003 to 0.55. A flat film over a disc has 46.
+NEAR = 1.0
+NEUTRAL = 1e-2  # |λ| size²/α up to which a motion counts as neutral, α the tension of what it moves
+
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Counts of eigenvalues.
+    """Counts of eigenvalues."""
 
-    Attributes
-    ----------
-    index : of the negative ones; None where rounding hides it.
-    below : of those that are negative and not soft; None where rounding hides it.
-    soft, near : of the soft ones, and of those in a wider band.
-    hidden : what else of it could not be computed, as a sentence.
-    """
-
-    index: int | None = None
-    below: int | None = None
-    soft: int = 0
-    near: int = 0
-    hidden: str = ""
+    index: int | None = None  # of the negative ones; None where rounding hides it
+    below: int | None = None  # of those that are negative and not soft; None where rounding hides it
+    soft: int = 0  # of the soft ones
+    near: int = 0  # of those in a wider band
+    hidden: str = ""  # what else of it could not be computed, as a sentence
 
     @property
     def unknown(self) -> bool:
@@ -39,13 +37,26 @@ class Spectrum:
         return self.below is None or bool(self.hidden)
 
 
-def count_soft(at: Equilibrium, band: float, near: float) -> tuple[Spectrum, SecondVariation | None]:
+def clear_of_zero(at: Equilibrium) -> SecondVariation | None:
+    """A - σM with σ = near · max α, factorised, if nothing is negative or near; None otherwise."""
+    above = _factorised(at, _wide(at, NEAR / at.shape.size**2))
+    return above if above is not None and above.negative == 0 else None
+
+
+def _wide(at: Equilibrium, near: float) -> Floats:
+    return near * at.surface.tensions.max(initial=0.0) * at.mass
+
+
+def count_soft(
+    at: Equilibrium, band: float, near: float, clear: SecondVariation | None = None
+) -> tuple[Spectrum, SecondVariation | None]:
     """The counts for two bands in units of α, 1/length², and a factor for the modes; None if there is none.
 
-    One factorisation where nothing is near or negative, two where nothing is near, else up to seven.
+    One factorisation where nothing is near or negative, or none if ``clear_of_zero`` is known; two where
+    nothing is near, else up to seven.
     """
-    wide = near * at.surface.tensions.max(initial=0.0) * at.mass
-    above = _factorised(at, wide)
+    wide = _wide(at, near)
+    above = clear or _factorised(at, wide)
     if above is not None and above.negative == 0:
         return Spectrum(0, 0), above
     below = _factorised(at, -wide)

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.units import length_factor
 from ..surface import Surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, vertex_sums
@@ -17,13 +16,14 @@ from ..surface.geometry import area_vectors, face_areas, vertex_sums
 GRAVITY = 9.81  # m/s²
 
 
-def standard_gravity(length: str) -> float:
-    """9.81 m/s² in a unit of length per s²; without a unit, in metres.
+@dataclass(frozen=True, eq=False)
+class Step:
+    """All loads at the end of a step of the analysis."""
 
-    >>> standard_gravity("mm"), round(standard_gravity("ft"), 3), standard_gravity("")
-    (9810.0, 32.185, 9.81)
-    """
-    return GRAVITY * (length_factor("m", length) if length else 1.0)
+    name: str  # "form pressure" ("… less snow", where the form was found under snow), or those of its loads
+    pressures: Floats  # (k,) force per area on each patch along its normal: the form's, net of snow, and wind
+    forces: Floats  # (n,3) forces on the vertices that keep their direction
+    gravity: float = 0.0  # length/time², 0 without self-weight
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class SelfWeight:
 
     def __post_init__(self) -> None:
         if self.gravity is not None:
-            object.__setattr__(
-                self,
-                "gravity",
-                validate.number("SelfWeight.gravity", self.gravity, least=SMALLEST, most=LARGEST),
-            )
+            gravity = validate.number("SelfWeight.gravity", self.gravity, least=SMALLEST, most=LARGEST)
+            object.__setattr__(self, "gravity", gravity)
         _check_name(self.name)
+
+    def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
+        return replace(step, gravity=standard if self.gravity is None else self.gravity)
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,27 @@ class Snow:
     name: str = "snow"
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "load", validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
-        )
+        load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
+        object.__setattr__(self, "load", load)
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
         object.__setattr__(self, "patches", tuple(self.patches))
         _check_name(self.name)
+
+    def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
+        """A third of each triangle's load at each of its corners; triangles below others carry none."""
+        named = [surface.patch_index(name) for name in self.patches]
+        carrying = named or np.flatnonzero(surface.roof).tolist()
+        if not carrying:
+            hint = "all patches are walls; name those that carry snow"
+            validate.refuse("Snow.patches", self.patches, "names of patches", hint=hint)
+        normal = np.array(surface.plane.normal)
+        plan = area_vectors(surface.vertices[surface.faces]) @ normal
+        side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
+        plan = np.maximum(plan * side[surface.patch_of_face], 0.0)
+        plan[~np.isin(surface.patch_of_face, carrying)] = 0.0
+        snow = -self.load / 3.0 * vertex_sums(plan[:, None] * normal, surface.faces, surface.n)
+        return replace(step, forces=step.forces + snow)
 
 
 @dataclass(frozen=True)
@@ -92,9 +106,8 @@ class Wind:
 
     def __post_init__(self) -> None:
         if not isinstance(self.pressures, Mapping) or not self.pressures:
-            validate.refuse(
-                "Wind.pressures", self.pressures, "pressures by patch name, such as {'roof': 0.5}"
-            )
+            expected = "pressures by patch name, such as {'roof': 0.5}"
+            validate.refuse("Wind.pressures", self.pressures, expected)
         checked = {
             zone: validate.number("Wind.pressures", value, least=-LARGEST, most=LARGEST, where=str(zone))
             for zone, value in self.pressures.items()
@@ -102,26 +115,18 @@ class Wind:
         object.__setattr__(self, "pressures", checked)
         _check_name(self.name)
 
+    @property
+    def patches(self) -> tuple[str, ...]:
+        return tuple(self.pressures)
+
+    def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
+        pressures = step.pressures.copy()
+        for zone, value in self.pressures.items():
+            pressures[surface.patch_index(zone)] += value
+        return replace(step, pressures=pressures)
+
 
 Load = SelfWeight | Snow | Wind
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """All loads at the end of a step of the analysis.
-
-    Attributes
-    ----------
-    name : "form pressure" ("… less snow", where the form was found under snow), or the names of its loads.
-    pressures : (k,) force per area on each patch along its normal; the form's, net of its snow, and wind.
-    forces : (n,3) forces on the vertices that keep their direction.
-    gravity : length/time², 0 without self-weight.
-    """
-
-    name: str
-    pressures: Floats
-    forces: Floats
-    gravity: float = 0.0
 
 
 def load_steps(
@@ -138,52 +143,24 @@ def load_steps(
     >>> both.name, both.pressures.tolist(), both.forces.sum(axis=0).round(9).tolist()
     ('snow and wind', [3.0], [0.0, 0.0, -2.0])
     """
+    per_face = surface.weights[surface.patch_of_face] * face_areas(surface.vertices[surface.faces])
+    downwards = -np.array(surface.plane.normal) / 3.0
+    weight = vertex_sums(per_face[:, None] * downwards, surface.faces, surface.n)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
-    form = Step(name, surface.net_pressures, _dead_weight(surface))
-    permanent, steps = form, [form]
-    for entry in loads:
-        together = entry if isinstance(entry, tuple) else (entry,)
+    permanent = Step(name, surface.net_pressures, weight)
+    steps = [permanent]
+    for together in map(acting_together, loads):
         step = replace(permanent, name=" and ".join(load.name for load in together))
         for load in together:
-            step = _added(step, load, surface, gravity)
-            if isinstance(load, SelfWeight):
-                permanent = replace(permanent, gravity=step.gravity)
+            step = load.added_to(step, surface, gravity)
         steps.append(step)
+        permanent = replace(permanent, gravity=step.gravity)
     return tuple(steps)
 
 
-def _added(step: Step, load: Load, surface: Surface, gravity: float) -> Step:
-    """The step with one more load."""
-    if isinstance(load, SelfWeight):
-        return replace(step, gravity=gravity if load.gravity is None else load.gravity)
-    if isinstance(load, Snow):
-        return replace(step, forces=step.forces + _snow(surface, load))
-    pressures = step.pressures.copy()
-    for zone, value in load.pressures.items():
-        pressures[surface.patch_index(zone)] += value
-    return replace(step, pressures=pressures)
-
-
-def _snow(surface: Surface, snow: Snow) -> Floats:
-    """(n,3) a third of each triangle's load at each of its corners; triangles below others carry none."""
-    named = [surface.patch_index(name) for name in snow.patches]
-    carrying = named or np.flatnonzero(surface.roof).tolist()
-    if not carrying:
-        hint = "all patches are walls; name those that carry snow"
-        validate.refuse("Snow.patches", snow.patches, "names of patches", hint=hint)
-    normal = np.array(surface.plane.normal)
-    plan = area_vectors(surface.vertices[surface.faces]) @ normal
-    side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
-    plan = np.maximum(plan * side[surface.patch_of_face], 0.0)
-    plan[~np.isin(surface.patch_of_face, carrying)] = 0.0
-    return -snow.load / 3.0 * vertex_sums(plan[:, None] * normal, surface.faces, surface.n)
-
-
-def _dead_weight(surface: Surface) -> Floats:
-    """(n,3) forces of the patches' own weights per area, which belong to the form-finding load."""
-    per_face = surface.weights[surface.patch_of_face] * face_areas(surface.vertices[surface.faces])
-    downwards = -np.array(surface.plane.normal) / 3.0
-    return vertex_sums(per_face[:, None] * downwards, surface.faces, surface.n)
+def acting_together(entry: Load | Sequence[Load]) -> tuple[Load, ...]:
+    """The loads of one step: those of a tuple, or a single one."""
+    return entry if isinstance(entry, tuple) else (entry,)  # type: ignore[return-value]
 
 
 def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
@@ -192,17 +169,14 @@ def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
     for entry in loads:
-        together = entry if isinstance(entry, tuple) and entry else (entry,)
-        for load in together:
+        for load in entry if isinstance(entry, tuple) and entry else (entry,):
             if not isinstance(load, Load):
                 validate.refuse("loads", load, expected)
-            named = load.pressures if isinstance(load, Wind) else getattr(load, "patches", ())
-            for name in named:
+            for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
     return tuple(loads)
 
 
 def _check_name(name: object) -> None:
-    """A name is a line of text."""
     if not isinstance(name, str) or not name.strip() or "\n" in name:
         validate.refuse("name of a load", name, "a line of text")

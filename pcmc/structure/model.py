@@ -11,18 +11,20 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array
-from ..base.units import NO_UNITS, Units
+from ..base.errors import OptionError
+from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
-from ..forces.weight import effective_tensions
+from ..forces.triangles import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.supports import apply_supports
-from .cables import THINNEST, checked_areas
-from .loads import GRAVITY, Load, SelfWeight, Step, check_loads, load_steps, standard_gravity
+from .loads import GRAVITY, Load, SelfWeight, Snow, Step, Wind, acting_together, check_loads, load_steps
+
+THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
 
 
 @dataclass(frozen=True)
@@ -45,12 +47,13 @@ class Material:
     density: float = 0.0
 
     def __post_init__(self) -> None:
-        young = validate.number("Material.young", self.young, least=SMALLEST, most=LARGEST)
-        object.__setattr__(self, "young", young)
-        poisson = validate.number("Material.poisson", self.poisson, least=0.0, below=0.5)
-        object.__setattr__(self, "poisson", poisson)
-        density = validate.number("Material.density", self.density, least=0.0, most=LARGEST)
-        object.__setattr__(self, "density", density)
+        limits: dict[str, dict[str, Any]] = {
+            "young": {"least": SMALLEST, "most": LARGEST},
+            "poisson": {"least": 0.0, "below": 0.5},
+            "density": {"least": 0.0, "most": LARGEST},
+        }
+        for name, bounds in limits.items():
+            object.__setattr__(self, name, validate.number(f"Material.{name}", getattr(self, name), **bounds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,56 +100,57 @@ class StructuralModel:
     elements: str = "membrane"
     cable_area: float | Mapping[str, float] | None = None
     cable_material: Material | None = None
-    certificate: Certificate | None = field(default=None, repr=False)
+    certificate: Any = field(default=None, repr=False)
     units: Units = NO_UNITS
-    verdict: str = field(init=False, repr=False)
-    certified: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         given: Any = self.surface
         solved = given if isinstance(given, Result) else None
-        object.__setattr__(self, "surface", given if solved is None else solved.surface)
-        expect_surface(self.surface)
+        surface = given if solved is None else solved.surface
+        expect_surface(surface)
         if not isinstance(self.material, Material):
             hint = "give Material(young=..., poisson=...)"
             validate.refuse("material", self.material, "a Material", hint=hint)
-        object.__setattr__(self, "thickness", checked_thickness(self.thickness, self.surface))
+        thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
-        checked_areas(self.cable_area, self.surface)
+        checked_areas(self.cable_area, surface)
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
-        object.__setattr__(self, "loads", check_loads(self.loads, self.surface))
-        if self.material.density == 0.0 and any(
-            isinstance(load, SelfWeight) for load in self._single_loads()
-        ):
+        loads = check_loads(self.loads, surface)
+        heavy = any(isinstance(load, SelfWeight) for entry in loads for load in acting_together(entry))
+        if self.material.density == 0.0 and heavy:
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
-        if self.certificate is None and solved is not None:
-            object.__setattr__(self, "certificate", solved.certificate)
-        certificate = certified(self.surface, self.anyway, self.certificate)
-        object.__setattr__(self, "certificate", certificate)
-        object.__setattr__(self, "verdict", certificate.verdict.value)
-        object.__setattr__(self, "certified", certificate.certified)
+        known = solved.certificate if self.certificate is None and solved is not None else self.certificate
+        certificate = certified(surface, self.anyway, known)
+        values = {"surface": surface, "thickness": thickness, "loads": loads, "certificate": certificate}
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
-    def _single_loads(self) -> list[Load]:
-        return [load for entry in self.loads for load in (entry if isinstance(entry, tuple) else (entry,))]
+    @property
+    def verdict(self) -> str:
+        """The sentence of the certificate's verdict."""
+        return str(self.certificate.verdict.value)
 
     @property
     def note(self) -> str:
         """The units of the file's numbers in a line, or what was assumed as they are not known."""
-        assumed = [load for load in self._single_loads() if isinstance(load, SelfWeight) and not load.gravity]
-        if not self.units and assumed:
+        if self.units:
+            return f"{self.units.sentence}, masses in {self.units.mass}, times in s"
+        single = [load for entry in self.loads for load in acting_together(entry)]
+        if any(isinstance(load, SelfWeight) and not load.gravity for load in single):
             return (
                 f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
             )
-        return f"{self.units.sentence}, masses in {self.units.mass}, times in s" if self.units else ""
+        return ""
 
     @cached_array
     def thicknesses(self) -> Floats:
         """(k,) thickness t of each patch."""
-        given = self.thickness
-        names = [patch.name for patch in self.surface.patches]
-        return np.array([given[name] if isinstance(given, Mapping) else given for name in names], dtype=float)
+        given, patches = self.thickness, self.surface.patches
+        return np.array(
+            [given[p.name] if isinstance(given, Mapping) else given for p in patches], dtype=float
+        )
 
     @cached_array
     def prestress(self) -> Floats:
@@ -163,6 +167,11 @@ class StructuralModel:
     def cable_areas(self) -> tuple[float, ...]:
         """The area of each cable's section, length²."""
         return checked_areas(self.cable_area, self.surface)
+
+    @property
+    def first_cable(self) -> int:
+        """The number of the first cable element."""
+        return self.surface.m + 1
 
     @cached_property
     def standing(self) -> Surface:
@@ -227,30 +236,90 @@ class StructuralModel:
     @cached_property
     def steps(self) -> tuple[Step, ...]:
         """The steps of the analysis, the form-finding load first."""
-        return load_steps(self.standing, self.loads, standard_gravity(self.units.length))
+        metre = length_factor("m", self.units.length) if self.units.length else 1.0
+        return load_steps(self.standing, self.loads, GRAVITY * metre)
 
     def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
-        """(n,3) the loads of a step as forces on the vertices, a third of each triangle's at its corners.
+        """(n,3) the loads of a step as forces on the vertices: thirds of triangles', halves of cable edges'.
 
         ``displacements`` (n,3) turn the pressures with the surface.
         """
-        s = self.standing
+        s, down = self.standing, -np.array(self.standing.plane.normal)
         X = s.vertices if displacements is None else s.vertices + displacements
         per_face = step.pressures[s.patch_of_face, None] * area_vectors(X[s.faces])
         mass = self.material.density * self.thicknesses[s.patch_of_face] * face_areas(s.vertices[s.faces])
-        per_face -= step.gravity * mass[:, None] * np.array(s.plane.normal)
-        shares = per_face[self.active] / 3.0
-        return step.forces + vertex_sums(shares, s.faces[self.active], s.n) + self._cable_weights(step)
-
-    def _cable_weights(self, step: Step) -> Floats:
-        """(n,3) half of each cable edge's weight at each of its ends."""
-        surface, forces = self.standing, np.zeros((self.surface.n, 3))
+        per_face += step.gravity * mass[:, None] * down
+        forces = step.forces + vertex_sums(per_face[self.active] / 3.0, s.faces[self.active], s.n)
         density = (self.cable_material or self.material).density
-        for cable, area in zip(surface.cables, self.cable_areas, strict=True):
-            half = 0.5 * density * area * step.gravity * segment_lengths(surface.vertices, cable.edges)
-            at_vertex = np.bincount(cable.edges.ravel(), np.repeat(half, 2), surface.n)
-            forces -= at_vertex[:, None] * np.array(surface.plane.normal)
+        for cable, area in zip(s.cables, self.cable_areas, strict=True):
+            half = 0.5 * density * area * step.gravity * segment_lengths(s.vertices, cable.edges)
+            forces += np.bincount(cable.edges.ravel(), np.repeat(half, 2), s.n)[:, None] * down
         return forces
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Material, thickness and loads of the structural model, in the units of the surface.
+
+    Attributes
+    ----------
+    young : Young's modulus, force per area.
+    thickness : of all patches, length, or a table with one for each patch.
+    poisson : Poisson's ratio.
+    density : mass per volume, as of ``Material``: t/m³ with kN and m. Above 0, self-weight is a load.
+    gravity : length/s²; by default 9.81 m/s² in the unit of length.
+    snow : load per plan area, besides the snow that the form was found under; 0 for none.
+    wind : pressures by patch, above 0 for suction on a roof.
+    cable_area : of the cables' sections, length², or a table with one for each cable.
+    """
+
+    young: float | None = None
+    thickness: float | Mapping[str, float] | None = None
+    poisson: float = 0.3
+    density: float = 0.0
+    gravity: float | None = None
+    snow: float = 0.0
+    wind: Mapping[str, float] = field(default_factory=dict)
+    cable_area: float | Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        self.material  # noqa: B018 (refuses bad values before any work)
+        self.loads  # noqa: B018
+
+    @property
+    def material(self) -> Material:
+        """The material of the patches and cables."""
+        for name in ("young", "thickness"):
+            if getattr(self, name) is None:
+                text = f"a structural model needs {name}; give --{name} or the key {name} of [structure]"
+                raise OptionError(text, what=name)
+        return Material(young=self.young or 0.0, poisson=self.poisson, density=self.density)
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """Self-weight, snow and wind, each in a step of its own."""
+        weight = [SelfWeight(self.gravity)] if self.density > 0.0 else []
+        snow = [Snow(self.snow)] if self.snow != 0.0 else []
+        return (*weight, *snow, *([Wind(self.wind)] if self.wind else []))
+
+    def check(self, surface: Surface) -> None:
+        """Refuse values that name no patch or cable of the surface, before it is solved."""
+        checked_thickness(self.thickness, surface)
+        check_loads(self.loads, surface)
+        checked_areas(self.cable_area, surface)
+
+    def model(
+        self,
+        surface: Any,
+        anyway: bool = False,
+        certificate: Certificate | None = None,
+        units: Units = NO_UNITS,
+    ) -> StructuralModel:
+        """The structural model of a surface at rest or of a result; errors as in ``pcmc.StructuralModel``."""
+        given: dict[str, Any] = {"cable_area": self.cable_area, "certificate": certificate, "units": units}
+        return StructuralModel(
+            surface, self.material, self.thickness or 0.0, self.loads, anyway=anyway, **given
+        )
 
 
 def checked_thickness(given: object, surface: Surface) -> float | dict[str, float]:
@@ -260,7 +329,22 @@ def checked_thickness(given: object, surface: Surface) -> float | dict[str, floa
         return validate.number("thickness", given, **limits)
     for name in given:
         surface.patch_index(name)
-    return {
-        patch.name: validate.number("thickness", given.get(patch.name), where=patch.name, **limits)
-        for patch in surface.patches
-    }
+    names = [patch.name for patch in surface.patches]
+    return {name: validate.number("thickness", given.get(name), where=name, **limits) for name in names}
+
+
+def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
+    """The area of each cable's section, from one number or one by name."""
+    names = [cable.name for cable in surface.cables]
+    limits: dict[str, Any] = {"least": (THINNEST * surface.size) ** 2, "most": surface.size**2}
+    if given is None and names:
+        message = f"cable_area is missing: give the area of the section of cable {names[0]!r}, length²"
+        raise OptionError(message, what="cable_area", where=names[0])
+    if isinstance(given, Mapping):
+        for name in given:
+            validate.choice("cable", name, names)
+    areas = [given.get(name) if isinstance(given, Mapping) else given for name in names]
+    return tuple(
+        validate.number("cable_area", area, where=name, **limits)
+        for name, area in zip(names, areas, strict=True)
+    )

@@ -14,14 +14,12 @@ from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
+from ..forces.cables import directions
 from ..surface.geometry import area_vectors
-from . import dat, frd
-from .blocks import TENSOR, Block
-from .cables import directions
-from .inp import first_cable
 from .model import StructuralModel
+from .tables import Block, read
 
-READERS = {".dat": dat.read, ".frd": frd.read}
+TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
 FAR = 1e-4  # of the size: a node farther from its vertex belongs to another surface
 
 
@@ -94,10 +92,9 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     if not isinstance(model, StructuralModel):
         validate.refuse("model", type(model).__name__, "a StructuralModel")
     check_regular(path)
-    suffix = suffix_of(path, READERS, "a result of CalculiX")
+    suffix = suffix_of(path, (".dat", ".frd"), "a result of CalculiX")
     try:
-        text = path.read_text(encoding="ascii")
-        steps = READERS[suffix](text)
+        steps = read(path.read_text(encoding="ascii"), suffix)
         _check(steps, model)
     except OSError as error:
         raise system_error(path, "read", error) from None
@@ -110,56 +107,41 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
 
 
 def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepResults:
-    """The arrays of step k on the surface's vertices and faces."""
-    step, n = model.steps[k], model.surface.n
-    displacements = np.full((n, 3), np.nan)
+    """The arrays of step k on the surface's vertices and faces, of which the standing ones are elements."""
+    step, surface, stress = model.steps[k], model.standing, blocks["stresses"]
+    displacements, reactions = np.full((surface.n, 3), np.nan), np.zeros((surface.n, 3))
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values
-    reactions = np.zeros((n, 3))
     if "forces" in blocks:
         reactions[blocks["forces"].ids - 1] = blocks["forces"].values
         reactions -= model.nodal_loads(step, np.nan_to_num(displacements))
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
-    tensions = _cable_tensions(model, blocks["cables"]) if "cables" in blocks else {}
-    stresses = _on_faces(model, blocks["stresses"])
-    return StepResults(step.name, model, displacements, reactions, stresses, tensions)
-
-
-def _cable_tensions(model: StructuralModel, stress: Block) -> dict[str, Floats]:
-    """The stress along each edge of a cable times its section, the mean over the section; by name."""
-    surface, first, tensions = model.standing, first_cable(model), {}
-    for cable, area in zip(surface.cables, model.cable_areas, strict=True):
-        numbers = first + np.arange(len(cable.edges))
-        mine = stress.means(numbers)[:, TENSOR]
-        along = directions(surface, cable.edges)
-        tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
-        first += len(cable.edges)
-    return tensions
-
-
-def _on_faces(model: StructuralModel, stress: Block) -> Floats:
-    """(m,3,3) for the faces of the surface, whose standing ones are the elements; NaN elsewhere."""
-    surface, faces = model.standing, model.faces
+    stresses = np.full((model.surface.m, 3, 3), np.nan)
     if stress.by_node:
         at_vertex = np.full((surface.n, 6), np.nan)
         at_vertex[stress.ids - 1] = stress.values
         values = at_vertex[surface.faces[model.active]].mean(axis=1)
     else:
-        values = stress.means(faces + 1)
-    tensors = np.full((model.surface.m, 3, 3), np.nan)
-    tensors[faces] = values[:, TENSOR]
-    return tensors
+        values = stress.means(model.faces + 1)
+    stresses[model.faces] = values[:, TENSOR]
+    tensions, first = {}, model.first_cable
+    for cable, area in zip(surface.cables, model.cable_areas, strict=True) if "cables" in blocks else ():
+        mine = blocks["cables"].means(first + np.arange(len(cable.edges)))[:, TENSOR]
+        along = directions(surface.vertices, cable.edges)[0]
+        tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
+        first += len(cable.edges)
+    return StepResults(step.name, model, displacements, reactions, stresses, tensions)
 
 
 def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
     """Refuse results with other nodes, elements or steps than the model's."""
-    nodes = np.flatnonzero(model.nodes) + 1
+    nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
+    edges = sum(len(cable.edges) for cable in model.standing.cables)
     for number, blocks in enumerate(steps[: len(model.steps)], 1):
-        for kind in ("displacements", "stresses", *(("forces",) if model.held.any() else ())):
+        for kind in ("displacements", "stresses", *(("forces",) if len(held) else ())):
             if kind not in blocks:
-                raise FileError(
-                    f"step {number} has no {kind}; run ccx on the model's file again", where=number
-                )
+                text = f"step {number} has no {kind}; run ccx on the model's file again"
+                raise FileError(text, where=number)
         moved, stress = blocks["displacements"], blocks["stresses"]
         _same("nodes", moved.ids, nodes)
         if stress.by_node:
@@ -167,10 +149,8 @@ def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
         else:
             _same("elements", np.unique(stress.ids), model.faces + 1)
         if "cables" in blocks:
-            edges = sum(len(cable.edges) for cable in model.standing.cables)
-            _same("cable elements", np.unique(blocks["cables"].ids), first_cable(model) + np.arange(edges))
+            _same("cable elements", np.unique(blocks["cables"].ids), model.first_cable + np.arange(edges))
         if "forces" in blocks:
-            held = np.flatnonzero(model.held) + 1
             _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
             _same("nodes", np.union1d(blocks["forces"].ids, nodes), nodes)
         if moved.places is not None:
@@ -183,11 +163,8 @@ def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
     if len(steps) != len(model.steps):
         names = [step.name for step in model.steps]
         state = f"{len(steps)} of the model's {len(names)} steps"
-        hint = (
-            f"ccx stopped in step {names[len(steps)]!r}"
-            if len(steps) < len(names)
-            else "is it another model's?"
-        )
+        stopped = len(steps) < len(names)
+        hint = f"ccx stopped in step {names[len(steps)]!r}" if stopped else "is it another model's?"
         raise FileError(f"has {state}; {hint}", found=len(steps), expected=len(names))
 
 

@@ -1,6 +1,6 @@
 """∇E and its derivative in frozen frames, each number enclosed in a ball.
 
-E is a sum over triangles and cable edges. With the formulas of ``forces.kernels`` and ``forces.weight`` a
+E is a sum over triangles and cable edges. With the formulas of ``forces.triangles`` a
 triangle of tension α, weight w and pressure p acts like one of tension τ = α + w z̄, and
 
     ∂E/∂i     = ½ τ ν × e_i + w A n/3 - p (x_j × x_k)/6

@@ -11,7 +11,7 @@ import pandas as pd
 
 from pcmc import Surface, curvature_error, gradient, mean_curvature, solve, target_curvature
 from pcmc.base.arrays import Floats, Ints
-from pcmc.forces import kernels
+from pcmc.forces import triangles
 from pcmc.forces.curvature import METHODS
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.quality import minimum_angle, triangle_quality
@@ -182,8 +182,8 @@ def conormals(surface: Surface, patch: str) -> Floats:
     """(n,3) area gradient of one patch at every vertex (17a): on its edge the outward co-normal."""
     tension = np.zeros(len(surface.patches))
     tension[surface.patch_index(patch)] = 1.0
-    mesh = kernels.energy_mesh(surface, tension, np.zeros_like(tension))
-    return kernels.measure(mesh, surface.vertices)[2]
+    mesh = triangles.energy_mesh(surface, tension, np.zeros_like(tension))
+    return triangles.measure(mesh, surface.vertices)[2]
 
 
 def turn(surface: Surface, vertex: int, patches: tuple[str, str]) -> float:

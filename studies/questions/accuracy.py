@@ -22,7 +22,7 @@ from pcmc import Surface, check_mesh, solve
 from pcmc.accuracy import AccurateResult, MeshCheck, solve_to_accuracy
 from pcmc.accuracy.estimator import error_shares, evenness
 from pcmc.base.arrays import Floats
-from pcmc.meshing.curve_projection import onto_held_curves
+from pcmc.meshing.held_curves import onto_held_curves
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Hole, PatchSpec, Plan, circle
 

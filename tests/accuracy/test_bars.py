@@ -94,7 +94,7 @@ def test_the_reaction_of_an_uneven_mesh_is_that_of_its_loads():
     assert holds(case, check)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_study_s_bars_hold_in_every_family(tmp_path):
     """On the coarsest mesh of each family; the study has all meshes."""
     perform(STUDY, tmp_path, short=True)

@@ -19,7 +19,7 @@ from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.certificate.reactions import reactions
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy, volume
-from pcmc.meshing.curve_projection import onto_held_curves
+from pcmc.meshing.held_curves import onto_held_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
@@ -186,7 +186,7 @@ def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():
     assert size_field(cap, np.zeros(cap.m), 400).min() > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_order_two_is_regained_at_a_re_entrant_corner():
     start = solve(l_roof(2.0)).surface
     wall = start.patches[-1].name

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
+from nightly import night_but
 
 from pcmc import cli
-from pcmc.certificate.slipping import describe_saddle
+from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, Plan
 from pcmc.project import load, run_project
 
@@ -49,10 +50,13 @@ def outcome_of(tmp_path, text):
     return run_project(load(path), use_cache=False)
 
 
+WEAK, HEAVY = "a wall too weak for its neighbours", "tensions that cannot carry the load"
+
+
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
-@pytest.mark.slow
-@pytest.mark.parametrize("text", WRONG.values(), ids=WRONG)
-def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, text):
+@pytest.mark.parametrize("kind", night_but(WRONG, WEAK, HEAVY))
+def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, kind):
+    text = WRONG[kind]
     first = outcome_of(tmp_path, text)
     assert not first.good
     heading, *lines = first.advice
@@ -87,6 +91,7 @@ def test_one_remedy_is_printed_the_one_that_was_tried(tmp_path, capsys):
     assert printed.err.count("cannot balance: 6 > 1 + 2") == 1
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
 def test_advice_that_misses_the_targets_says_so(tmp_path, monkeypatch):
     """A roof that comes to rest and misses the targets is advised in these words."""

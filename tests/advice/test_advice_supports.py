@@ -82,7 +82,6 @@ def test_supports_on_lines_are_no_point_masts():
 
 
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
-@pytest.mark.slow
 def test_for_a_drawing_the_ring_is_drawn(tmp_path, monkeypatch):
     file = drawing(tmp_path, ("line", "mast", (4, 3, 0), (4, 3, 2.5)))
     loaded = project.load(file)

@@ -10,8 +10,8 @@ from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap,
 from generators import spherical_cap_exact
 from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
 from pcmc.certificate import Verdict
-from pcmc.certificate.curve_tables import conormal_sum
 from pcmc.certificate.reactions import support_forces
+from pcmc.certificate.tables import conormal_sum
 from pcmc.contact.pinching import standing_part
 from pcmc.forces.functional import patch_areas, volume
 from pcmc.meshing.quality import triangle_quality

@@ -137,7 +137,6 @@ def test_tension_does_not_pass_zero():
     assert 0.0 < branch.points.parameter.iloc[-1] < 1e-3
 
 
-@pytest.mark.slow
 def test_mesh_that_collapses_ends_the_branch_with_that_reason():
     start = solve(two_caps(1.2), target="stationary").surface
     branch = follow(start, Direction({"small": 1.0}), 8.0)

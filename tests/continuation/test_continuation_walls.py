@@ -37,7 +37,6 @@ def test_fold_of_two_caps_on_a_coarse_mesh():
     assert not solve(lower).converged  # no minimum is left; a far saddle is
 
 
-@pytest.mark.slow
 def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
     start = solve(two_squares(8, alpha_aux=1.8)).surface
     branch = follow(start, "wall", 2.3)
@@ -110,7 +109,6 @@ def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
     assert len(branch.points) > 0 == len(branch.events)
 
 
-@pytest.mark.slow
 def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     pytest.importorskip("mmgpy")
     branch = follow(small_cap, "cap", until={"height": 1.5}, step=-0.05, min_quality=0.93, remesh=0.25)
@@ -121,7 +119,6 @@ def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     assert branch.points.parameter.to_numpy() == pytest.approx(exact, rel=0.05)
 
 
-@pytest.mark.slow
 def test_new_mesh_does_not_leap_over_a_goal(small_cap):
     pytest.importorskip("mmgpy")
     options = {"step": -0.05, "min_quality": 0.93, "remesh": 0.25}

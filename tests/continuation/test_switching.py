@@ -156,6 +156,7 @@ def ennepers():
     return branches
 
 
+@pytest.mark.nightly
 def test_enneper_s_surface_turns_unstable_at_its_hemisphere_with_second_order(ennepers):
     radius = []
     for branch in ennepers:
@@ -170,6 +171,7 @@ def test_enneper_s_surface_turns_unstable_at_its_hemisphere_with_second_order(en
     assert extrapolated == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.nightly
 def test_two_more_surfaces_of_less_area_leave_it(ennepers):
     area = []
     for branch in ennepers[:2]:

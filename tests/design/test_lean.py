@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from nightly import at_night
 from refusals import refused
 
 from pcmc import Parameter, Target, certify, cli, meet, solve
@@ -81,10 +82,13 @@ def test_the_command_says_which_walls_lean(tmp_path, capsys, upright):
     assert ("walls lean from the vertical: 'wall 1'" in capsys.readouterr().out) is (upright == "false")
 
 
+NEAR = partial(refine_near, points=[6, 3, 0.5], levels=2, radius=1.5)
+
+
 @pytest.mark.parametrize(
     "finer",
-    [refine, partial(remesh, edge_length=0.7), lambda surface: refine_near(surface, [6, 3, 0.5], 2, 1.5)],
-    ids=["refined", "remeshed", "refined near"],
+    [partial(remesh, edge_length=0.7), *at_night(refine, NEAR)],
+    ids=["remeshed", "refined", "refined near"],
 )
 @pytest.mark.parametrize("turned", [0.0, 2.0])
 def test_an_upright_wall_stays_upright_on_finer_meshes(finer, turned):

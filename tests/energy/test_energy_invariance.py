@@ -105,6 +105,7 @@ def test_threads_do_not_change_the_answer(small_blocks, workers):
         assert d.tobytes() == again[0][1].tobytes()
 
 
+@pytest.mark.nightly
 def test_a_mesh_of_two_real_blocks():
     points, faces = hexagon(110)  # 72 600 triangles
     X = np.column_stack([points, 0.01 * (points**2).sum(axis=1)])

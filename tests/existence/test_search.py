@@ -255,7 +255,6 @@ def test_a_part_that_nothing_holds_falls_under_its_weight():
     assert unheld(heavy.rebuilt(fixed=[0])) is None
 
 
-@pytest.mark.slow
 def test_a_way_that_crawls_ends_at_the_saddle_and_names_the_ends_that_slip():
     surface = two_squares(64, alpha_aux=1.0)
     saddle = solve(surface, target="stationary")
@@ -342,7 +341,6 @@ def test_sweeps_search_only_if_asked():
     assert solve_case(**case, inflation=2.0, search=True)["verdict"] == "stable"
 
 
-@pytest.mark.slow
 def test_from_equal_tensions_to_those_asked_for():
     """The pressure cannot be raised from low ones: there the stronger patch pulls the wall away."""
     weak = two_caps(1.2, alpha_large=1.0, alpha_small=1.5, alpha_aux=6.0)

@@ -10,7 +10,6 @@ import time
 import urllib.request
 from pathlib import Path
 
-import nbformat
 import pytest
 from browsing import SOFTWARE_GL, Explored, browser, needs_browser, until
 
@@ -25,6 +24,8 @@ CELLS = [
 @pytest.fixture
 def lab(tmp_path):
     """A JupyterLab of its own, with a notebook of the two cells; its address."""
+    import nbformat  # here, as it takes seconds to import
+
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(c) for c in CELLS])
     notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
     nbformat.write(notebook, tmp_path / "cap.ipynb")
@@ -67,7 +68,7 @@ def lab(tmp_path):
         running.wait(30)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @needs_browser
 def test_the_page_is_a_cells_output_and_its_surface_is_in_the_next(lab, tmp_path):
     from selenium.common.exceptions import WebDriverException

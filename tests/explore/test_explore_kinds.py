@@ -7,6 +7,7 @@ import tomllib
 import pytest
 from browsing import Explored, needs_browser, until
 from explore_cases import followed
+from nightly import night_but
 
 from pcmc.design import Target
 from pcmc.design.targets import measure
@@ -134,8 +135,7 @@ LABELS = {"tensions": "Tension α", "pressures": "Pressure p", "cables": "Tensio
 
 
 @needs_browser
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", TEXTS)
+@pytest.mark.parametrize("kind", night_but(TEXTS, "patches"))
 def test_every_kind_of_project_goes_through_the_page(kind, driver, tmp_path):
     """Opened, moved by hand, brought to a target, saved, and opened again with the same numbers."""
     with followed(written(kind, tmp_path)) as running:

@@ -172,7 +172,6 @@ vary = ["west", "east", {patch = "east", kind = "pressure", low = 0.5, high = 2.
 """
 
 
-@pytest.mark.slow
 def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT)
@@ -289,7 +288,6 @@ def test_wrong_targets_are_named_on_the_page(page):
     assert page.complaints() == []
 
 
-@pytest.mark.slow
 def test_sliders_agree_with_their_numbers(page, explorer):
     """Also for values beyond the slider's ends, zero, and another sign."""
     page.enter("Pressure p of right", 500)
@@ -315,6 +313,7 @@ def test_sliders_agree_with_their_numbers(page, explorer):
     page.complaints()
 
 
+@pytest.mark.nightly
 def test_slow_work_is_said(page, monkeypatch):
     real = Session.settle
 
@@ -336,6 +335,7 @@ def test_slow_work_is_said(page, monkeypatch):
     assert sign.value_of_css_property("color") == green
 
 
+@pytest.mark.nightly
 def test_two_pages_are_two_sessions(driver, explorer):
     one = Explored(driver, explorer.url)
     first = driver.current_window_handle

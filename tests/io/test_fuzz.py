@@ -27,7 +27,7 @@ for library in ("pyvista", "rhino3dm", "trimesh"):
     pytest.importorskip(library)
 
 READABLE = [suffix for suffix, form in FORMATS.items() if form.reads]
-FLIPS = int(os.environ.get("PCMC_FLIPS", "500"))  # PCMC_FLIPS=2000 for a long run
+FLIPS = int(os.environ.get("PCMC_FLIPS", "200"))  # PCMC_FLIPS=2000 for a long run
 OWN = (".obj", ".ply", ".fe")  # read by readers of our own, which check all themselves: no net below them
 NET = "not a readable ."  # how an error of the net begins
 
@@ -60,7 +60,6 @@ def damaged(whole, chance):
     return data[:a] + data[b:c] + data[a:b] + data[c:] if kind < 0.1 else data
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("suffix", READABLE)
 def test_flipped_bits(tmp_path, suffix, capfd):
     whole, path, chance = tmp_path / f"whole{suffix}", tmp_path / f"damaged{suffix}", random.Random(1)
@@ -73,7 +72,6 @@ def test_flipped_bits(tmp_path, suffix, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.slow
 def test_flipped_bits_of_a_project(tmp_path, capfd):
     path, chance, read = tmp_path / "a.toml", random.Random(1), 0
     for _ in range(FLIPS):
@@ -102,7 +100,8 @@ files = ["a.obj", "b.pcmc"]
 
 # ---- structure that is almost right
 
-SLOW = settings(max_examples=200, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+CHECKS = list(HealthCheck)
+SLOW = settings(max_examples=FLIPS // 2, deadline=None, derandomize=True, suppress_health_check=CHECKS)
 NUMBERS = st.one_of(
     st.integers(-3, 8).map(str),
     st.sampled_from(
@@ -124,7 +123,6 @@ def through(suffix, text, net=False):
         attempt(pcmc.read, path, net)
 
 
-@pytest.mark.slow
 @SLOW
 @given(LINES, st.sampled_from(["\n", "\r\n", "\r"]))
 def test_lines_of_obj(lines, end):
@@ -139,7 +137,6 @@ PROPERTY = st.tuples(KINDS, st.sampled_from(["x", "y", "z", "vertex_indices", "s
 ELEMENT = st.tuples(st.sampled_from(["vertex", "face", "other"]), NUMBERS, st.lists(PROPERTY, max_size=5))
 
 
-@pytest.mark.slow
 @SLOW
 @given(
     st.sampled_from(["ascii", "binary_little_endian", "binary_big_endian"]),
@@ -153,7 +150,6 @@ def test_headers_and_bodies_of_ply(form, elements, body):
     through(".ply", "\n".join([*lines, "end_header\n"]).encode() + body)
 
 
-@pytest.mark.slow
 @SLOW
 @given(
     st.lists(
@@ -175,7 +171,6 @@ JSON = st.recursive(
 )
 
 
-@pytest.mark.slow
 @SLOW
 @given(st.lists(st.sampled_from(["patches", "plane", "counts", 0, 1, 2]), max_size=4), JSON)
 def test_metadata_with_other_values(place, value):
@@ -200,7 +195,6 @@ STEPS = [
 ]
 
 
-@pytest.mark.slow
 @SLOW
 @given(st.lists(st.sampled_from(STEPS), min_size=1, max_size=5), JSON)
 def test_gltf_with_other_values(place, value):
@@ -235,7 +229,6 @@ VALUES = [
 ]
 
 
-@pytest.mark.slow
 @SLOW
 @given(st.sampled_from(VALUES), JSON)
 def test_projects_with_other_values(old, value):

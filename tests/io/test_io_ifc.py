@@ -27,7 +27,6 @@ def roof_of(path):
     return model, roof, {part.Name: part for part in roof.IsDecomposedBy[0].RelatedObjects}
 
 
-@pytest.mark.slow
 def test_the_validator_of_ifcopenshell_accepts_it(tmp_path):
     """With the rules of the schema; and it refuses a file in which a rule is broken."""
     from generators import two_squares

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from nightly import at_night
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
@@ -68,6 +69,7 @@ def film_pressure(bulge, half=0.5):
     return 2.0 * brentq(lambda q: reach(q) - half, 0.5001 / bulge, min(0.999 * most, 3.0))
 
 
+@pytest.mark.nightly
 def test_pressure_in_a_film_between_rings():
     """No pressure now: from the catenoid over the cylinder to the fold of the bulging film, by quadrature."""
     exact = -minimize_scalar(lambda r: -film_pressure(r), bounds=(1.2, 1.7), method="bounded").fun
@@ -78,6 +80,7 @@ def test_pressure_in_a_film_between_rings():
     assert found.where == "the roof inflates"
 
 
+@pytest.mark.nightly
 def test_two_caps_with_a_wall_fold_where_the_wall_pulls_too_much():
     """(4, 3, 3) at depth 4.5. Where the junction ends at a corner the fold depends a little on where the
     vertices lie along the surface; beside it, the solver and its eigenvalues agree."""
@@ -140,7 +143,7 @@ def test_a_saddle_is_followed_until_it_has_more_ways_down():
 
 
 @pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
-@pytest.mark.parametrize("build", [cap, lambda: solve(two_caps(1.2), target="stationary").surface])
+@pytest.mark.parametrize("build", [cap, *at_night(lambda: solve(two_caps(1.2), target="stationary").surface)])
 def test_surface_evolver_comes_to_rest_just_below_the_fold_and_runs_away_just_above(build):
     """On the same mesh, from the surface at the fold, by the program's own search along its Newton step."""
     start = build()

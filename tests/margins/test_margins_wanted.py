@@ -45,6 +45,7 @@ def test_slopes_at_the_fold_are_those_of_differences(cap):
         assert slope == pytest.approx((after - before) / 1e-3, rel=1e-2)
 
 
+@pytest.mark.nightly
 def test_a_margin_is_a_target(cap):
     design = meet(cap, WANTED, "cap")
     assert design.met
@@ -118,6 +119,7 @@ def test_the_page_asks_for_the_surface_shown(cap):
     assert session.margin("pressure", lambda: True) is None
 
 
+@pytest.mark.nightly
 @needs_browser
 def test_the_page_shows_the_sentence_and_the_shape_there(page):
     page.find("#margin").click()

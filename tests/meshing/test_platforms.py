@@ -31,6 +31,7 @@ def platform(radius, width, opening, walls, *, alpha, wall, h, turn=0.0, bottom=
     return Plan(outline, across, edge_length=h, tension=alpha).surface()
 
 
+@pytest.mark.nightly
 def test_a_remeshed_roof_is_at_rest_as_it_is_seen():
     """A foot comes to stand right below a resting crest vertex, from where it had hung apart."""
     coarse = solve(platform(15, 6, 100, (50,), alpha=3.6, wall=2.88, h=1.9, turn=7.0))

@@ -286,7 +286,6 @@ def test_a_patch_that_another_program_added_has_no_tension_to_convert(tmp_path):
         assert io.read_bare(path, "m")[0].tensions.tolist() == [1.0]
 
 
-@pytest.mark.slow
 def test_flipped_bits_never_crash_the_repair(tmp_path):
     X, F = sheet()
     data = obj(tmp_path / "a.obj", X, {"roof": F}).read_bytes()

@@ -13,8 +13,8 @@ from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Divider, Hole, PatchSpec, Plan, draft, patch_names, plan_from
+from pcmc.plan.build import dome, harmonic_heights
 from pcmc.plan.draft import drafted
-from pcmc.plan.heights import dome, harmonic_heights
 from pcmc.surface.topology import POINT
 
 BOX = [[0, 0], [20, 0], [20, 12], [0, 12]]
@@ -295,7 +295,6 @@ def test_heights_in_closed_form():
     np.testing.assert_allclose(base, mesh.points[:, 0] * 2 + 1, atol=1e-12)
 
 
-@pytest.mark.slow
 def test_twenty_thousand_triangles():
     surface = plan_from({**tomllib.loads(L_WITH_COURTYARD), "edge_length": 0.2}).surface()
     assert surface.m > 20_000

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 
 import drawn
 import numpy as np
@@ -216,11 +217,11 @@ def test_curves_of_rhino_stay_exact(tmp_path):
 
 
 def raise_for_overwriting(path):
-    from pcmc.cli.solving import _project
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        project.run_project(_project(path, None, [path], None, ""))
+        project.run_project(
+            replace(project.load(path), output=project.Output(files=[path]), folder=path.parent)
+        )
 
 
 def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():

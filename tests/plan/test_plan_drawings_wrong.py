@@ -140,7 +140,6 @@ def test_too_many_lines_and_patches_are_counted_with_the_name_of_the_file(tmp_pa
     assert str(caught.value).startswith(f"{path}: patches: 2500 are too many")
 
 
-@pytest.mark.slow
 def test_blocks_of_blocks_of_blocks_end(tmp_path):
     file = tmp_path / "a.dxf"
     document, space = drawn.new()
@@ -157,7 +156,6 @@ def test_blocks_of_blocks_of_blocks_end(tmp_path):
     assert "entities" in str(caught.value)
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
 def test_flipped_bits_of_a_drawing_raise_our_errors_only(tmp_path):
     data = drawn.corner(tmp_path / "corner.dxf").read_bytes()

@@ -12,7 +12,7 @@ from generators import spherical_cap, two_squares
 from pcmc.base.errors import MissingExtra
 from pcmc.base.units import Units
 from pcmc.plan import Divider, Hole, Plan
-from pcmc.plot import notebook
+from pcmc.plot import pictures
 from pcmc.project import Outcome
 
 CELL = """
@@ -109,8 +109,8 @@ def test_without_the_plot_extra_cells_show_text(monkeypatch):
     def missing(surface, **options):
         raise MissingExtra("pyvista", "plot")
 
-    monkeypatch.setattr("pcmc.plot.notebook.draw", missing)
-    assert notebook.cell_html(tent()).startswith("<pre>Surface of 12 triangles")
+    monkeypatch.setattr("pcmc.plot.pictures.draw", missing)
+    assert pictures.cell_html(tent()).startswith("<pre>Surface of 12 triangles")
 
 
 def test_a_result_has_its_verdict_once_it_is_known():

@@ -16,7 +16,7 @@ from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import State
-from pcmc.plot import arrows, legend, raster
+from pcmc.plot import arrows, colors, raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 from pcmc.project import paint
 from pcmc.surface.colours import WALLS, patch_colors, rgb
@@ -104,8 +104,10 @@ def test_each_surface_may_show_patches_of_its_own():
 
 def test_legend_names_what_is_seen(monkeypatch):
     surface, shown = two_squares(4, alpha_aux=1.0), []
-    entries = legend.entries
-    monkeypatch.setattr(legend, "entries", lambda pictures: shown.append(entries(pictures)) or shown[-1])
+    entries = colors.legend_entries
+    monkeypatch.setattr(
+        colors, "legend_entries", lambda pictures: shown.append(entries(pictures)) or shown[-1]
+    )
     plot.draw(surface, legend=True)
     plot.draw(surface, legend=True, patches=["wall"])  # which the sheets hide
     plot.draw(surface, legend=True, scalars=pcmc.mean_curvature(surface))
@@ -373,7 +375,6 @@ def test_only_many_triangles_ask_for_opengl(monkeypatch):
     assert asked
 
 
-@pytest.mark.slow
 def test_a_million_triangles_are_drawn(tmp_path):
     surface = two_squares(460)
     assert surface.m > 900_000

@@ -40,7 +40,6 @@ report = "report.pdf"
 """
 
 
-@pytest.mark.slow
 def test_one_command_writes_what_other_programs_read(tmp_path, monkeypatch, capsys):
     """The L-shaped roof: IFC, Rhino, glTF, DXF, PDF, CalculiX, tables, each by another reader."""
     import ezdxf

@@ -17,7 +17,6 @@ from pcmc.project.checking import line_with
 ROOF = Path(__file__).resolve().parents[2] / "notebooks" / "roof.toml"
 
 
-@pytest.mark.slow
 def test_the_example_gives_certified_files_and_a_picture(tmp_path):
     assert len(ROOF.read_text(encoding="utf-8").splitlines()) <= 30
     steps = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -10,8 +11,9 @@ import pytest
 from refusals import refused
 from small_project import changed
 
+from pcmc import cli
 from pcmc.base.errors import FileError
-from pcmc.project import json_schema, load, reference, sections
+from pcmc.project import load, reference, sections
 
 
 @pytest.mark.parametrize(
@@ -229,9 +231,10 @@ def test_a_bad_view_is_refused_before_any_work(small, view, found):
         load(small)
 
 
-def test_editors_read_the_same_keys_from_the_schema():
+def test_editors_read_the_same_keys_from_the_schema(capsys):
     jsonschema = pytest.importorskip("jsonschema")
-    schema = json_schema()
+    assert cli.main(["schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(tomllib.loads(Path("notebooks/roof.toml").read_text(encoding="utf-8")), schema)
     plan = {"outline": [[0, 0], [4, 0], [4, 3]], "dividers": [{"polyline": [[2, 0], [2, 3]]}]}

@@ -39,7 +39,7 @@ def wheel(tmp_path_factory):
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_wheel_holds_the_package_alone(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -54,7 +54,7 @@ def test_the_wheel_holds_the_package_alone(wheel):
     assert missing == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_users_type_checker_sees_the_types(wheel, tmp_path):
     venv.create(tmp_path / "user", symlinks=True)
     (python,) = tmp_path.glob("user/*/python")

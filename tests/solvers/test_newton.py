@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from nightly import at_night
 from starts import (
     bezier_hall,
     four_fans,
@@ -21,7 +22,7 @@ from pcmc.certificate import Verdict
 from pcmc.solvers import solve as one_start
 from pcmc.solvers.result import Status
 
-slow = pytest.mark.slow
+nightly = pytest.mark.nightly
 SADDLE_CAPS = {"alpha_left": 4.0, "alpha_right": 4.0, "alpha_aux": 1.0, "depth": 5.0}
 
 # name: (surface, index of the stationary point, pinched vertices)
@@ -65,7 +66,7 @@ SHORT = ("cap", "Fig. 4", "Example 1, wall 3", "Example 2")
 
 
 def marked(names, large):
-    return [pytest.param(name, marks=slow) if large(name) else name for name in names]
+    return [pytest.param(name, marks=nightly) if large(name) else name for name in names]
 
 
 def check(result, index, quality):
@@ -144,7 +145,7 @@ def test_a_junction_that_slips_along_its_support_is_named():
     assert solve(start).certificate.verdict is Verdict.STABLE  # from a lower start
 
 
-@pytest.mark.parametrize("tensions", [{"wall": 2.0}, {"small": 4.0}, {"large": 5.0}])
+@pytest.mark.parametrize("tensions", [{"wall": 2.0}, *at_night({"small": 4.0}, {"large": 5.0})])
 def test_a_wall_whose_bottom_is_held_does_not_slip(tensions):
     """Example 2 with tensions at which it slips while the wall's bottom slides."""
     surface = two_caps(0.4).retensioned(tensions)
@@ -161,8 +162,8 @@ def bottom_held(surface):
     "make",
     [
         partial(four_fans, 5),
-        pytest.param(partial(joined_caps, 1.0, **SADDLE_CAPS), marks=slow),
-        pytest.param(partial(three_patches, 8), marks=slow),
+        pytest.param(partial(joined_caps, 1.0, **SADDLE_CAPS), marks=nightly),
+        pytest.param(partial(three_patches, 8), marks=nightly),
     ],
     ids=["Example 3", "joined caps", "Fig. 4"],
 )

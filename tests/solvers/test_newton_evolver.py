@@ -24,7 +24,6 @@ pytestmark = [
     pytest.mark.skipif(not evolver.available(), reason="evolver is not installed"),
     pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
 ]
-slow = pytest.mark.slow
 WEAK = {"alpha_left": 4.0, "alpha_right": 4.0, "alpha_aux": 1.0, "depth": 5.0}
 NEWTON = "hessian_normal on\nhessian"
 
@@ -72,7 +71,6 @@ def test_it_has_nothing_left_to_do(name):
     agrees(*CASES[name])
 
 
-@slow
 @pytest.mark.parametrize("name", FINER)
 def test_nor_on_finer_meshes(name):
     agrees(*FINER[name])

@@ -13,7 +13,7 @@ from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Status
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
-slow = pytest.mark.slow
+nightly = pytest.mark.nightly
 
 
 def order(errors, sizes):
@@ -133,7 +133,7 @@ def test_junction_of_the_caps_balances_in_the_limit(caps):
     assert max(result.certificate.junctions["force_left"].max() for result in caps) < 1e-8
 
 
-@slow
+@nightly
 @pytest.mark.parametrize("edge", [0.5, 0.35, 0.25])
 def test_joined_caps_are_stable_at_every_refinement(edge):
     result = solve(joined_caps(edge))
@@ -143,7 +143,7 @@ def test_joined_caps_are_stable_at_every_refinement(edge):
     assert joined_caps_exact().distance(result.surface).max() < 0.12 * edge**2
 
 
-@pytest.mark.parametrize("edge", [1.0, 0.5, pytest.param(0.25, marks=slow)])
+@pytest.mark.parametrize("edge", [1.0, 0.5, pytest.param(0.25, marks=nightly)])
 def test_joined_caps_with_a_weak_wall_are_a_saddle_of_index_one(edge):
     tensions = {"alpha_left": 4.0, "alpha_right": 4.0, "alpha_aux": 1.0, "depth": 5.0}
     result = solve(joined_caps(edge, **tensions), target="stationary")
@@ -192,9 +192,9 @@ def test_the_bubble_is_a_sphere_and_a_saddle_of_index_one(alpha):
 @pytest.mark.parametrize(
     ("tensions", "edges"),
     [
-        pytest.param((1.0, 1.0, 1.0), (0.8, 0.4, 0.2), marks=slow),
+        pytest.param((1.0, 1.0, 1.0), (0.8, 0.4, 0.2), marks=nightly),
         ((1.0, 0.8, 0.6), (0.8, 0.6, 0.4)),
-        pytest.param((2.0, 1.0, 1.5), (0.8, 0.5, 0.3), marks=slow),  # the mesh slides far
+        pytest.param((2.0, 1.0, 1.5), (0.8, 0.5, 0.3), marks=nightly),  # the mesh slides far
     ],
 )
 def test_the_double_bubble_is_two_spheres_and_a_flat_disc(tensions, edges):

@@ -96,7 +96,8 @@ def test_nodes_elsewhere_are_those_of_another_surface(tmp_path):
 
 def test_numbers_with_long_exponents_are_read():
     text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\n\n 1 -1.5-120 0. 2.0E+00\n"
-    assert pcmc.structure.dat.read(text)[0]["displacements"].values.tolist() == [[-1.5e-120, 0.0, 2.0]]
+    found = pcmc.structure.tables.read(text, ".dat")[0]["displacements"]
+    assert found.values.tolist() == [[-1.5e-120, 0.0, 2.0]]
 
 
 def test_reactions_of_an_exact_answer_are_ours(tmp_path):

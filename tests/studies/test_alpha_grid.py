@@ -57,6 +57,7 @@ def test_each_open_case_gets_its_number_of_starts():
     assert branches(records.assign(status="stalled"), open_cases, 2) == []
 
 
+@pytest.mark.nightly
 def test_a_patch_held_all_around_folds_below_half_its_radius():
     fold = alpha_grid_branches.patch_fold(1.2, "small")
     assert 1.7 < fold < 2.0
@@ -82,6 +83,7 @@ def test_branches_arrive_or_fold_with_a_way_down_opening():
     assert turned["ending"] == "slip"
 
 
+@pytest.mark.nightly
 def test_a_branch_that_ends_in_poor_triangles_is_tried_from_elsewhere():
     """From (8, 4, 3) the junction slips into a corner; with the smaller patch raised it folds."""
     slipped = branch_case([[8.0, 3.0, 8.0], [8.0, 4.0, 3.0]], 1.2)
@@ -100,6 +102,7 @@ def test_no_patch_is_weakened_beyond_its_own_fold():
     assert found["quality"] > 0.2
 
 
+@pytest.mark.nightly
 def test_equilibria_are_sought_at_half_the_edge_length():
     there = finer_case([6.0, 4.0, 3.0], 1.2)
     assert (there["status"], there["verdict"]) == ("converged", "stable")
@@ -205,7 +208,7 @@ def test_sentences_follow_from_the_cases():
     assert few[turned.paper[2]] == "no such cases"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_grid_by_the_geometric_solver_end_to_end(tmp_path, monkeypatch):
     for module in (alpha_grid, alpha_grid_geometric):
         monkeypatch.setattr(module, "TENSIONS", (1.0, 4.0))

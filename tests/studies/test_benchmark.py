@@ -43,7 +43,7 @@ def small(monkeypatch):
     monkeypatch.setattr(explore, "STEPS", 3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     code = main(["benchmark", "--quick", "--results", str(tmp_path)])
     table = pd.read_csv(tmp_path / "benchmark" / "quick.csv", keep_default_na=False)

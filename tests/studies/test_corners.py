@@ -95,6 +95,7 @@ def test_what_the_mesh_holds_goes_to_what_a_sliding_end_shows():
     assert held[-1]["eigenvalue"] == pytest.approx(held[-2]["eigenvalue"], rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_case_of_the_grid_with_its_bottoms_held_and_sliding():
     held, sliding = (corners.grid_case([1.5, 6.0, 6.0], bottom) for bottom in ("held", "sliding"))
     assert (held["label"], held["levels"], held["index"]) == (PERSISTS, 6, 0)
@@ -115,6 +116,7 @@ def test_ends_slide_along_a_round_outline():
         assert along[ladder.ends(build())].all()
 
 
+@pytest.mark.nightly
 def test_ends_on_a_round_outline_are_held_by_the_mesh_too():
     """Fig. 4: sliding ends make the same saddle; fixed ones lose all hold once the junctions rest there."""
     initial, project = three_patches(7), next(case.project for case in CASES if case.name == "fig4")

@@ -12,7 +12,6 @@ from studies.study import perform
 KEPT = Path(__file__).resolve().parents[2] / "results" / "existence"
 
 
-@pytest.mark.slow
 def test_short_run_writes_tables_and_figures(tmp_path):
     perform(STUDY, tmp_path, short=True)
     folder = tmp_path / "existence"

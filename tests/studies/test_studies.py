@@ -223,7 +223,6 @@ def test_the_same_run_twice_gives_the_same_bytes_in_every_table(tmp_path):
         assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
 
 
-@pytest.mark.slow
 def test_command_runs_from_anywhere_and_ends_with_the_comparison(tmp_path):
     command = [sys.executable, "-m", "studies", "run", "example3", "--short", "--results"]
     environment = os.environ | {"PYTHONPATH": str(HOME), "COLUMNS": "200"}

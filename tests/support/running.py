@@ -6,9 +6,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import nbformat
-from nbclient import NotebookClient
-
 FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
 NAMES = sorted(path.name for path in FOLDER.glob("*.ipynb"))
 NUMBER = re.compile(r"-?\b\d+(?:\.\d+)?(?:e[+-]?\d+)?\b")
@@ -16,11 +13,15 @@ NUMBER = re.compile(r"-?\b\d+(?:\.\d+)?(?:e[+-]?\d+)?\b")
 
 def load(name: str) -> Any:
     """A notebook as it is stored."""
+    import nbformat  # here: its schemas take seconds to import, and every test process collects this file
+
     return nbformat.read(FOLDER / name, as_version=4)
 
 
 def executed(name: str) -> Any:
     """A copy of a notebook with the outputs of running it now, in its folder."""
+    from nbclient import NotebookClient
+
     notebook = load(name)
     client = NotebookClient(
         notebook,
@@ -82,6 +83,8 @@ def words_and_numbers(said: str) -> tuple[list[str], list[float]]:
 
 def main() -> None:
     """Run every notebook and store it."""
+    import nbformat
+
     for name in NAMES:
         notebook = executed(name)
         nbformat.write(notebook, FOLDER / name)

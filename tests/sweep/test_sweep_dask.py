@@ -16,7 +16,6 @@ from pcmc.base.errors import OptionError, SweepError
 from pcmc.sweep import Sweep, read_store, run, table
 from pcmc.sweep import workers as workers_module
 
-pytestmark = pytest.mark.slow
 GRID = {"rate": [3.6 + 0.02 * i for i in range(15)], "seed": [0.1, 0.2, 0.3]}
 SWEEP = Sweep("sweep_cases:chaos", GRID, {"pause": 0.02})
 
@@ -81,6 +80,7 @@ def test_a_cluster_gives_the_same_table_even_if_a_worker_is_killed(cluster, tmp_
     assert last_row(path) == 45  # no case twice
 
 
+@pytest.mark.nightly
 def test_cases_that_misbehave_on_a_cluster(cluster):
     cluster.start_worker("one")
     sweep = Sweep("sweep_cases:misbehave", {"how": ["raise", "hang", "kill", "behave"]})
@@ -89,6 +89,7 @@ def test_cases_that_misbehave_on_a_cluster(cluster):
     same(result, run(sweep, workers=2, time_limit=1.0))
 
 
+@pytest.mark.nightly
 def test_a_scheduler_that_goes_away_stops_the_sweep(cluster, tmp_path):
     cluster.start_worker("one")
 
@@ -102,6 +103,7 @@ def test_a_scheduler_that_goes_away_stops_the_sweep(cluster, tmp_path):
     same(run(SWEEP, tmp_path / "s.sqlite", workers=2), run(SWEEP, workers=2))
 
 
+@pytest.mark.nightly
 def test_ctrl_c_ends_the_cases_on_the_cluster(cluster, tmp_path):
     cluster.start_worker("one")
     sweep = Sweep("sweep_cases:holding", {"n": [1, 2]}, {"folder": str(tmp_path), "pause": 3600.0})
@@ -126,6 +128,7 @@ def free(path):
     return True
 
 
+@pytest.mark.nightly
 def test_clusters_that_cannot_be_used(cluster, monkeypatch):
     monkeypatch.setattr(workers_module, "CONNECT", 1.0)
     with socket.socket() as unused:

@@ -372,6 +372,7 @@ def test_a_target_that_is_missed_is_1(roof):
     assert not pd.read_csv("t.csv")["targets_met"].any()
 
 
+@pytest.mark.nightly
 def test_a_stopped_sweep_goes_on_where_it_was(roof, capsys):
     grid = {"west.tension": [3, 3.2], "wall 1.tension": [0.5, 0.8]}
 

@@ -162,7 +162,7 @@ def rows(path):
     return 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ten_kills_at_random_instants_change_nothing(tmp_path):
     sweep, path = Sweep("sweep_cases:chaos", LONG, {"pause": 0.03}), tmp_path / "s.sqlite"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}

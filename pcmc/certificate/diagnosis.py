@@ -1,0 +1,154 @@
+"""Where and why triangles collapse, and what moves along the way down from a saddle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Bools, Floats, Ints
+from ..meshing.quality import edge_lengths, triangle_quality
+from ..surface import Surface
+from .tables import names_of
+
+REACH = 1.5  # median edge lengths: the cause is looked for this near to the worst triangle
+LOW = 0.2  # median edge lengths: a held wall this low has no room for triangles
+KEY = 'in a plan, bottom = "{}"'
+ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
+ALIKE = 6  # decimals of a share: symmetric places differ by rounding
+SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a slip of this end
+
+
+def where_collapsed(surface: Surface, pinchable: Bools) -> str:
+    """Names the worst triangle outside walls that can pinch, and its cause if that is a known one.
+
+    ``pinchable`` (k,) marks these walls. Two causes are known: a junction slips along a support away
+    from its own end, where only the mesh holds it; or it comes down on the held bottom of its wall,
+    which cannot pinch (``find_walls``).
+    """
+    face, quality = _worst_face(surface, pinchable)
+    place = surface.vertices[surface.faces[face]].mean(axis=0)
+    worst = (
+        f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
+        f" {place.round(4).tolist()}, quality {quality:.1e}"
+    )
+    if held_wall_down(surface, pinchable):
+        return worst + (
+            "; the junction there comes down on the held bottom of its wall, so the wall has no height"
+            " left: make the wall weaker, or let its bottom slide so that the junction can rest on the plane"
+            f" ({KEY.format('sliding')})"
+        )
+    if _slips(surface, pinchable, place, REACH * float(np.median(edge_lengths(surface)))):
+        worst += (
+            "; the junction there slips along a support, which does not hold its end: hold the bottom"
+            f" of its wall ({KEY.format('held')})"
+        )
+    return worst
+
+
+def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
+    """Whether the worst triangle is in a wall whose junction has come down on its held bottom.
+
+    Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
+    """
+    X, patch = surface.vertices, int(surface.patch_of_face[_worst_face(surface, pinchable)[0]])
+    used = np.zeros(surface.n, dtype=bool)
+    used[surface.faces[surface.patch_of_face == patch]] = True
+    top = used & surface.topology.on_junction
+    bottom, top = used & surface.fixed & ~top, top & surface.free
+    if not (surface.auxiliary[patch] and top.any() and bottom.any()):
+        return False
+    height = float(np.min(cKDTree(X[bottom]).query(X[top])[0]))
+    return height < LOW * float(np.median(edge_lengths(surface)))
+
+
+def _worst_face(surface: Surface, pinchable: Bools) -> tuple[int, float]:
+    """The worst triangle outside walls that can pinch, and its quality."""
+    quality = triangle_quality(surface.vertices, surface.faces)
+    outer = np.where(pinchable[surface.patch_of_face], np.inf, quality)
+    return int(outer.argmin()), float(outer.min())
+
+
+def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> bool:
+    """Whether a junction near the place slides on a support next to its fixed end, or lies along it."""
+    X, topo = surface.vertices, surface.topology
+    near = np.linalg.norm(X - place, axis=1) <= reach
+    if not (near & topo.on_junction & ~surface.fixed).any():
+        return False
+    if (near & surface.fixed).any() and (near & surface.on_plane).any():
+        return True
+    held = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
+    for curve in topo.junctions:
+        if near[curve.vertices].any() and pinchable[list(curve.sheets)].any() and not curve.closed:
+            for end, beside in (curve.vertices[:2], curve.vertices[:-3:-1]):
+                if surface.fixed[end] and _along(X, held, int(end), int(beside)):
+                    return True
+    return False
+
+
+def _along(X: Floats, held: Ints, end: int, beside: int) -> bool:
+    """Whether the edge from ``end`` to ``beside`` lies along one of the held edges (k,2) there."""
+    sides = X[held[(held == end).any(axis=1)].sum(axis=1) - end] - X[end]
+    edge = X[beside] - X[end]
+    lengths = np.linalg.norm(sides, axis=1) * np.linalg.norm(edge)
+    return bool((sides @ edge > np.cos(np.radians(ALONG)) * lengths).any())
+
+
+@dataclass(frozen=True, eq=False)
+class SlippingEnd:
+    """A fixed end of a junction next to which a mode moves almost as far as anywhere.
+
+    A mode that the end holds rises from 0 along the junction, to about π h / L after an edge h of the length
+    L; one that slips jumps, whatever the mesh, and only the triangles at the end hold it.
+    """
+
+    junction: str  # names of the patches that meet there
+    walls: tuple[str, ...]  # names of the walls among them
+    place: Floats  # (3,)
+    share: float  # the mode's motion at the junction's next vertex over its largest motion
+
+
+def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
+    """The fixed ends of junctions that slip in a mode (n,3), the one that slips most first."""
+    motion = np.linalg.norm(mode, axis=1)
+    largest = float(motion.max(initial=0.0))
+    ends = []
+    for curve in surface.topology.junctions:
+        for end, beside in (curve.vertices[:2], curve.vertices[:-3:-1]):
+            if curve.closed or not surface.fixed[end] or motion[beside] < SLIPS * largest or largest == 0.0:
+                continue
+            walls = tuple(surface.patches[i].name for i in curve.sheets if surface.walls[i])
+            names, share = names_of(surface, curve.sheets), float(motion[beside] / largest)
+            ends.append(SlippingEnd(names, walls, surface.vertices[end], share))
+    return sorted(ends, key=lambda end: -round(end.share, ALIKE))  # of equal ones the first of the mesh
+
+
+def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
+    """The ways down from a saddle: where its lowest mode (n,3) moves most, and which ends slip in it."""
+    text = f"index {index}: {'1 way' if index == 1 else f'{index} ways'} down"
+    if not len(mode):
+        return text
+    motion = np.linalg.norm(mode, axis=1)
+    most = int(np.round(motion / (motion.max() or 1.0), ALIKE).argmax())
+    curves = [curve for curve in surface.topology.junctions if most in curve.vertices]
+    face = int(np.flatnonzero((surface.faces == most).any(axis=1))[0])
+    part = f"patch {surface.patches[surface.patch_of_face[face]].name!r}"
+    part = f"the junction {names_of(surface, curves[0].sheets)}" if curves else part
+    text += f"; the mode moves {part} most, near {_text(surface.vertices[most])}"
+    ends = slipping_ends(surface, mode)
+    if not ends:
+        return text
+    junctions = " and of ".join(dict.fromkeys(end.junction for end in ends))
+    places = " and ".join(_text(end.place) for end in ends[:4])
+    walls = " and of ".join(dict.fromkeys(repr(name) for end in ends for name in end.walls))
+    advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
+    which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
+    return (
+        f"{text}; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
+        f" {ends[0].share:.2f} as far, so only the mesh holds it there; {advice}"
+    )
+
+
+def _text(place: Floats) -> str:
+    return str((place.round(3) + 0.0).tolist())

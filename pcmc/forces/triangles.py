@@ -1,0 +1,252 @@
+"""The force of a triangle under tension α, pressure p and weight w: value, gradient and Hessian block.
+
+A triangle has corners a, b, c (counter-clockwise seen from its positive side), the edges opposite them
+e_a = c - b, e_b = a - c, e_c = b - a, the area A, the unit normal ν = (b - a) × (c - a) / 2A and the mean
+height z̄ of its corners over Π, whose normal is n. Seen from the reference point of volumes,
+
+    A           ∂A/∂a = g_a = ½ ν × e_a          (15a)
+    V           ∂V/∂a = (b × c) / 6              (15b, with the sign that makes (10b) positive)
+    ∫z dA = A z̄     ∂/∂a = z̄ g_a + A n/3
+
+    ∂²E/∂i∂j  =  s t tᵀ + k 1 + [q]× + u nᵀ + n vᵀ,   T = α + w z̄
+
+with s = T (e_i·e_j) / (4A) and t = ν; q = ∓½ T ν ± p x_k / 6 (upper signs where j follows i, k the third
+corner; 0 for i = j); u = w g_i / 3 and v = w g_j / 3. The *stiffness* has only
+k = T₊ (e_i·e_j) / (4A), T₊ = α + max(w z̄, 0).
+
+A sheet of weight w acts like one of tension α + w z, pushed by w n per area: at rest
+H = (p - w ⟨ν, n⟩) / (2 (α + w z)). Where α + w z ≤ 0 it is under compression. A triangle without area has no
+normal and no area gradient. Every loop releases the interpreter, so that blocks of triangles run on several
+threads. Nothing is computed for weights where no patch has one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
+from ..surface import Surface
+from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
+
+
+class Mesh(NamedTuple):
+    """Faces with the weights of their energy, as one argument of compiled loops; positions are another."""
+
+    faces: Ints  # (m,3) corners
+    patch: Ints  # (m,) of each triangle
+    origin: Floats  # (3,) the reference point of volumes
+    tension: Floats  # (k,) α of each patch; p and w below
+    pressure: Floats
+    weight: Floats
+    ground: Floats  # (3,) a point of Π, and its normal: weights act along it
+    normal: Floats
+
+
+def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
+    """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
+    tension = surface.tensions if tension is None else read_only(tension)
+    pressure = surface.net_pressures if pressure is None else read_only(pressure)
+    plane = np.array(surface.plane.point), np.array(surface.plane.normal)
+    return Mesh(
+        surface.faces, surface.patch_of_face, surface.origin, tension, pressure, surface.weights, *plane
+    )
+
+
+@compiled
+def measure_block(
+    mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats, gradient: Floats
+) -> None:
+    """Add the areas, volumes and ∇(αA - pV) of triangles first..last to (k,), (k,) and gradient (n,3)."""
+    F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
+    current = patch[first]
+    alpha, sixth_p = mesh.tension[current], mesh.pressure[current] / 6.0
+    area_sum, volume_sum = 0.0, 0.0
+    for f in range(first, last):
+        if patch[f] != current:
+            area[current] += area_sum
+            volume[current] += volume_sum / 6.0
+            area_sum, volume_sum = 0.0, 0.0
+            current = patch[f]
+            alpha, sixth_p = mesh.tension[current], mesh.pressure[current] / 6.0
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
+        e_c, minus_e_b = sub(b, a), sub(c, a)
+        normal = cross(e_c, minus_e_b)
+        twice_area = norm(normal)
+        area_sum += 0.5 * twice_area
+        b_cross_c = cross(b, c)
+        volume_sum += dot(a, b_cross_c)
+        half_alpha_nu = scaled(0.5 * alpha / twice_area if twice_area > 0.0 else 0.0, normal)
+        e_a = sub(minus_e_b, e_c)
+        accumulate(gradient, i, sub(cross(half_alpha_nu, e_a), scaled(sixth_p, b_cross_c)))
+        accumulate(gradient, j, sub(cross(minus_e_b, half_alpha_nu), scaled(sixth_p, cross(c, a))))
+        accumulate(gradient, k, sub(cross(half_alpha_nu, e_c), scaled(sixth_p, cross(a, b))))
+    area[current] += area_sum
+    volume[current] += volume_sum / 6.0
+
+
+@compiled
+def _measure_areas(mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats) -> None:
+    """The areas and volumes alone, for line searches that need no gradient."""
+    F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
+    for f in range(first, last):
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
+        area[patch[f]] += 0.5 * norm(cross(sub(b, a), sub(c, a)))
+        volume[patch[f]] += dot(a, cross(b, c)) / 6.0
+
+
+def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, Floats, Floats]:
+    """Areas (k,), volumes (k,) of the k patches and the gradient (n,3) of Σ αA - pV in one pass.
+
+    Each block sums into arrays of its own, added in order: the same number of workers gives the
+    same bytes, and a mesh under two BLOCKs the same bytes on every machine.
+    """
+    parts = len(blocks(len(mesh.faces), workers or threads()))
+    area, volume = np.zeros((2, parts, len(mesh.tension)))
+    gradient = np.zeros((parts, *X.shape))
+
+    def work(part: int, first: int, last: int) -> None:
+        measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
+
+    run_blocks(work, len(mesh.faces), workers)
+    for part in range(1, parts):
+        gradient[0] += gradient[part]
+    return area.sum(axis=0), volume.sum(axis=0), gradient[0]
+
+
+def areas_and_volumes(mesh: Mesh, X: Floats) -> tuple[Floats, Floats]:
+    """Areas (k,) and signed volumes (k,), seen from the mesh's origin, of the k patches."""
+    parts = len(blocks(len(mesh.faces), threads()))
+    area, volume = np.zeros((2, parts, len(mesh.tension)))
+
+    def work(part: int, first: int, last: int) -> None:
+        _measure_areas(mesh, X, first, last, area[part], volume[part])
+
+    run_blocks(work, len(mesh.faces), None)
+    return area.sum(axis=0), volume.sum(axis=0)
+
+
+def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ w ∫ z dA at X (n,3), force·length; its gradient is added to ``gradient`` (n,3) if that is given.
+
+    >>> from pcmc import Patch
+    >>> table = Surface([[0, 0, 2], [1, 0, 2], [0, 1, 2]], [[0, 1, 2]], [0],
+    ...                 [Patch("a", 1.0, weight=3.0)], fixed=[0])
+    >>> add_weights(table, table.vertices)
+    3.0
+    """
+    if not surface.weights.any():
+        return 0.0
+    return float((surface.weights * moments(surface, X, surface.weights, gradient)).sum())
+
+
+def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | None = None) -> Floats:
+    """(k,) ∫ z dA of each patch, length³; the gradient of Σ w ∫ z dA is added to ``gradient`` (n,3)."""
+    moment = np.zeros(len(surface.patches))
+    mesh = energy_mesh(surface)._replace(weight=read_only(weights.view()))
+    _measure_moments(mesh, X, moment, np.empty((0, 3)) if gradient is None else gradient)
+    return moment
+
+
+@compiled
+def _measure_moments(mesh: Mesh, X: Floats, moment: Floats, out: Floats) -> None:
+    F, ground, n = mesh.faces, vector(mesh.ground), vector(mesh.normal)
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        twice = cross(sub(b, a), sub(c, a))
+        twice_area = norm(twice)
+        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), ground), n)
+        moment[mesh.patch[f]] += 0.5 * twice_area * mean
+        w = mesh.weight[mesh.patch[f]]
+        if len(out) == 0 or w == 0.0 or twice_area == 0.0:
+            continue
+        half_nu = scaled(0.5 * w * mean / twice_area, twice)
+        down = scaled(w * twice_area / 6.0, n)
+        accumulate(out, F[f, 0], add(cross(half_nu, sub(c, b)), down))
+        accumulate(out, F[f, 1], add(cross(half_nu, sub(a, c)), down))
+        accumulate(out, F[f, 2], add(cross(half_nu, sub(b, a)), down))
+
+
+def effective_tensions(surface: Surface, X: Floats, faces: Ints, patch: Ints) -> Floats:
+    """(m,) α + w z̄ of triangles (m,3) at X (n,3), force/length; below 0 under compression."""
+    tension = surface.tensions[patch]
+    if not surface.weights.any():
+        return np.asarray(tension)
+    return np.asarray(tension + surface.weights[patch] * surface.plane.height(X)[faces].mean(axis=1))
+
+
+def compressed(surface: Surface) -> Bools:
+    """(m,) triangles with a weight where α + w z̄ ≤ 0."""
+    pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)
+    return np.asarray((surface.weights[surface.patch_of_face] != 0.0) & (pull <= 0.0))
+
+
+class Block(NamedTuple):
+    """s t tᵀ + k 1."""
+
+    s: float
+    t: Vector
+    k: float
+
+
+class Tilt(NamedTuple):
+    """u nᵀ + n vᵀ."""
+
+    u: Vector
+    v: Vector
+    n: Vector
+
+
+class Triangle(NamedTuple):
+    """What the blocks of a triangle are made of, with the factors ``hessian`` and ``stiffness`` in it."""
+
+    corner: tuple[Vector, Vector, Vector]  # seen from the reference point
+    edge: tuple[Vector, Vector, Vector]  # opposite the corners
+    nu: Vector  # unit normal; zero if there is no area
+    s: float  # T / (4A)
+    k: float  # T₊ / (4A)
+    half_pull: Vector  # ½ T ν
+    sixth_p: float  # p / 6
+    sixth_w: float  # w / 6
+
+
+@inlined
+def triangle(mesh: Mesh, X: Floats, f: int, hessian: float, stiffness: float) -> Triangle:
+    """Triangle f of hessian · ∂²E + stiffness · L."""
+    F, origin, patch = mesh.faces, vector(mesh.origin), mesh.patch[f]
+    a, b, c = sub(point(X, F[f, 0]), origin), sub(point(X, F[f, 1]), origin), sub(point(X, F[f, 2]), origin)
+    edge = (sub(c, b), sub(a, c), sub(b, a))
+    normal = cross(edge[1], edge[2])
+    twice_area = norm(normal)
+    scale = 1.0 / twice_area if twice_area > 0.0 else 0.0
+    alpha, weight, nu, extra = mesh.tension[patch], mesh.weight[patch], scaled(scale, normal), 0.0
+    if weight != 0.0:
+        middle = add(scaled(1.0 / 3.0, add(add(a, b), c)), origin)
+        extra = weight * dot(sub(middle, vector(mesh.ground)), vector(mesh.normal))
+    half, sixth = 0.5 * hessian * (alpha + extra), hessian / 6.0
+    k = 0.5 * stiffness * (alpha + max(extra, 0.0)) * scale
+    press = sixth * mesh.pressure[patch]
+    return Triangle((a, b, c), edge, nu, half * scale, k, scaled(half, nu), press, sixth * weight)
+
+
+@inlined
+def triangle_block(t: Triangle, i: int, j: int) -> Block:
+    """s t tᵀ + k 1 of two corners."""
+    cosine = dot(t.edge[i], t.edge[j])
+    return Block(t.s * cosine, t.nu, t.k * cosine)
+
+
+@inlined
+def triangle_skew(t: Triangle, k: int) -> Vector:
+    """q for a corner and the one that follows; k is the third."""
+    return sub(scaled(t.sixth_p, t.corner[k]), t.half_pull)
+
+
+@inlined
+def triangle_tilt(t: Triangle, n: Vector, i: int, j: int) -> Tilt:
+    """u nᵀ + n vᵀ of two corners."""
+    return Tilt(scaled(t.sixth_w, cross(t.nu, t.edge[i])), scaled(t.sixth_w, cross(t.nu, t.edge[j])), n)

@@ -1,0 +1,129 @@
+"""The tables of numbers in CalculiX's result files, by step.
+
+``.dat`` is printed by node, and by integration point of each element. ``.frd``, for viewers, is read in
+ASCII: columns of fixed width, six digits, all by node.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError
+
+EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
+DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
+DAT_COLUMNS = {"displacements": (1, 3), "forces": (1, 3), "stresses": (2, 6)}  # keys and values of a row
+FRD_HEAD = re.compile(r"^(?:    2C|    3C|  100C|    1P| 9999).*$", re.M)
+FRD_KINDS = {"DISP": ("displacements", 3), "FORC": ("forces", 3), "STRESS": ("stresses", 6)}
+FRD_STRESSES = [0, 1, 2, 3, 5, 4]  # xx, yy, zz, xy, yz, zx in the file
+KEY, NUMBER = 13, 12  # characters of a row of an .frd file: " -1" and the node; each value
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """One quantity of one step, by ascending numbers of nodes or elements."""
+
+    kind: str  # displacements, forces, stresses, or cables: the stresses of these
+    time: float  # at the end of the step
+    ids: Ints  # (k,) numbers of nodes or elements
+    values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
+    by_node: bool  # whether the numbers are those of nodes
+    places: Floats | None = None  # (k,3) where the nodes are, if the file has it
+
+    def means(self, elements: Ints) -> Floats:
+        """(k,c) the mean over the integration points of each of the elements (k,), ascending numbers."""
+        chosen = np.isin(self.ids, elements)
+        place = np.searchsorted(elements, self.ids[chosen])
+        sums = [np.bincount(place, column, len(elements)) for column in self.values[chosen].T]
+        return np.stack(sums, axis=1) / np.bincount(place, minlength=len(elements))[:, None]
+
+
+def read(text: str, suffix: str) -> list[dict[str, Block]]:
+    """The tables of each step, whose times are 1, 2, ...; of several in a step the last counts.
+
+    >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
+    >>> read(text, ".dat")[0]["displacements"].values.tolist()
+    [[0.5, 0.0, -0.001]]
+    """
+    steps: list[dict[str, Block]] = []
+    for block in (_of_dat if suffix == ".dat" else _of_frd)(text):
+        number = round(block.time)
+        if abs(block.time - number) <= 1e-6 and number >= 1:  # else a part of a step
+            steps += [{} for _ in range(number - len(steps))]
+            steps[number - 1][block.kind] = block
+    return steps
+
+
+def _of_dat(text: str) -> Iterator[Block]:
+    heads = list(DAT_HEAD.finditer(text))
+    if not heads:
+        raise FileError("has no results; is it a .dat file of ccx, and has its analysis run?")
+    for head, end in zip(heads, [*(head.start() for head in heads[1:]), len(text)], strict=True):
+        kind, line = head[1], text.count("\n", 0, head.start()) + 1
+        if kind not in DAT_COLUMNS:
+            continue
+        keys, values = DAT_COLUMNS[kind]
+        body = re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])  # names of local axes
+        rows = _numbers(body.split(), keys + values, kind, line)
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        time = float(_numbers([head[4]], 1, "time", line)[0, 0])
+        kind = "cables" if head[3] == "CABLES" else kind
+        yield Block(kind, time, rows[:, 0].astype(int), rows[:, keys:], keys == 1)
+
+
+def _of_frd(text: str) -> Iterator[Block]:
+    if not text.startswith("    1C") or "\n  100C" not in text:
+        raise FileError("has no results; is it an .frd file of ccx in ASCII, and has its analysis run?")
+    if not text.rstrip().endswith("9999"):
+        raise FileError("the file is cut off: its last line is not 9999; run ccx again")
+    nodes, places = np.empty(0, dtype=int), np.empty((0, 3))
+    for head, following in pairwise(FRD_HEAD.finditer(text)):
+        body, line = text[head.end() : following.start()], text.count("\n", 0, head.start()) + 1
+        name = re.search(r"^ -4  (\w+)", body, re.M)
+        if head[0].startswith("    2C"):
+            nodes, places = _frd_rows(body, 3, "nodes", line)
+        elif head[0].startswith("  100C") and name is not None and name[1] in FRD_KINDS:
+            kind, count = FRD_KINDS[name[1]]
+            ids, values = _frd_rows(body, count, kind, line)
+            values = values[:, FRD_STRESSES] if kind == "stresses" else values
+            time = float(_numbers([head[0][12:24]], 1, "time", line)[0, 0])
+            known = np.isin(ids, nodes).all() and len(nodes) == len(ids)
+            yield Block(kind, time, ids, values, True, places if known else None)
+
+
+def _frd_rows(body: str, columns: int, what: str, line: int) -> tuple[Ints, Floats]:
+    """The rows that start with -1: node numbers (k,), ascending, and values (k,columns)."""
+    rows = [row for row in body.split("\n") if row.startswith(" -1")]
+    width = KEY + NUMBER * columns
+    if not rows or any(len(row) < width for row in rows) or "\n -3" not in body:
+        raise FileError(f"line {line}: the {what} are cut off; run ccx again", where=line)
+    words = [row[k : k + NUMBER] for row in rows for k in range(KEY, width, NUMBER)]
+    try:
+        ids = np.array([row[3:KEY] for row in rows], dtype=int)
+    except ValueError as error:
+        raise FileError(f"line {line}: the {what} cannot be read ({error})", where=line) from None
+    order = np.argsort(ids, kind="stable")
+    return ids[order], _numbers(words, columns, what, line)[order]
+
+
+def _numbers(words: list[str], columns: int, what: str, line: int) -> Floats:
+    """(k,columns) the words of a table; an error names the table and the line where it starts."""
+    try:
+        values = np.array(words, dtype=float)
+    except ValueError:
+        try:
+            values = np.array([EXPONENT.sub(r"E\1", word) for word in words], dtype=float)
+        except ValueError as error:
+            raise FileError(f"line {line}: the {what} cannot be read ({error})", where=line) from None
+    if len(values) % columns or not len(values):
+        raise FileError(f"line {line}: the {what} are cut off; run ccx again", where=line)
+    table = values.reshape(-1, columns)
+    if not np.isfinite(table).all():
+        raise FileError(f"line {line}: the {what} are not finite; the analysis failed", where=line)
+    return table
