@@ -8,9 +8,8 @@ curves surface             lines, arcs, Béziers and planes as objects; what a s
 forces                     E with its derivatives, and its curvature
 contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
-stability certificate      lowest modes and Morse index; the verdict on a finished surface
+stability certificate      lowest modes and Morse index; the verdict on a finished surface, its figures
 verification               a theorem for a surface at rest, proved in floating point
-quantities                 what is measured on a roof: names, units, key figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
 design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all

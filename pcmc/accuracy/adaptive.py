@@ -24,21 +24,20 @@ import pandas as pd
 from .. import existence
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra, SurfaceError
+from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
+from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..meshing.sizes import limit_growth, triangles_for
-from ..quantities import dimension_of
 from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.geometry import face_areas
 from .estimator import Goal, error_shares, evenness
-from .goals import Accuracy, accuracies, check_places, goals_in
-from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
+from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, row_name, vertex_numbers, with_bar
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
@@ -51,6 +50,9 @@ SINGULAR = 2.0  # times the wanted root of a share: above, the share falls more 
 FLOOR = 1e-12  # of the largest share: a share below counts as that much
 WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
 ACCURACY_OF = ("mesh", "limit")
+QUANTITIES = ("height", "area", "volume", "energy", "reaction", "thrust")
+QUANTITIES += ("reaction per length", "lowest eigenvalue")
+Accuracy = Mapping[str, float] | str
 
 
 class AccuracyStatus(Enum):
@@ -119,8 +121,8 @@ class AccurateResult:
             unit = units.behind(dimension_of(row["quantity"]))
             on_mesh = with_bar(row["value"], row["error"], unit)
             limit = with_bar(row["limit"], row["limit_error"], unit)
-            wanted = f"wanted ± {row['accuracy']:g}{unit}"
-            parts.append(f"{_name(row)} {on_mesh} on this mesh, {limit} in the limit, {wanted}")
+            name, wanted = row_name(row["quantity"], row["of"]), f"wanted ± {row['accuracy']:g}{unit}"
+            parts.append(f"{name} {on_mesh} on this mesh, {limit} in the limit, {wanted}")
         return "; ".join(parts)
 
 
@@ -176,16 +178,87 @@ def solve_to_accuracy(
     if not isinstance(surface, Surface):
         validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     check_places(wanted, surface)
-    _require_mmg()
-    project: Projection | None
+    if importlib.util.find_spec("mmgpy") is None:
+        raise MissingExtra("mmgpy", "remesh")
+    project: Projection | None = None
     if callable(boundary):
         project = boundary
+    elif validate.choice("boundary", boundary, BOUNDARIES) == "smooth":
+        project = onto_held_curves(surface, corners=vertex_numbers(corners, surface.n))
     else:
-        validate.choice("boundary", boundary, BOUNDARIES)
-        sharp = vertex_numbers(corners, surface.n)
-        project = onto_held_curves(surface, corners=sharp) if boundary == "smooth" else None
+        vertex_numbers(corners, surface.n)
     given = {"boundary": boundary, "corners": corners}
     return _Search(wanted, accuracy_of, given, project, most_triangles, callback, options).run(surface)
+
+
+def accuracies(given: Any) -> dict[str, float]:
+    """The accuracy (> 0) by the name of a quantity, such as ``"height"`` or ``"height of north"``.
+
+    Parameters
+    ----------
+    given : a mapping, or text such as ``"height=1e-3, area of north=0.01"``.
+
+    Raises
+    ------
+    OptionError
+        For a quantity that does not exist, an accuracy that is not positive, or none at all.
+
+    Examples
+    --------
+    >>> accuracies("height=1e-3, area of north=0.01")
+    {'height': 0.001, 'area of north': 0.01}
+    >>> accuracies({"hight": 1e-3})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.OptionError: unknown quantity 'hight'; did you mean 'height'? Known: height, ...
+    """
+    expected = "a table such as {'height': 1e-3}, or a text such as 'height=1e-3'"
+    wanted: dict[Any, Any] = {}
+    for part in given.split(",") if isinstance(given, str) else ():
+        name, sign, value = part.rpartition("=")
+        try:
+            wanted[name.strip()] = validate.parsed(value)
+        except ValueError:
+            sign = ""
+        if not sign or not name.strip():
+            validate.refuse("accuracy", part.strip(), "QUANTITY=NUMBER, such as height=1e-3")
+    wanted = given if isinstance(given, Mapping) else wanted
+    if not wanted:
+        validate.refuse("accuracy", given, expected)
+    found = {}
+    for name, value in wanted.items():
+        validate.choice("quantity", str(name).partition(" of ")[0], QUANTITIES)
+        found[str(name)] = validate.number("accuracy", value, above=0.0, where=str(name))
+    return found
+
+
+def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
+    """Refuse a quantity of a patch that the surface does not have."""
+    for name in wanted:
+        _, of, patch = name.partition(" of ")
+        if of:
+            surface.patch_index(patch.partition(" near ")[0])
+
+
+def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, float]:
+    """The accuracy of each row of a mesh check's table that is asked for.
+
+    A quantity alone stands for that of the whole surface, and where there is none, as for heights, for
+    those of all patches. With a patch it stands for all curves of that patch, too.
+    """
+    goals: dict[Goal, float] = {}
+    for name, accuracy in wanted.items():
+        quantity, _, patch = name.partition(" of ")
+        rows = [str(of) for of in table["of"][table["quantity"] == quantity]]
+        if patch:
+            rows = [of for of in rows if patch in (of, of.partition(" near ")[0])]
+        elif "" in rows:
+            rows = [""]
+        if not rows:
+            message = f"accuracy: the surface has no {name}; print(pcmc.check_mesh(...)) shows what it has"
+            raise OptionError(message, what="accuracy", found=name)
+        goals |= dict.fromkeys(((quantity, of) for of in rows), accuracy)
+    return goals
 
 
 def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
@@ -219,30 +292,13 @@ def size_field(surface: Surface, shares: Floats, triangles: float, growth: float
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """A surface at rest, its check, the quantities wanted, and the largest error bar over its accuracy."""
+    """A surface at rest, its check, and the quantities wanted with their bars."""
 
     result: Result
     check: MeshCheck
     goals: Mapping[Goal, float]
     values: pd.DataFrame
-    excess: float
-
-    @classmethod
-    def of(
-        cls,
-        result: Result,
-        check: MeshCheck,
-        wanted: Mapping[str, float],
-        accuracy_of: str,
-        doubts: Mapping[str, float],
-    ) -> _Round:
-        goals = goals_in(check.table, wanted)
-        names = list(zip(check.table["quantity"], check.table["of"], strict=True))
-        rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
-        values = rows.assign(accuracy=list(goals.values()))
-        values[["error", "limit_error"]] += np.array([[doubts.get(quantity, 0.0)] for quantity, _ in goals])
-        bar = values["error" if accuracy_of == "mesh" else "limit_error"]
-        return cls(result, check, goals, values, float((bar / values["accuracy"]).max()))
+    excess: float  # the largest error bar over its accuracy
 
     @property
     def settled(self) -> bool:
@@ -274,14 +330,20 @@ class _Search:
         status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
         try:
             for _ in range(ROUNDS):
-                if ended := self._unsolved(result) or self._round(result):
+                if ended := self._unsolved(result) or self._ended(self._round(result)):
                     status, detail = ended
                     break
                 result = self._next(self.rounds[-1])
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
             status, detail = AccuracyStatus.STOPPED, ""
-        return self._end(status, detail, first)
+        history = [r.values.assign(round=k + 1, **r.record) for k, r in enumerate(self.rounds)]
+        rows = pd.concat(history, ignore_index=True) if history else pd.DataFrame()
+        surfaces = tuple(r.result.surface for r in self.rounds)
+        if not self.rounds:
+            return AccurateResult(status, first, None, pd.DataFrame(), rows, surfaces, detail)
+        last = self.rounds[-1]
+        return AccurateResult(status, last.result, last.check, last.values, rows, surfaces, detail)
 
     def _unsolved(self, result: Result) -> End | None:
         if result.converged:
@@ -290,31 +352,43 @@ class _Search:
             return AccuracyStatus.STOPPED, ""
         return AccuracyStatus.NOT_AT_REST, f"on {result.surface.m} triangles: {result.message}"
 
-    def _round(self, result: Result) -> End | None:
-        """Check the mesh of a surface at rest; the end of the search if this is the last round."""
+    def _round(self, result: Result) -> _Round:
+        """Check the mesh of a surface at rest; bars have what the first mesh's curves leave in doubt, too."""
         first = self.rounds[0].check if self.rounds else None
-        check = check_mesh(
-            result, **(self.given if first is None else {"boundary": self.project or "polygon"})
-        )
+        given = self.given if first is None else {"boundary": self.project or "polygon"}
+        check = check_mesh(result, **given)
         doubts: dict[str, float] = {}
         for (quantity, _), doubt in (first.curve_doubts if first else {}).items():
             doubts[quantity] = max(doubt, doubts.get(quantity, 0.0))
-        here = _Round.of(result, check, self.wanted, self.accuracy_of, doubts)
+        goals = goals_in(check.table, self.wanted)
+        names = list(zip(check.table["quantity"], check.table["of"], strict=True))
+        rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
+        values = rows.assign(accuracy=list(goals.values()))
+        values[["error", "limit_error"]] += np.array([[doubts.get(quantity, 0.0)] for quantity, _ in goals])
+        bar = values["error" if self.accuracy_of == "mesh" else "limit_error"]
+        here = _Round(result, check, goals, values, float((bar / values["accuracy"]).max()))
         self.rounds.append(here)
         if self.callback is not None:
             self.callback({"round": len(self.rounds), **here.record, "excess": here.excess})
-        if here.excess <= 1.0 and check.persists:
+        return here
+
+    def _ended(self, here: _Round) -> End | None:
+        """The end of the search, if this is the last round."""
+        if here.excess <= 1.0 and here.check.persists:
             return AccuracyStatus.REACHED, ""
-        for (quantity, of), accuracy in here.goals.items():
-            if (doubt := self.rounds[0].check.curve_doubts.get((quantity, of), 0.0)) > accuracy:
-                name = _name({"quantity": quantity, "of": of})
+        for goal, accuracy in here.goals.items():
+            if (doubt := self.rounds[0].check.curve_doubts.get(goal, 0.0)) > accuracy:
                 return AccuracyStatus.CURVES, (
-                    f"the first mesh has only points of them, and the {name} may be {doubt:.2g} off for that;"
-                    " draw them in a plan, start from more points, or give boundary= a function"
+                    f"the first mesh has only points of them, and the {row_name(*goal)} may be {doubt:.2g}"
+                    " off for that; draw them in a plan, start from more points, or give boundary= a function"
                 )
         if len(self.rounds) >= PATIENCE and not any(r.settled for r in self.rounds[-PATIENCE:]):
-            return AccuracyStatus.NO_LIMIT, _why_no_limit(here)
-        m = result.surface.m
+            rows = here.values[~np.isfinite(here.values["error"])]
+            names = ", ".join(map(row_name, rows["quantity"], rows["of"]))
+            why = "; ".join(filter(None, (here.check.detail, here.check.advice)))
+            settle = f"the values of {names} do not settle from mesh to mesh"
+            return AccuracyStatus.NO_LIMIT, settle if here.check.persists else why
+        m = here.result.surface.m
         if m < WORTHWHILE * self.most_triangles:
             return None
         known = math.isfinite(here.excess)
@@ -325,50 +399,20 @@ class _Search:
         return AccuracyStatus.TRIANGLES, f"{needed}; {hint}"
 
     def _next(self, here: _Round) -> Result:
-        """The surface on the next mesh; if it does not come to rest there, on the check's finer mesh."""
-        result = solve(self._remeshed(here), **self.options)
-        finer = here.check.surfaces[1:2]
-        if result.converged or result.status is Status.STOPPED or not finer:
-            return result
-        return solve(finer[0], **self.options) if finer[0].m <= self.most_triangles else result
-
-    def _remeshed(self, here: _Round) -> Surface:
-        """The surface on a mesh with equal shares of the error.
+        """The surface on a mesh with equal shares of the error; if it does not come to rest there, on the
+        check's finer mesh.
 
         With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
         """
-        surface, fine = here.result.surface, here.check.surfaces[1:2]
-        if fine:
-            shares = error_shares(surface, fine[0], here.goals)
+        surface, finer = here.result.surface, here.check.surfaces[1:2]
+        if finer:
+            shares = error_shares(surface, finer[0], here.goals)
         else:  # no finer mesh has this surface: finer everywhere
             shares = face_areas(surface.vertices[surface.faces]) ** 2
         factor = SPARE * evenness(shares) * here.excess if math.isfinite(here.excess) else MOST
         triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
-        return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=self.project)
-
-    def _end(self, status: AccuracyStatus, detail: str, first: Result) -> AccurateResult:
-        history = [r.values.assign(round=k + 1, **r.record) for k, r in enumerate(self.rounds)]
-        rows = pd.concat(history, ignore_index=True) if history else pd.DataFrame()
-        surfaces = tuple(r.result.surface for r in self.rounds)
-        if not self.rounds:
-            return AccurateResult(status, first, None, pd.DataFrame(), rows, surfaces, detail)
-        last = self.rounds[-1]
-        return AccurateResult(status, last.result, last.check, last.values, rows, surfaces, detail)
-
-
-def _why_no_limit(here: _Round) -> str:
-    """The mesh check's reason, or the quantities whose values do not settle."""
-    if not here.check.persists:
-        return "; ".join(filter(None, (here.check.detail, here.check.advice)))
-    rows = here.values[~np.isfinite(here.values["error"])]
-    names = ", ".join(map(_name, rows.to_dict("records")))
-    return f"the values of {names} do not settle from mesh to mesh"
-
-
-def _name(row: Mapping[Any, Any]) -> str:
-    return f"{row['quantity']} of {row['of']}" if row["of"] else str(row["quantity"])
-
-
-def _require_mmg() -> None:
-    if importlib.util.find_spec("mmgpy") is None:
-        raise MissingExtra("mmgpy", "remesh")
+        sizes = size_field(surface, shares, triangles)
+        result = solve(remesh(surface, sizes, growth=GROWTH, project=self.project), **self.options)
+        if result.converged or result.status is Status.STOPPED or not finer:
+            return result
+        return solve(finer[0], **self.options) if finer[0].m <= self.most_triangles else result

@@ -19,14 +19,15 @@ k_e is the stiffness of a vertex in the middle of two equilateral triangles. The
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..certificate.reactions import support_forces
-from ..contact.pinching import standing_part
+from ..certificate.reactions import held_boundary, support_forces
+from ..certificate.tables import names_of
 from ..design.quantities import largest_pull
 from ..design.targets import Target, measure
 from ..forces.functional import energy_and_gradient
@@ -37,16 +38,6 @@ from ..surface import Surface
 
 STEP = 1e-5  # of the size: length of the steps that differences of ∇E are taken over
 
-QUANTITIES = (
-    "height",
-    "area",
-    "volume",
-    "energy",
-    "reaction",
-    "thrust",
-    "reaction per length",
-    "lowest eigenvalue",
-)
 Goal = tuple[str, str]
 """A quantity and the patch or boundary it belongs to, as in a mesh check; "" for the whole."""
 
@@ -96,65 +87,60 @@ class _FineMesh:
     """The fine surface at rest, its second variation, and the interpolation errors of the coarse one."""
 
     coarse: Surface
-    fine: Surface
-    system: SecondVariation | None
-    stiffness: Floats
-    free: Floats
-    held: Floats
+    at: Equilibrium
+    system: SecondVariation | None  # without it the duals are unknown: all have the shares of the energy
+    stiffness: Floats  # (e,) k of the coarse edges
+    free: Floats  # (n,3) interpolation errors in the motion space
+    held: Floats  # (n,3) and at held vertices
 
     @classmethod
     def of(cls, coarse: Surface, fine: Surface) -> _FineMesh:
-        part = standing_part(fine)
-        shown, X = part.surface, part.surface.vertices
-        equilibrium = Equilibrium.of(fine)
-        try:
-            system = equilibrium.factorised()
-        except SingularMatrix:
-            system = None  # the duals are unknown; every quantity takes the shares of the energy
+        at, system = Equilibrium.of(fine), None
+        with suppress(SingularMatrix):
+            system = at.factorised()
         tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
         edge_of_face = coarse.topology.edge_of_face.ravel()
         k: Floats = np.bincount(edge_of_face, tension, len(coarse.topology.edges)).astype(float)
-        missing = np.zeros_like(X)
-        missing[coarse.n :] = _interpolation_error(coarse, X)
+        missing = _interpolation_error(coarse, at.X)
         held = np.where(fine.fixed[:, None], missing, 0.0)
-        return cls(coarse, shown, system, k, equilibrium.space.project(missing), held)
+        return cls(coarse, at, system, k, at.space.project(missing), held)
 
     def shares(self, goal: Goal) -> Floats:
         """(e,) the share of each coarse edge in the error of a quantity."""
-        quantity, of = goal
-        n, force = self.coarse.n, energy_and_gradient(self.fine, supports=False)[1]
-        missing = np.linalg.norm(self.free[n:], axis=1)
-        if quantity == "energy" or self.system is None:
-            at_held = np.abs(np.einsum("nd,nd->n", force, self.held))[n:]
-            return np.asarray(0.5 * self.stiffness * missing**2 + at_held)
-        own = np.zeros(len(missing))
-        if quantity == "lowest eigenvalue":
+        (quantity, of), system, fine = goal, self.system, self.at.shape
+        free, mode = self._sizes(self.free), None
+        if system is not None and quantity == "lowest eigenvalue":
             try:
-                mode = lowest(self.system, 1)[1][0]
+                mode = lowest(system, 1)[1][0]
             except SingularMatrix:  # no mode is known; the shares of the energy will do
-                return self.shares(("energy", of))
-            slope = _along(self.fine, mode, second=True)
-            own = self.stiffness * self._missing(mode) ** 2
-        else:
-            slope = _slope(self.fine, quantity, of)
-        dual = self.system.of.space.to_vectors(self.system.solve(self.system.of.space.to_coordinates(slope)))
-        reaction = slope - _along(self.fine, dual)
-        at_held = np.abs(np.einsum("nd,nd->n", reaction, self.held))[n:]
-        return np.asarray(self.stiffness * missing * self._missing(dual) + at_held + own)
+                quantity = "energy"
+        if system is None or quantity == "energy":
+            at_held = self._at_held(self.at.gradient_with_reactions)
+            return np.asarray(0.5 * self.stiffness * free**2 + at_held)
+        slope = _slope(fine, quantity, of) if mode is None else _along(fine, mode, second=True)
+        dual = self.at.space.to_vectors(system.solve(self.at.space.to_coordinates(slope)))
+        shares = self.stiffness * free * self._missing(dual) + self._at_held(slope - _along(fine, dual))
+        return np.asarray(shares if mode is None else shares + self.stiffness * self._missing(mode) ** 2)
+
+    def _sizes(self, field: Floats) -> Floats:
+        """(e,) of a field (n,3) at the new vertices."""
+        return np.asarray(np.linalg.norm(field[self.coarse.n :], axis=1))
 
     def _missing(self, field: Floats) -> Floats:
         """(e,) size of the interpolation error of a field of motions, in the motion space."""
-        error = np.zeros_like(field)
-        error[self.coarse.n :] = _interpolation_error(self.coarse, field)
-        space = self.system.of.space if self.system is not None else None
-        error = error if space is None else space.project(error)
-        return np.asarray(np.linalg.norm(error[self.coarse.n :], axis=1))
+        return self._sizes(self.at.space.project(_interpolation_error(self.coarse, field)))
+
+    def _at_held(self, force: Floats) -> Floats:
+        """(e,) the work of a force (n,3) along the errors at held vertices."""
+        return np.asarray(np.abs(np.einsum("nd,nd->n", force, self.held))[self.coarse.n :])
 
 
 def _interpolation_error(coarse: Surface, field: Floats) -> Floats:
-    """(e,3) the field at each new vertex less the mean of the ends of its edge."""
+    """(n,3) the field at each new vertex less the mean of the ends of its edge; 0 at the others."""
     start, end = coarse.topology.edges.T
-    return np.asarray(field[coarse.n :] - 0.5 * (field[start] + field[end]))
+    error = np.zeros_like(field)
+    error[coarse.n :] = field[coarse.n :] - 0.5 * (field[start] + field[end])
+    return error
 
 
 def _slope(surface: Surface, quantity: str, of: str) -> Floats:
@@ -162,25 +148,26 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     if quantity in ("height", "area", "volume"):
         return measure(surface, Target({"height": "apex"}.get(quantity, quantity), of or None)).by_position
     acting, vertices = support_forces(surface), _held_vertices(surface, of)
-    pull = np.zeros_like(surface.vertices)
     if quantity == "reaction per length":
         inside = np.isin(surface.topology.edges, vertices).all(axis=1)
         return largest_pull(acting, inside & acting.along_patch(None)).by_position
+    pull = np.zeros_like(surface.vertices)
+    pull[vertices] = surface.plane.normal
     if quantity == "thrust":
         total = surface.plane.along(acting.along[vertices].sum(axis=0))
         pull[vertices] = total / (np.linalg.norm(total) or 1.0)
-    else:
-        pull[vertices] = surface.plane.normal
     return _reaction_slope(surface, pull)
 
 
 def _held_vertices(surface: Surface, of: str) -> Ints:
     """The vertices of the held boundary, or of its curves with the name of a patch."""
-    held = support_forces(surface).on_boundary
-    patch = of.split(" near (")[0]
-    names = [" | ".join(surface.patches[i].name for i in c.sheets) for c in surface.topology.boundary_loops]
-    curves = zip(names, surface.topology.boundary_loops, strict=True)
-    chosen = [c.vertices[held[c.vertices]] for name, c in curves if name == patch]
+    held, patch = np.zeros(surface.n, dtype=bool), of.split(" near (")[0]
+    held[surface.topology.edges[held_boundary(surface)]] = True
+    chosen = [
+        curve.vertices[held[curve.vertices]]
+        for curve in surface.topology.boundary_loops
+        if names_of(surface, curve.sheets) == patch
+    ]
     return np.unique(np.concatenate(chosen)) if chosen else np.flatnonzero(held)
 
 
@@ -205,9 +192,10 @@ def _along(surface: Surface, field: Floats, second: bool = False) -> Floats:
     if most == 0.0:
         return np.zeros_like(field)
     step = (sqrt(STEP) if second else STEP) * surface.size / most
-    X = surface.vertices
-    ahead, back = (energy_and_gradient(surface, X + s * field, supports=False)[1] for s in (step, -step))
+    shifts = (step, -step, 0.0) if second else (step, -step)
+    ahead, back, *here = (
+        energy_and_gradient(surface, surface.vertices + s * field, supports=False)[1] for s in shifts
+    )
     if not second:
         return np.asarray((ahead - back) / (2.0 * step))
-    here = energy_and_gradient(surface, supports=False)[1]
-    return np.asarray((ahead + back - 2.0 * here) / step**2)
+    return np.asarray((ahead + back - 2.0 * here[0]) / step**2)

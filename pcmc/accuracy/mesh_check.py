@@ -15,10 +15,10 @@ from ..base import validate
 from ..base.arrays import Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
-from ..certificate import Certificate, certify
+from ..certificate import certify
+from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import doubted_midpoints, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
-from ..quantities import dimension_of
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
@@ -77,17 +77,16 @@ class MeshCheck:
         ------
         OptionError : the table has no such row.
         """
-        pairs = zip(self.table["quantity"].tolist(), self.table["of"].tolist(), strict=True)
-        known = [_name(*pair) for pair in pairs]
-        return self.table.iloc[known.index(validate.choice("quantity", _name(quantity, of), known))]
+        known = list(map(row_name, self.table["quantity"], self.table["of"]))
+        return self.table.iloc[known.index(validate.choice("quantity", row_name(quantity, of), known))]
 
     def numbers(self) -> dict[str, Any]:
         """The verdict, and bar, limit, its bar and order of the quantities of the whole surface, for tables.
 
         The height is that of the highest patch. Keys are such as ``height_error`` and ``volume_limit``.
         """
-        verdict = self.verdict.name.lower().replace("_", " ")
-        found: dict[str, Any] = {"mesh_verdict": verdict, "mesh_detail": self.detail}
+        found: dict[str, Any] = {"mesh_verdict": self.verdict.name.lower().replace("_", " ")}
+        found["mesh_detail"] = self.detail
         heights = self.table[self.table["quantity"] == "height"].nlargest(1, "value")
         for row in pd.concat([heights, self.table[self.table["of"] == ""]]).to_dict("records"):
             for column in ("error", "limit", "limit_error", "order"):
@@ -97,19 +96,19 @@ class MeshCheck:
     def brief(self, units: Units = NO_UNITS) -> str:
         """The verdict, its reason, and the bars of heights, of rooms and of the whole surface."""
         main = self.table[(self.table.of == "") | self.table.quantity.isin(["height", "pressure"])]
-        return "\n".join([*self._head(), _text_table(main, units)])
+        return f"{self._head()}\n{_text_table(main, units)}"
 
     def text(self, units: Units = NO_UNITS) -> str:
         """The verdict, its reason and the table, with the units of its numbers if they are given."""
-        return "\n".join([*self._head(), "", _text_table(self.table, units)])
+        return f"{self._head()}\n\n{_text_table(self.table, units)}"
+
+    def _head(self) -> str:
+        return "\n".join(filter(None, (self.verdict.value, self.detail, self.advice)))
 
     def __str__(self) -> str:
         return self.text()
 
     __repr__ = __str__  # what a prompt shows: the table, not arrays
-
-    def _head(self) -> list[str]:
-        return [part for part in (self.verdict.value, self.detail, self.advice) if part]
 
 
 def check_mesh(
@@ -183,7 +182,10 @@ def check_mesh(
             expected=most_triangles,
         )
     certificate = surface.certificate if isinstance(surface, Result) else certify(surface)
-    _refuse_unsolved(certificate)
+    if certificate.index is None:
+        message = f"check_mesh needs a surface at rest; solve it first ({certificate.verdict.value}"
+        message += f"; {certificate.detail})" if certificate.detail else ")"
+        raise SurfaceError(message, what="surface", found=certificate.residual)
     surfaces, certificates = [first], [certificate]
     finding, order = None, None
     for _ in range(meshes - 1):
@@ -199,21 +201,10 @@ def check_mesh(
         finding = other if finding is None or other.verdict is MeshVerdict.CHANGES else finding
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
     doubts = _curve_doubts(first, sharp, found, callback) if boundary == "smooth" else {}
-    table = _table(
-        found,
-        shape_order=shape_order(surfaces) if order is None else order,
-        doubt=np.array([doubts.get((r.quantity, r.of), 0.0) for r in found[0].values()]),
-    )
+    table = _table(found, shape_order(surfaces) if order is None else order, doubts)
     return MeshCheck(
         finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces), doubts
     )
-
-
-def _refuse_unsolved(certificate: Certificate) -> None:
-    if certificate.index is None:
-        message = f"check_mesh needs a surface at rest; solve it first ({certificate.verdict.value}"
-        message += f"; {certificate.detail})" if certificate.detail else ")"
-        raise SurfaceError(message, what="surface", found=certificate.residual)
 
 
 def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
@@ -226,10 +217,9 @@ def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
 
 
 def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Surface:
-    """The surface on a mesh with four times as many triangles."""
-    named: dict[str, Projection] = {"smooth": lambda _: smooth_midpoints(surface, corners=corners)}
-    project = named.get(boundary) if isinstance(boundary, str) else boundary
-    return refine(surface, 1, project)
+    if boundary == "smooth":
+        return refine(surface, 1, lambda _: smooth_midpoints(surface, corners=corners))
+    return refine(surface, 1, boundary if callable(boundary) else None)
 
 
 def _solved(start: Surface, callback: Callback | None) -> Result:
@@ -257,17 +247,21 @@ def _curve_doubts(
     }
 
 
-def _table(found: Sequence[dict[Key, Reading]], **doubts: Any) -> pd.DataFrame:
+def _table(
+    found: Sequence[dict[Key, Reading]], order: float, doubts: Mapping[tuple[str, str], float]
+) -> pd.DataFrame:
     """Values, limits, bars and orders; NaN for a quantity that a finer mesh does not have."""
-    first = list(found[0].values())
-    estimates = np.array([[_of(one, key, "estimate") for key in found[0]] for one in found])
-    rounding = np.array([[_of(one, key, "rounding") for key in found[0]] for one in found])
-    value = np.array([reading.value for reading in first])
-    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value, **doubts)
+    none = Reading("", "", math.nan, math.nan, math.nan)
+    rows = [[one.get(key, none) for key in found[0]] for one in found]
+    estimates = np.array([[reading.estimate for reading in row] for row in rows])
+    rounding = np.nanmax(np.array([[reading.rounding for reading in row] for row in rows]), axis=0)
+    value = np.array([reading.value for reading in rows[0]])
+    doubt = np.array([doubts.get((reading.quantity, reading.of), 0.0) for reading in rows[0]])
+    result = extrapolate(estimates, rounding, value, shape_order=order, doubt=doubt)
     return pd.DataFrame(
         {
-            "quantity": [reading.quantity for reading in first],
-            "of": [reading.of for reading in first],
+            "quantity": [reading.quantity for reading in rows[0]],
+            "of": [reading.of for reading in rows[0]],
             "value": value,
             "error": result.error,
             "limit": result.limit,
@@ -277,30 +271,24 @@ def _table(found: Sequence[dict[Key, Reading]], **doubts: Any) -> pd.DataFrame:
     )
 
 
-def _name(quantity: str, of: str) -> str:
+def row_name(quantity: str, of: str) -> str:
+    """What a row is called: "area of north", or "energy" of the whole."""
     return f"{quantity} of {of}" if of else quantity
-
-
-def _of(one: dict[Key, Reading], key: Key, name: str) -> float:
-    return float(getattr(one[key], name)) if key in one else math.nan
 
 
 def _text_table(table: pd.DataFrame, units: Units) -> str:
     """Lines with as many digits as the bars let stand."""
-    kinds = list(map(dimension_of, table.quantity))
     lines = pd.DataFrame(
         {
             "quantity": table.quantity,
             "of": table.of,
-            "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
-            "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
-            "unit": [units.behind(kind).strip() for kind in kinds],
+            "on this mesh": list(map(with_bar, table.value, table.error)),
+            "limit": list(map(with_bar, table.limit, table.limit_error)),
+            "unit": [units.behind(dimension_of(quantity)).strip() for quantity in table.quantity],
             "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
         }
     )
-    if not units:
-        del lines["unit"]
-    return lines.to_string(index=False)
+    return lines.drop(columns=[] if units else ["unit"]).to_string(index=False)
 
 
 def with_bar(value: float, bar: float, unit: str = "") -> str:
@@ -317,15 +305,10 @@ def with_bar(value: float, bar: float, unit: str = "") -> str:
         return f"{value:.8g}{unit} (given)"
     if not math.isfinite(bar):
         return f"{value:.4g}{unit} ± unknown"
-    return _rounded(value, bar) + unit
-
-
-def _rounded(value: float, bar: float) -> str:
-    """Both with two digits of the bar."""
     if bar <= 1e-9 * abs(value):
-        return f"{value:.8g} ± {bar:.0e}"
+        return f"{value:.8g} ± {bar:.0e}{unit}"
     digits = 1 - math.floor(math.log10(bar))
-    if -6 <= digits <= 9:
-        shown = max(digits, 0)
-        return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}"
-    return f"{value:.4g} ± {bar:.2g}"
+    if not -6 <= digits <= 9:
+        return f"{value:.4g} ± {bar:.2g}{unit}"
+    shown = max(digits, 0)
+    return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}{unit}"

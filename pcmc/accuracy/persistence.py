@@ -12,11 +12,11 @@ import numpy as np
 from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.balance import overload
+from ..certificate.tables import names_of
 from ..contact.pinching import standing_part
-from ..forces.functional import energy_and_gradient
-from ..forces.motion_space import motion_space
 from ..meshing.quality import triangle_quality
 from ..solvers.result import Result, Status
+from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 
@@ -59,51 +59,50 @@ def lost(start: Surface, result: Result) -> Finding:
     The place is that of the start: where the solver ends, a surface may be far away.
     """
     surface = result.surface
-    part = standing_part(surface)
     quality = triangle_quality(surface.vertices, surface.faces)
-    quality[part.walls.pinchable[surface.patch_of_face]] = np.inf
+    quality[standing_part(surface).walls.pinchable[surface.patch_of_face]] = np.inf
     worst = int(quality.argmin())
     if result.status in RUNNING_AWAY:
-        what = RUNNING_AWAY[result.status]
+        what = f"{RUNNING_AWAY[result.status]}, most"
         vertices = np.linalg.norm(surface.vertices - start.vertices, axis=1).argmax(keepdims=True)
     elif quality[worst] < POOR:
         what, vertices = "its triangles collapse", surface.faces[worst]
     else:
-        forces = energy_and_gradient(part.surface, surface.vertices)[1]
-        left = motion_space(part.surface, part.classes, surface.vertices).project(forces)
-        what, vertices = "its forces do not come to rest", np.linalg.norm(left, axis=1).argmax(keepdims=True)
-    place = start.vertices[vertices].mean(axis=0)
+        left = np.linalg.norm(Equilibrium.of(surface).unbalanced, axis=1)
+        what, vertices = "its forces do not come to rest", left.argmax(keepdims=True)
+    place, load = start.vertices[vertices].mean(axis=0), overload(surface)
     reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
-    reason += f", most near {_text(place)}" if result.status in RUNNING_AWAY else f" near {_text(place)}"
-    load = overload(surface)
-    if load is not None:
-        reason += f"; {load}"
+    reason += f" near {_text(place)}" + ("" if load is None else f"; {load}")
     return _at(MeshVerdict.HELD_BY_MESH, start, reason, place)
 
 
 def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
     """The finding about surfaces at rest, each on a refinement of the mesh before."""
+    first = certificates[0]
     for surface, certificate in zip(surfaces[1:], certificates[1:], strict=True):
-        if certificate.index != certificates[0].index:
-            return _other_index(surface, certificate, certificates[0])
-    first = surfaces[0]
-    size = max(float(np.ptp(first.plane.height(first.vertices))), FLAT * first.size)
+        if certificate.index != first.index:
+            place = _where_softest(surface, certificate)
+            becomes = "stable" if certificate.index == 0 else f"a saddle of index {certificate.index}"
+            was = "stable" if first.index == 0 else f"of index {first.index}"
+            reason = (
+                f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest near"
+                f" {_text(place)}"
+            )
+            return _at(MeshVerdict.CHANGES, surface, reason, place)
+    size = max(float(np.ptp(surfaces[0].plane.height(surfaces[0].vertices))), FLAT * surfaces[0].size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
         if contact := _other_contact(surface, fine):
             return contact
-        farthest = int(move.argmax())
-        if move[farthest] > FAR * size:
-            place = surface.vertices[farthest]
-            reason = (
-                f"on {fine.m} triangles it is another shape, {move[farthest]:.3g} away near {_text(place)}"
-            )
+        far, place = float(move.max()), surface.vertices[int(move.argmax())]
+        if far > FAR * size:
+            reason = f"on {fine.m} triangles it is another shape, {far:.3g} away near {_text(place)}"
             return _at(MeshVerdict.CHANGES, surface, reason, place)
-    mean = [_mean(move) for move in moves]
-    if shape_order(surfaces) < 0.0:
+    if _order(surfaces, moves) < 0.0:
+        before, last = (_mean(move) for move in moves[-2:])
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
         reason = (
-            f"each finer surface is farther from the last one (by {mean[-2]:.2g}, then {mean[-1]:.2g} in the"
+            f"each finer surface is farther from the last one (by {before:.2g}, then {last:.2g} in the"
             f" mean), most near {_text(place)}"
         )
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
@@ -117,10 +116,13 @@ def shape_order(surfaces: Sequence[Surface]) -> float:
     coarse mesh may be at rest on the smooth surface itself, so that first moves are small and later ones
     larger. The error is how far the last refinement's new vertices are from the middles of their edges.
     """
+    return _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
+
+
+def _order(surfaces: Sequence[Surface], moves: Sequence[Floats]) -> float:
     if len(surfaces) < 3:
         return np.inf
-    before, last = (_mean(_moves(a, b)) for a, b in pairwise(surfaces[-3:]))
-    coarse, fine = surfaces[-2:]
+    (before, last), (coarse, fine) = (_mean(move) for move in moves[-2:]), surfaces[-2:]
     middles = coarse.vertices[coarse.topology.edges].mean(axis=1)
     error = _mean(np.linalg.norm(fine.vertices[coarse.n :] - middles, axis=1))
     return float(np.log2(before / last)) if last > STILL * fine.size + MATTERS * error else np.inf
@@ -131,51 +133,36 @@ def _mean(moves: Floats) -> float:
     return float(np.sqrt((moves**2).mean()))
 
 
+def _moves(coarse: Surface, fine: Surface) -> Floats:
+    """(n,) how far the coarse vertices have moved in ways that change the shape, length."""
+    space = Equilibrium.of(coarse).space
+    return np.linalg.norm(space.project(fine.vertices[: coarse.n] - coarse.vertices), axis=1)
+
+
 def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
     """The finding from the trend of the lowest eigenvalue, where all else persists."""
     index, finest = certificates[0].index, surfaces[-1]
     kind = "stable" if index == 0 else f"a saddle of index {index}"
-    meshes = " and ".join(str(surface.m) for surface in surfaces[1:])
-    reason = f"{kind} on {meshes} triangles too"
+    reason = f"{kind} on {' and '.join(str(surface.m) for surface in surfaces[1:])} triangles too"
     lowest = [float(c.eigenvalues[0]) for c in certificates if len(c.eigenvalues)]
     if index != 0 or len(lowest) < max(3, len(surfaces)):
         return Finding(MeshVerdict.PERSISTS, reason)
     step, before = lowest[-1] - lowest[-2], lowest[-2] - lowest[-3]
-    falls = before < 0.0 and step < 0.84 * before  # no limit in sight, as for the error bars
-    if not falls:
+    if not (before < 0.0 and step < 0.84 * before):  # a limit in sight, as for the error bars
         return Finding(MeshVerdict.PERSISTS, reason)
     values = ", ".join(f"{value:.3g}" for value in lowest)
     reason += f", but the lowest eigenvalue falls from mesh to mesh ({values}) with no limit in sight"
+    if lowest[-1] + FURTHER * step >= 0.0:
+        return Finding(MeshVerdict.PERSISTS, reason)
     place = _where_softest(finest, certificates[-1])
-    if lowest[-1] + FURTHER * step < 0.0:
-        reason += f": it would be a saddle within {FURTHER} more refinements, by a motion near {_text(place)}"
-        return _at(MeshVerdict.HELD_BY_MESH, finest, reason, place)
-    return Finding(MeshVerdict.PERSISTS, reason)
-
-
-def _other_index(surface: Surface, here: Certificate, first: Certificate) -> Finding:
-    """The finding where the Morse index is another one on a finer mesh."""
-    place = _where_softest(surface, here)
-    becomes = "stable" if here.index == 0 else f"a saddle of index {here.index}"
-    was = "stable" if first.index == 0 else f"of index {first.index}"
-    reason = (
-        f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest near"
-        f" {_text(place)}"
-    )
-    return _at(MeshVerdict.CHANGES, surface, reason, place)
+    reason += f": it would be a saddle within {FURTHER} more refinements, by a motion near {_text(place)}"
+    return _at(MeshVerdict.HELD_BY_MESH, finest, reason, place)
 
 
 def _where_softest(surface: Surface, certificate: Certificate) -> Floats:
     """(3,) where the lowest mode moves the surface most."""
     moved = np.linalg.norm(certificate.modes, axis=2).sum(axis=0)  # zero where no mode was computed
     return np.asarray(surface.vertices[moved.argmax()])
-
-
-def _moves(coarse: Surface, fine: Surface) -> Floats:
-    """(n,) how far the coarse vertices have moved in ways that change the shape, length."""
-    part = standing_part(coarse)
-    space = motion_space(part.surface, part.classes, coarse.vertices)
-    return np.linalg.norm(space.project(fine.vertices[: coarse.n] - coarse.vertices), axis=1)
 
 
 def _other_contact(coarse: Surface, fine: Surface) -> Finding | None:
@@ -186,10 +173,9 @@ def _other_contact(coarse: Surface, fine: Surface) -> Finding | None:
         tops = walls.top_edges[walls.wall_below == k]
         lengths = segment_lengths(coarse.vertices, tops)
         if abs(after[k] - before[k]) > 2.0 * lengths.max() + RESTED * lengths.sum():
-            name = coarse.patches[k].name
             reason = (
-                f"on {fine.m} triangles the junction over {name!r} rests on the plane along {after[k]:.3g}"
-                f" of its length {lengths.sum():.3g}, here along {before[k]:.3g}"
+                f"on {fine.m} triangles the junction over {coarse.patches[k].name!r} rests on the plane along"
+                f" {after[k]:.3g} of its length {lengths.sum():.3g}, here along {before[k]:.3g}"
             )
             return Finding(MeshVerdict.CHANGES, reason, _tuple(coarse.vertices[tops].mean(axis=(0, 1))))
     return None
@@ -207,7 +193,7 @@ def _resting_lengths(surface: Surface) -> Floats:
 def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> Finding:
     """A finding about a place, with advice where it is near a junction that ends over a wall that slides."""
     X, sliding = surface.vertices, standing_part(surface).walls.sliding
-    nearest, found = np.inf, None
+    nearest, advice, ending = np.inf, "", ""
     for curve in surface.topology.junctions:
         ends = [v for v in curve.vertices[[0, -1]] if surface.fixed[v] and not curve.closed]
         if not ends or not sliding[list(curve.sheets)].any():
@@ -215,18 +201,15 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> F
         length = segment_lengths(X, np.stack([curve.vertices[:-1], curve.vertices[1:]], axis=1)).sum()
         distance = np.linalg.norm(X[curve.vertices] - place, axis=1).min() / length
         if distance <= min(nearest, REACH):
-            nearest, found = distance, (curve, X[min(ends, key=lambda v: np.linalg.norm(X[v] - place))])
-    if found is None:
-        return Finding(verdict, reason, _tuple(place))
-    curve, end = found
-    names = " | ".join(surface.patches[k].name for k in curve.sheets)
-    wall = next(surface.patches[k].name for k in curve.sheets if sliding[k])
-    reason += f"; the junction {names} there ends at {_text(end)}, where only the mesh holds it"
-    advice = (
-        f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'
-        " vertices to fixed="
-    )
-    return Finding(verdict, reason, _tuple(place), advice)
+            nearest, end = distance, X[min(ends, key=lambda v: np.linalg.norm(X[v] - place))]
+            names = names_of(surface, curve.sheets)
+            wall = next(surface.patches[k].name for k in curve.sheets if sliding[k])
+            ending = f"; the junction {names} there ends at {_text(end)}, where only the mesh holds it"
+            advice = (
+                f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'
+                " vertices to fixed="
+            )
+    return Finding(verdict, reason + ending, _tuple(place), advice)
 
 
 def _tuple(place: Floats) -> tuple[float, float, float]:

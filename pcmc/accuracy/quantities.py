@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,36 +14,27 @@ from ..certificate.supports import held_curves
 from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..forces.volume_below import volume_below
 from ..surface import Surface
+from ..surface.topology import Curve
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 SAME = 1e-6  # of the size, cubed: volumes this near are one, up to what solving to rest leaves open
 RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
 EIGENVALUES = 1e-12  # of the largest eigenvalue: rounding of the lowest one
-
 STIFFEST = 10.0  # the largest eigenvalue in units of α over the area of a triangle
 
-Curve = tuple[tuple[int, ...], bytes]  # a boundary curve: its sheets, and its vertices in the coarsest mesh
 Key = tuple[str, str, tuple[int, ...], bytes]
+"""Quantity and patch; or quantity, sheets of a boundary curve, and its vertices in the coarsest mesh."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A quantity of one surface.
-
-    Attributes
-    ----------
-    quantity, of : its name, and the patch or boundary it belongs to; empty for the whole.
-    value : as read from the mesh.
-    estimate : of the same limit, but smoother from mesh to mesh; the same as ``value`` for most.
-    rounding : differences up to this size are none; 0 for a value that is given, such as the volume of
-        rooms whose volumes are prescribed.
-    """
+    """A quantity of one surface."""
 
     quantity: str
-    of: str
-    value: float
-    estimate: float
-    rounding: float
+    of: str  # the patch or boundary it belongs to; empty for the whole
+    value: float  # as read from the mesh
+    estimate: float  # of the same limit, but smoother from mesh to mesh; the same as ``value`` for most
+    rounding: float  # differences up to this size are none; 0 for a value that is given
 
 
 def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[Key, Reading]:
@@ -56,40 +48,39 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
     share = ROUNDING + RESIDUALS * certificate.residual
     size, tension = surface.size, float(surface.tensions.max())
     areas = certificate.patches["area"].to_numpy()
+    whole = float(areas.sum())
     found: dict[Key, Reading] = {}
 
     def add(
-        what: str, of: str, value: float, scale: float, curve: Curve = ((), b""), better: float | None = None
+        what: str, of: str, value: float, rounding: float, estimate: float | None = None, key: Any = ()
     ) -> None:
-        reading = Reading(what, of, value, value if better is None else better, share * scale)
-        found[what, "" if curve[1] else of, *curve] = reading
+        reading = Reading(what, of, value, value if estimate is None else estimate, rounding)
+        found[key or (what, of, (), b"")] = reading
 
     for k, patch in enumerate(surface.patches):
         if surface.roof[k]:
-            height, estimate = _height(surface, k)
-            reading = Reading("height", patch.name, height, estimate, share * size)
-            found["height", patch.name, (), b""] = reading
+            add("height", patch.name, *_height(surface, k, share * size))
     for patch, area in zip(surface.patches, areas.tolist(), strict=True):
-        add("area", patch.name, area, size**2)
-    if (given := given_volume(surface)) is None:
-        add("volume", "", certificate.volume, size**3)
-    else:
-        add("volume", "", given, 0.0)
+        add("area", patch.name, area, share * size**2)
+    given = given_volume(surface)
+    add("volume", "", *((certificate.volume, share * size**3) if given is None else (given, 0.0)))
     for room, pressure in zip(surface.rooms, room_pressures(surface).tolist(), strict=True):
-        add("pressure", room.name, pressure, tension / size)
-    add("energy", "", certificate.energy, tension * float(areas.sum()))
-    add("reaction", "", certificate.support, tension * size, better=-certificate.load)
-    for curve, name, pull, most in _boundaries(surface, certificate, vertices):
-        alone = -certificate.load if len(certificate.supports) == 1 else None
-        add("reaction", name, float(pull @ np.array(surface.plane.normal)), tension * size, curve, alone)
-        add("thrust", name, float(np.linalg.norm(surface.plane.along(pull))), tension * size, curve)
-        add("reaction per length", name, most, tension, curve)
+        add("pressure", room.name, pressure, share * tension / size)
+    add("energy", "", certificate.energy, share * tension * whole)
+    pull = share * tension * size
+    add("reaction", "", certificate.support, pull, -certificate.load)
+    alone = -certificate.load if len(certificate.supports) == 1 else None
+    for curve, name, force, most in _boundaries(surface, certificate):
+        old = np.sort(curve.vertices[curve.vertices < vertices]).tobytes()
+        up, along = force @ np.array(surface.plane.normal), np.linalg.norm(surface.plane.along(force))
+        add("reaction", name, float(up), pull, alone, ("reaction", "", curve.sheets, old))
+        add("thrust", name, float(along), pull, None, ("thrust", "", curve.sheets, old))
+        what = "reaction per length"
+        add(what, name, most, share * tension, None, (what, "", curve.sheets, old))
     if len(certificate.eigenvalues):
-        stiffest = STIFFEST * tension * surface.m / float(areas.sum())
+        stiffest = STIFFEST * tension * surface.m / whole
         rounding = share * tension / size**2 + EIGENVALUES * stiffest
-        lowest = float(certificate.eigenvalues[0])
-        key = "lowest eigenvalue"
-        found[key, "", (), b""] = Reading(key, "", lowest, lowest, rounding)
+        add("lowest eigenvalue", "", float(certificate.eigenvalues[0]), rounding)
     return found
 
 
@@ -116,9 +107,7 @@ def given_volume(surface: Surface) -> float | None:
     return given if same and np.abs(share @ signs - roof).max() <= ROUNDING else None
 
 
-def _boundaries(
-    surface: Surface, certificate: Certificate, vertices: int
-) -> Iterator[tuple[Curve, str, Floats, float]]:
+def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[Curve, str, Floats, float]]:
     """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
 
     Of several curves of one name, each is named with its place.
@@ -127,44 +116,43 @@ def _boundaries(
     table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
-    pulls = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
-    most = table["per_length_max"].to_numpy().tolist()
-    for i, curve in enumerate(curves):
-        place = ", ".join(f"{c:.3g}" for c in middles[i])
-        name = names[i] if names.count(names[i]) == 1 else f"{names[i]} near ({place})"
-        old = np.sort(curve.vertices[curve.vertices < vertices])
-        yield (curve.sheets, old.tobytes()), name, pulls[i], most[i]
+    forces = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
+    for curve, name, at, force, most in zip(
+        curves, names, middles, forces, table["per_length_max"].tolist(), strict=True
+    ):
+        place = ", ".join(f"{c:.3g}" for c in at)
+        yield curve, name if names.count(name) == 1 else f"{name} near ({place})", force, most
 
 
-def _height(surface: Surface, patch: int) -> tuple[float, float]:
-    """Greatest height of a patch's vertices over Π, and that of the smooth surface through them there.
+def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float, float]:
+    """Greatest height of a patch's vertices over Π, ``rounding``, and the height of the smooth surface
+    through the vertices there.
 
     The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
     through it and its neighbours, or on a junction the parabola, has its top at the surface's own. In a
     mirror plane the images of its neighbours belong to them.
     """
-    local = surface.plane.to_local(surface.vertices)
+    local, topo = surface.plane.to_local(surface.vertices), surface.topology
     vertices = np.unique(surface.faces[surface.patch_of_face == patch])
     top = int(vertices[local[vertices, 2].argmax()])
-    value = float(local[top, 2])
+    value, on_junction = float(local[top, 2]), topo.on_junction[top]
     mirrors = [plane for plane, mask in surface.on_planes if plane.mirror and mask[top]]
     if surface.fixed[top] or surface.on_plane[top] or (surface.held[top] and not mirrors):
-        return value, value
-    topo = surface.topology
+        return value, rounding, value
     around = (topo.edges == top).any(axis=1)
-    if topo.on_junction[top]:
+    if on_junction:
         around &= topo.junction_edge | topo.seam_edge
     beside = surface.vertices[topo.edges[around].sum(axis=1) - top]
     for plane in mirrors:
         beside = np.concatenate([beside, beside - 2.0 * plane.height(beside)[:, None] * plane.normal])
     step = surface.plane.to_local(beside) - local[top]
-    if topo.on_junction[top]:
-        if len(beside) != 2:
-            return value, value
+    if on_junction and len(beside) != 2:
+        return value, rounding, value
+    if on_junction:
         along = step[0, :2] - step[1, :2]
         along /= np.linalg.norm(along) or 1.0
         step = np.column_stack([step[:, :2] @ along, np.zeros(2), step[:, 2]])
-    return value, value + _rise(step)
+    return value, rounding, value + _rise(step)
 
 
 def _rise(step: Floats) -> float:

@@ -22,8 +22,7 @@ from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import lowest
-from ..stability.softness import NEAR, NEUTRAL, Spectrum, count_soft
+from ..stability.modes import NEAR, NEUTRAL, Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
 from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over

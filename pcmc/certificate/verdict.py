@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..forces.triangles import compressed, effective_tensions
-from ..stability.softness import NEAR, NEUTRAL, Spectrum
+from ..stability.modes import NEAR, NEUTRAL, Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable

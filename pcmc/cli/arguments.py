@@ -20,7 +20,7 @@ from ..base.units import LENGTHS
 from ..forces.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY
 from ..project import MOST_CHECKED, Outcome, Project
-from ..project.output import OnStep
+from ..project.outcome import OnStep
 from ..surface import Surface
 
 TOML, DXF = ".toml", ".dxf"

@@ -62,7 +62,7 @@ def sweep(
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-    from ..quantities import dimension_of
+    from ..certificate.quantities import dimension_of
     from ..sweep import draw_sweep, run, short_table, write_table
     from ..sweep.projects import column_labels
     from ..sweep.store import FAILED

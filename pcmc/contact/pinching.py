@@ -25,34 +25,21 @@ from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.supports import apply_supports
 from ..surface.topology import topology
-from .held_bottoms import across_bottom, held_walls
-from .wall_rows import WallRows, join_rows, wall_rows
+from .wall_rows import WallRows, held_walls, join_rows, wall_rows
 
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """The walls that can pinch: their lower edge slides on Π or is held there, their top edge is a junction.
+    """The walls that can pinch: the lower edge slides on Π or is held there, the top edge is a junction."""
 
-    Attributes
-    ----------
-    rows : where their other vertices lie below the top edges.
-    top_edges : (k,2) the top edges.
-    wall_below : (k,) the patch of the wall below each of them.
-    top_free : (n,) bool, free vertices of top edges: these can come to rest on Π.
-    foot : (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere.
-    corner : (n,) bool, fixed vertices of top edges on Π, where a wall ends.
-    side : (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to.
-    pinchable : (patches,) bool, the patches that are such walls.
-    """
-
-    rows: WallRows
-    top_edges: Ints
-    wall_below: Ints
-    top_free: Bools
-    corner: Bools
-    side: Floats
-    pinchable: Bools
-    foot: Ints
+    rows: WallRows  # where their other vertices lie below the top edges
+    top_edges: Ints  # (k,2)
+    wall_below: Ints  # (k,) the patch of the wall below each of them
+    top_free: Bools  # (n,) free vertices of top edges: these can come to rest on Π
+    corner: Bools  # (n,) fixed vertices of top edges on Π, where a wall ends
+    side: Floats  # (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to
+    pinchable: Bools  # (patches,) the patches that are such walls
+    foot: Ints  # (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere
 
     @property
     def held(self) -> Bools:
@@ -67,8 +54,20 @@ class Walls:
         return self.pinchable & ~held
 
     def across_bottom(self, vectors: Floats, X: Floats) -> Floats:
-        """The part (n,3) of vectors across the held bottom below each vertex."""
-        return across_bottom(vectors, X, self.top_edges, self.foot)
+        """The part (n,3) of vectors across the held bottom below each top vertex; X, vectors are (n,3)."""
+        chord, first = np.zeros_like(X), np.zeros_like(X)
+        edges = self.top_edges[(self.foot[self.top_edges] >= 0).all(axis=1)]
+        start, end = X[self.foot[edges.T]]
+        side = end - start
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        # the two edges at a vertex may run either way, so sum their directions with the sign of the first
+        first[edges[:, 1]], first[edges[:, 0]] = side, side
+        for v in edges.T:
+            sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
+            np.add.at(chord, v, sign[:, None] * side)
+        length = np.linalg.norm(chord, axis=1)[:, None]
+        tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
+        return np.asarray(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
 
 
 def find_walls(surface: Surface, held: bool = False) -> Walls:
@@ -76,46 +75,46 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
 
     With ``held``, or where a junction already rests on one, walls with held bottoms are among them.
     """
-    n = surface.n
-    height = surface.plane.height(surface.vertices)
-    topo, roof = surface.topology, ~surface.auxiliary[surface.patch_of_face]
+    n, topo, X = surface.n, surface.topology, surface.vertices
+    roof = ~surface.auxiliary[surface.patch_of_face]
     roof_edge, roof_vertex = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
     roof_edge[topo.edge_of_face[roof]] = True
     roof_vertex[surface.faces[roof]] = True
-    pinchable = np.zeros(len(surface.patches), dtype=bool)
-    rows, wall_below = [], [np.empty(0, dtype=np.int64)]
-    top_edges: list[Ints] = [np.empty((0, 2), dtype=np.int64)]
-    low, foot = lying(height, surface.vertices), np.full(n, -1, dtype=np.int64)
-    for index, patch in enumerate(surface.patches):
-        if not patch.auxiliary:
-            continue
+    height = surface.plane.height(X)
+    low, foot = lying(height, X), np.full(n, -1, dtype=np.int64)
+    sliding = list[tuple[int, Ints, Ints, Ints | None]]()
+    for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
         edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
-        vertices = np.unique(edges)
-        if not surface.on_ground[vertices].any() or not len(top):
-            continue
-        pinchable[index] = True
-        rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges))
-        top_edges.append(top)
+        if surface.on_ground[edges].any() and len(top):
+            sliding.append((index, edges, top, None))
+    rows, wall_below = [], [np.empty(0, dtype=np.int64)]
+    tops: list[Ints] = [np.empty((0, 2), dtype=np.int64)]
+    for index, edges, top, feet in (*sliding, *held_walls(surface, roof_edge, roof_vertex, low, held)):
+        before = np.concatenate(tops)
+        if feet is not None:
+            if np.isin(top, before[(foot[before] < 0).all(axis=1)]).any():
+                continue
+            foot = np.where(feet >= 0, feet, foot)
+        inner = np.unique(edges)
+        rows.append(wall_rows(surface, inner[~roof_vertex[inner]], top, edges, feet))
+        tops.append(top)
         wall_below.append(np.full(len(top), index))
-    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
-        vertices = np.unique(edges)
-        if np.isin(top, np.concatenate(top_edges)[(foot[np.concatenate(top_edges)] < 0).all(axis=1)]).any():
-            continue
-        pinchable[index] = True
-        foot = np.where(feet >= 0, feet, foot)
-        rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges, feet))
-        top_edges.append(top)
-        wall_below.append(np.full(len(top), index))
-    on_top = np.zeros(n, dtype=bool)
-    on_top[np.concatenate(top_edges)] = True
+    top_edges, below = np.concatenate(tops), np.concatenate(wall_below)
+    on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
+    on_top[top_edges], pinchable[below] = True, True
+    # on Π the side is that of the push of the sheets' pressure along its normal
+    near = low[surface.faces].any(axis=1)
+    F, patch = surface.faces[near], surface.patch_of_face[near]
+    force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
+    push = vertex_sums((force * (area_vectors(X[F]) @ np.array(surface.plane.normal)))[:, None], F, n)[:, 0]
     return Walls(
         rows=join_rows(rows),
-        top_edges=np.concatenate(top_edges),
-        wall_below=np.concatenate(wall_below),
+        top_edges=top_edges,
+        wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,
         corner=on_top & surface.pinned & low,
-        side=np.where(np.where(low, _pressure_push(surface, low), height) < 0.0, -1.0, 1.0),
+        side=np.where(np.where(low, push, height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
         foot=foot,
     )
@@ -220,19 +219,12 @@ def beside_resting(walls: Walls, resting: Bools) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class StandingPart:
-    """A surface without its pinched walls: the part that carries forces. See ``standing_part``.
+    """A surface without its pinched walls: the part that carries forces. See ``standing_part``."""
 
-    Attributes
-    ----------
-    surface : the standing part, with the vertex array of the whole surface.
-    walls, resting : the walls of the whole surface, and its junction vertices at rest on Π.
-    classes : what the vertices lie on; resting ones lie on the junction.
-    """
-
-    surface: Surface
-    walls: Walls
-    resting: Bools
-    classes: VertexClasses
+    surface: Surface  # the standing part, with the vertex array of the whole surface
+    walls: Walls  # of the whole surface
+    resting: Bools  # its junction vertices at rest on Π
+    classes: VertexClasses  # what the vertices lie on; resting ones lie on the junction
 
     @classmethod
     def of(cls, surface: Surface, walls: Walls, resting: Bools) -> StandingPart:
@@ -325,21 +317,17 @@ def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints)
     F = owner[surface.faces]
     apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     wall = surface.auxiliary[surface.patch_of_face]
-    apart[wall] &= ~_lie_on_plane(walls, resting)[F[wall]].all(axis=1)
-    apart[_folded(F, np.flatnonzero(apart & wall & resting[F].any(axis=1)))] = False
+    down, rows = resting | walls.corner, walls.rows
+    down[rows.vertices] = under_low(rows, down) | (rows.relative_height == 0.0)  # vertices on Π
+    apart[wall] &= ~down[F[wall]].all(axis=1)
+    # a foot that has come to its resting top takes faces beside it to the same three corners: together they
+    # are no part of the wall that stands there, and would pull its next vertex down without end
+    chosen = np.flatnonzero(apart & wall & resting[F].any(axis=1))
+    if len(chosen):
+        corners = np.sort(F[chosen], axis=1)
+        _, same, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+        apart[chosen[count[same.ravel()] > 1]] = False
     return F, apart
-
-
-def _folded(F: Ints, chosen: Ints) -> Ints:
-    """Those of the chosen faces that lie on one another, pair by pair.
-
-    A foot that has come to its resting top takes faces beside it to the same three corners. Together they
-    are no part of the wall that stands there, and would pull its next vertex down without end.
-    """
-    if not len(chosen):
-        return chosen
-    _, same, count = np.unique(np.sort(F[chosen], axis=1), axis=0, return_inverse=True, return_counts=True)
-    return np.asarray(chosen[count[same.ravel()] > 1])
 
 
 def _owners(n: int, walls: Walls, resting: Bools) -> Ints:
@@ -355,24 +343,44 @@ def _owners(n: int, walls: Walls, resting: Bools) -> Ints:
     return owner
 
 
-def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
-    """(n,) vertices on Π: resting ones, corners, feet, and wall vertices below such alone."""
-    down = resting | walls.corner
-    rows = walls.rows
-    down[rows.vertices] = under_low(rows, down) | (rows.relative_height == 0.0)
-    return down
-
-
 def under_low(rows: WallRows, low: Bools) -> Bools:
     """(w,) wall vertices whose place on the top edge is on Π: straight below a low end, or between two."""
     i, j = rows.top_ends.T
     return (low[i] | (rows.fraction == 1.0)) & (low[j] | (rows.fraction == 0.0))
 
 
-def _pressure_push(surface: Surface, at: Bools) -> Floats:
-    """(n,) force of the pressure of sheets along Π's normal on the vertices ``at``; elsewhere 0."""
-    near = at[surface.faces].any(axis=1)
-    F, patch = surface.faces[near], surface.patch_of_face[near]
-    force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
-    push = force * (area_vectors(surface.vertices[F]) @ np.array(surface.plane.normal))
-    return np.where(at, vertex_sums(push[:, None], F, surface.n)[:, 0], 0.0)
+def midpoints(surface: Surface, edges: Ints) -> Floats:
+    """(k,3) the middles of edges (k,2), for a finer mesh.
+
+    A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
+    below the middle of the top edge: rows that coincide where the junction rests part again beside it.
+    """
+    start, end = edges.T
+    X = surface.vertices
+    middle = 0.5 * (X[start] + X[end])
+    part = standing_part(surface)
+    walls, rows, resting = part.walls, part.walls.rows, part.resting
+    if not resting.any():
+        return middle
+    top, direction, drop = X.copy(), np.zeros_like(X), np.zeros_like(X)
+    top[rows.vertices] = rows.top_places(X)
+    direction[rows.vertices] = rows.directions(surface)
+    of_held = walls.foot >= 0
+    of_held[rows.vertices] = rows.feet[:, 0] >= 0
+    drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
+    drop[rows.vertices] = rows.drops(X)
+    down = resting.copy()
+    down[rows.vertices] = under_low(rows, resting | walls.corner)
+    of_wall = resting | walls.top_free
+    of_wall[rows.vertices] = True
+    rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
+    rising &= ~(surface.fixed[start] & surface.fixed[end])
+    start, end = edges[rising].T
+    place = 0.5 * (top[start] + top[end])
+    height = surface.plane.height(place)[:, None]
+    on_sliding = place + 0.5 * height * (direction[start] + direction[end])
+    share = np.zeros(surface.n)
+    share[rows.vertices] = 1.0 - rows.relative_height
+    below = 0.25 * (share[start] + share[end])[:, None] * (drop[start] + drop[end])
+    middle[rising] = np.where(of_held[start, None], place - below, on_sliding)
+    return middle

@@ -1,4 +1,7 @@
-"""The rows of a wall: where its vertices lie below its top edge, so that they follow when it moves."""
+"""The rows of a wall: where its vertices lie below its top edge, so that they follow when it moves.
+
+And walls whose bottom is held on Π: which can pinch, and the vertices that their junctions come down on.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
+from ..surface.checks import lying
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 FLAT = 1e-9  # of the size: with its top edge at most this high, a wall's heights show no rows
@@ -28,28 +32,23 @@ class WallRows:
     or, where the bottom of the wall is held, with Q the place between the held vertices below i and j,
 
         P + (ρ - 1) (P - Q) + |P - Q| o
-
-    Attributes
-    ----------
-    vertices : (w,) their indices.
-    top_ends : (w,2) the ends i, j of the top edge above each.
-    fraction : (w,) λ, how far P is from i to j.
-    relative_height : (w,) ρ, 0 at the bottom and 1 at the top.
-    offset : (w,3) o, how far a leaning or bulging wall is off the line below P, over the height there.
-    feet : (w,2) the held bottom vertices below i and j; -1 where the bottom slides.
     """
 
-    vertices: Ints
-    top_ends: Ints
-    fraction: Floats
-    relative_height: Floats
-    offset: Floats
-    feet: Ints
+    vertices: Ints  # (w,) their indices
+    top_ends: Ints  # (w,2) the ends i, j of the top edge above each
+    fraction: Floats  # (w,) λ, how far P is from i to j
+    relative_height: Floats  # (w,) ρ, 0 at the bottom and 1 at the top
+    offset: (
+        Floats  # (w,3) o, how far a leaning or bulging wall is off the line below P, over the height there
+    )
+    feet: Ints  # (w,2) the held bottom vertices below i and j; -1 where the bottom slides
 
     def top_places(self, X: Floats) -> Floats:
         """(w,3) the places P on the top edges, with the surface's vertices at X (n,3)."""
-        fraction = self.fraction[:, None]
-        return (1.0 - fraction) * X[self.top_ends[:, 0]] + fraction * X[self.top_ends[:, 1]]
+        return self._between(X[self.top_ends[:, 0]], X[self.top_ends[:, 1]])
+
+    def _between(self, start: Floats, end: Floats) -> Floats:
+        return np.asarray((1.0 - self.fraction[:, None]) * start + self.fraction[:, None] * end)
 
     def places(self, surface: Surface, X: Floats) -> Floats:
         """(w,3) where the rows lie, with the top edges at X (n,3)."""
@@ -65,9 +64,7 @@ class WallRows:
 
     def drops(self, X: Floats) -> Floats:
         """(w,3) P - Q, from the held bottom up to the top edge; without meaning where the bottom slides."""
-        fraction = self.fraction[:, None]
-        bottom = (1.0 - fraction) * X[self.feet[:, 0]] + fraction * X[self.feet[:, 1]]
-        return self.top_places(X) - bottom
+        return self.top_places(X) - self._between(X[self.feet[:, 0]], X[self.feet[:, 1]])
 
     def directions(self, surface: Surface) -> Floats:
         """(w,3) from the place on the top edge to the vertex, over the height there: (ρ - 1) n + o."""
@@ -149,11 +146,65 @@ def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom
     foot = vertices[bottom[vertices]]
     # a corner is foot and top at once: no path may lead through it
     links = wall_edges[(inner | np.isin(np.arange(surface.n), top))[wall_edges].all(axis=1)]
-    graph = coo_array((np.ones(len(links)), links.T), shape=(surface.n, surface.n)).tocsr()
-    steps = [
-        dijkstra(graph, directed=False, indices=goal, unweighted=True, min_only=True)[vertices]
-        for goal in (foot, top)
-    ]
+    steps = [_steps(links, goals, surface.n, nearest=True)[vertices] for goals in (foot, top)]
     reached = np.isfinite(steps[0]) & np.isfinite(steps[1])
     total = np.where(reached, steps[0] + steps[1], 1.0)
     return np.where(reached, steps[0] / total, 0.5)
+
+
+def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
+    """(g,n) the least number of edges (k,2) from each goal to each vertex, or (n,) from the nearest goal."""
+    graph = coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
+    return np.asarray(dijkstra(graph, directed=False, indices=goals, unweighted=True, min_only=nearest))
+
+
+def held_walls(
+    surface: Surface, roof_edge: Bools, roof_vertex: Bools, low: Bools, all_of_them: bool
+) -> list[tuple[int, Ints, Ints, Ints]]:
+    """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
+
+    All that have one top edge to either side of each junction vertex; none unless a junction rests on one.
+    """
+    topo, X, rests = surface.topology, surface.vertices, all_of_them
+    walls = list[tuple[int, Ints, Ints, Ints]]()
+    bottom = topo.boundary_edge & (surface.fixed & low)[topo.edges].all(axis=1)
+    for index in np.flatnonzero(surface.auxiliary).tolist():
+        of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
+        vertices = np.unique(topo.edges[of_wall])
+        if not bottom[of_wall].any() or surface.on_plane[vertices].any():
+            continue
+        top = topo.edges[of_wall[roof_edge[of_wall]]]
+        below = vertices[surface.fixed[vertices] & ~roof_vertex[vertices]]
+        if not len(top) or not low[below].all():
+            continue
+        foot = _held_feet(surface.n, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
+        free = np.unique(top)[~surface.fixed[np.unique(top)]]
+        if foot is None or (np.bincount(top.ravel(), minlength=surface.n)[free] != 2).any():
+            continue
+        gap = np.linalg.norm(X[free] - X[foot[free]], axis=1)
+        rests = rests or bool(lying(gap, X).any())
+        walls.append((index, topo.edges[of_wall], top, foot))
+    shared = [np.unique(top) for _, _, top, _ in walls]
+    count = np.bincount(np.concatenate(shared), minlength=surface.n) if shared else np.empty(0)
+    alone = [bool((count[tops[~surface.fixed[tops]]] == 1).all()) for tops in shared]
+    return [wall for wall, single in zip(walls, alone, strict=True) if single] if rests else []
+
+
+def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
+    """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
+
+    Both edges (k,2) start from the corners where the wall ends, which are their own feet. The vertices so
+    many steps from each corner along the top and along the bottom make a pair.
+    """
+    tops, bottoms = np.unique(top_edges), np.unique(bottom_edges)
+    corners, count = np.intersect1d(tops, bottoms), len(tops)
+    if not len(corners) or count != len(bottoms):
+        return None
+    steps = [_steps(top_edges, corners, n)[:, tops].T, _steps(bottom_edges, corners, n)[:, bottoms].T]
+    label = np.unique(np.concatenate(steps), axis=0, return_inverse=True)[1].reshape(2, -1)
+    above, below = label.argsort(axis=1)
+    if any((np.sort(labels) != np.arange(count)).any() for labels in label):
+        return None
+    foot = np.full(n, -1, dtype=np.int64)
+    foot[tops[above]] = bottoms[below]
+    return foot

@@ -9,8 +9,8 @@ from typing import Any
 
 from ..base import validate
 from ..base.errors import OptionError
+from ..certificate.quantities import dimension_of
 from ..forces.rooms import refuse_varied_pressure
-from ..quantities import dimension_of
 from ..surface import Surface
 from ..surface.values import part_index, part_values
 from .quantities import MEASURES, Measurement

@@ -21,7 +21,6 @@ from ..certificate import Certificate
 from ..certificate.required import certified, warning_mark
 from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
-from ..surface.sections import Polyline, section
 from . import dxf, pdf, views
 from .panel_sheets import flat_panels
 from .panel_sheets import panel_sheets as panels_at_true_size
@@ -41,7 +40,7 @@ class DrawingSet:
     units: str  # of its lengths
     certificate: Certificate  # of the surface
     curves: Sequence[Line]  # ridges, rims, wall lines and cables
-    sections: Sequence[Polyline]  # the lines in which each plane cuts the roof
+    sections: Sequence[Line]  # in which each plane cuts the roof
     points: pd.DataFrame  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable)
     marks: Sequence[tuple[str, Floats]]  # name and place (3,) of each mast or other support of one point
     schedule: Panels | None  # the panels, if a tolerance was given
@@ -219,12 +218,12 @@ def _setting_out(curves: Sequence[Line]) -> pd.DataFrame:
     return pd.DataFrame({"point": names, "x": at[:, 0], "y": at[:, 1], "z": at[:, 2], "on": where})
 
 
-def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[Polyline]]]:
+def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[Line]]]:
     """Each height with the lines of its section."""
     low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
     given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
     chosen = [validate.number("heights", height) for height in given]
-    cuts = [(h, section(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
+    cuts = [(h, views.cut(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
     for h, found in cuts:
         if not found and heights is not None:
             text = f"heights: z = {h:g} misses the roof, which lies between {low:g} and {high:g}"
@@ -232,7 +231,7 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
     return [cut for cut in cuts if cut[1]]
 
 
-def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[Polyline]]]:
+def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[Line]]]:
     """Each vertical section as a view, with its lines."""
     if lines is None:
         low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
@@ -246,9 +245,9 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
         if not (np.isfinite(ends).all() and length > 0.0):
             validate.refuse("lines", line, "two different points (x, y)")
         along /= length
-        found = section(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
+        found = views.cut(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
         if not found:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
-        profiles.append((views.profile(surface, title, ends[0], along, found), found))
+        profiles.append((views.profile(title, ends[0], along, found), found))
     return profiles

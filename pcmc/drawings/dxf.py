@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra
 from ..base.units import TABLE, length_factor
+from ..io.libraries import load_library
 from .sheet import LAYERS, SMALL, Sheet
-from .views import section_layer
 
 VERSION = "R2018"
 MODEL_TEXT = 0.004  # height of letters in the model, in its size
@@ -27,11 +26,7 @@ def document(drawings: Any) -> Any:
     name of its patches or its cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports
     of one point, each on the layer of its kind; beside the roof the panels flat at true size.
     """
-    try:
-        import ezdxf
-    except ImportError:
-        raise MissingExtra("ezdxf", "cad") from None
-    doc: Any = ezdxf.new(VERSION)
+    doc = load_library("ezdxf", "cad").new(VERSION)
     units = drawings.units
     doc.units = TABLE[units].dxf
     doc.header["$MEASUREMENT"] = int(units not in ("ft", "in"))
@@ -72,12 +67,10 @@ def _add_model(space: Any, model: Any) -> None:
     roof = surface.roof[surface.patch_of_face]
     for corners in surface.vertices[surface.faces[roof]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
-    lines: list[tuple[str, Any, str]] = [(curve.layer, curve, curve.name) for curve in model.curves]
-    names = [patch.name for patch in surface.patches]
-    lines += [(section_layer(surface, line), line, names[line.patch]) for line in model.sections]
-    for layer, line, name in lines:
-        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs={"layer": layer})
-        entity.set_xdata("PCMC", [(1000, name[:250])])
+    for line in (*model.curves, *model.sections):
+        look = {"layer": line.layer}
+        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs=look)
+        entity.set_xdata("PCMC", [(1000, line.name[:250])])
     height = MODEL_TEXT * surface.size
     rows = model.points[["point", "x", "y", "z"]].to_numpy().tolist()
     labels = [(name, at, "PCMC-POINT") for name, *at in rows]

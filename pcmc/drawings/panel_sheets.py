@@ -54,11 +54,10 @@ def _labels(schedule: Panels) -> list[list[str]]:
         for edge in edges:
             at_edge[edge].append(number)
 
-    def label(edge: int, number: int) -> str:
-        others = "+".join(str(other) for other in at_edge[edge] if other != number)
-        return f"{others or 'rim'} / e{edge}"
-
-    return [[label(edge, number) for edge in edges] for number, edges in enumerate(sides, start=1)]
+    return [
+        [f"{'+'.join(str(k) for k in at_edge[e] if k != number) or 'rim'} / e{e}" for e in edges]
+        for number, edges in enumerate(sides, start=1)
+    ]
 
 
 def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: list[str]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import MissingExtra
+from ..io.libraries import require
 from .sheet import LAYERS, Line, Sheet, Text
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
@@ -21,14 +21,11 @@ def register_fonts() -> None:
     ------
     MissingExtra : reportlab or matplotlib is not installed.
     """
-    try:
-        from reportlab.pdfbase import pdfmetrics, ttfonts
-    except ImportError:
-        raise MissingExtra("reportlab", "report") from None
-    try:
-        from matplotlib import get_data_path
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    require("reportlab", extra="report")
+    require("matplotlib", extra="plot")
+    from matplotlib import get_data_path
+    from reportlab.pdfbase import pdfmetrics, ttfonts
+
     for name in (FONT, BOLD):
         if name not in pdfmetrics.getRegisteredFontNames():
             file = Path(get_data_path(), "fonts", "ttf", f"{name}.ttf")

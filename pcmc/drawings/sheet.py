@@ -204,15 +204,6 @@ def add_frames(sheets: list[Sheet], name: str, units: str, mark: str) -> None:
             sheet.texts.append(Text((0.5 * width, top - 4.0), mark, fits, "PCMC-MARK", "C"))
 
 
-def fits(size: Floats, name: str) -> bool:
-    """Whether a drawing of this size (2,) in mm fits a format.
-
-    >>> fits(np.array([500.0, 300.0]), "A2"), fits(np.array([500.0, 300.0]), "A3")
-    (True, False)
-    """
-    return bool((np.asarray(size) <= np.array(drawing_area(name)) + 1e-9).all())
-
-
 def table_sheets(
     title: str, table: pd.DataFrame, name: str, decimals: int, units: Mapping[str, str] | None = None
 ) -> list[Sheet]:

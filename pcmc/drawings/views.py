@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..surface import Surface
 from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import area_vectors
-from ..surface.sections import Polyline
+from ..surface.sections import section
 from .sheet import (
     FORMATS,
     SCALES,
@@ -26,7 +26,6 @@ from .sheet import (
     Text,
     corner,
     drawing_area,
-    fits,
     place_labels,
     width,
 )
@@ -49,9 +48,7 @@ class View:
 
     title: str
     lines: list[Line] = field(default_factory=list)
-    texts: list[tuple[Floats, str, Floats]] = field(
-        default_factory=list
-    )  # beside a point, in a direction (2,)
+    texts: list[tuple[Floats, str, Floats]] = field(default_factory=list)  # at points, in a direction (2,)
     points: list[tuple[Floats, str, str]] = field(default_factory=list)  # marked, with their names and layers
     stations: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # along each axis, to be dimensioned
     levels: Floats = field(default_factory=lambda: np.empty(0))  # heights that are marked beside it
@@ -95,13 +92,30 @@ def outline(curves: Sequence[Line], axis: Sequence[float]) -> Floats:
     return np.concatenate(places) if places else np.empty(0)
 
 
+def cut(surface: Surface, point: Floats, normal: Floats) -> list[Line]:
+    """The lines in which a plane cuts the roof and its walls."""
+    return [
+        Line(
+            one.points,
+            "PCMC-SECTION" if surface.roof[one.patch] else "PCMC-SECTION-WALL",
+            one.closed,
+            surface.patches[one.patch].name,
+        )
+        for one in section(surface, point, normal)
+    ]
+
+
+def _seen(title: str, surface: Surface, curves: Sequence[Line], axes: Floats, faces: Bools) -> View:
+    """The edges of faces and the curves on two axes (2,3)."""
+    edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[faces])]
+    lines = [Line(pair, "PCMC-PANEL") for pair in surface.vertices[edges] @ axes.T]
+    return View(title, lines + [curve._replace(points=curve.points @ axes.T) for curve in curves])
+
+
 def plan(surface: Surface, curves: Sequence[Line], points: Sequence[tuple[Floats, str, str]]) -> View:
     """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
-    view = View("plan", points=[(at[:2], name, layer) for at, name, layer in points])
-    roof = surface.roof[surface.patch_of_face]
-    edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[roof])]
-    view.lines += [Line(pair, "PCMC-PANEL") for pair in surface.vertices[edges][:, :, :2]]
-    view.lines += [Line(c.points[:, :2], c.layer, c.closed) for c in curves]
+    view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
+    view.points = [(at[:2], name, layer) for at, name, layer in points]
     middle = 0.5 * np.sum(view.box, axis=0)
     for curve in curves:
         if curve.layer == "PCMC-CABLE":
@@ -114,36 +128,31 @@ def plan(surface: Surface, curves: Sequence[Line], points: Sequence[tuple[Floats
 
 def elevations(surface: Surface, curves: Sequence[Line]) -> list[View]:
     """From four sides: curves, the edges of the panels that face the viewer, and levels."""
-    topo, X = surface.topology, surface.vertices
-    roof = surface.roof[surface.patch_of_face]
-    normal = area_vectors(X[surface.faces])
+    height, normal = surface.vertices[:, 2], area_vectors(surface.vertices[surface.faces])
     views = []
     for title, (right, towards) in ELEVATIONS.items():
         axes = np.array([[*right, 0.0], [0.0, 0.0, 1.0]])
-        facing = roof & (normal[:, :2] @ np.array(towards) > 0.0)
-        edges = topo.edges[np.unique(topo.edge_of_face[facing])]
+        facing = surface.roof[surface.patch_of_face] & (normal[:, :2] @ np.array(towards) > 0.0)
         along, heights = (np.sort(outline(curves, axis)) for axis in axes)
-        view = View(title, stations=(along[[0, -1]] if len(along) else along, np.empty(0)))
-        view.levels = np.append(heights, [X[:, 2].min(), X[:, 2].max()])
-        view.lines += [Line(pair, "PCMC-PANEL") for pair in X[edges] @ axes.T]
-        view.lines += [Line(c.points @ axes.T, c.layer, c.closed) for c in curves]
-        views.append(view)
+        views.append(_seen(title, surface, curves, axes, facing))
+        views[-1].stations = along[[0, -1]] if len(along) else along, np.empty(0)
+        views[-1].levels = np.append(heights, [height.min(), height.max()])
     return views
 
 
-def contours(surface: Surface, curves: Sequence[Line], cuts: Sequence[tuple[float, list[Polyline]]]) -> View:
+def contours(surface: Surface, curves: Sequence[Line], cuts: Sequence[tuple[float, list[Line]]]) -> View:
     """Sections at heights, seen from above, each with its height."""
     view = plan(surface, curves, ())
     view.title = "sections at heights"
     view.lines = [line for line in view.lines if line.layer != "PCMC-PANEL"]
     for height, lines in cuts:
-        view.lines += [Line(one.points[:, :2], section_layer(surface, one), one.closed) for one in lines]
+        view.lines += [one._replace(points=one.points[:, :2]) for one in lines]
         top = max((one.points for one in lines), key=lambda points: float(points[:, 1].max()))
         view.texts.append((top[top[:, 1].argmax(), :2], f"z = {height:.6g}", np.array([0.0, 1.0])))
     return view
 
 
-def profile(surface: Surface, name: str, start: Floats, along: Floats, lines: list[Polyline]) -> View:
+def profile(name: str, start: Floats, along: Floats, lines: Sequence[Line]) -> View:
     """A section along a line in the plan: distance from the line's first point, and height.
 
     Its stations and levels are the ends of its lines, where the roof ends or meets a wall, and its top.
@@ -151,16 +160,11 @@ def profile(surface: Surface, name: str, start: Floats, along: Floats, lines: li
     view, ends = View(name), [np.empty((0, 2))]
     for one in lines:
         flat = np.stack([(one.points[:, :2] - start) @ along, one.points[:, 2]], axis=1)
-        view.lines.append(Line(flat, section_layer(surface, one), one.closed))
+        view.lines.append(one._replace(points=flat))
         ends.append(flat[[flat[:, 0].argmin(), flat[:, 0].argmax()] if one.closed else [0, -1]])
     stations, levels = np.concatenate(ends).T
     view.stations, view.levels = (stations, np.empty(0)), np.append(levels, [end[1] for end in view.box])
     return view
-
-
-def section_layer(surface: Surface, line: Polyline) -> str:
-    """The layer of a section's line: of the roof, or of a wall."""
-    return "PCMC-SECTION" if surface.roof[line.patch] else "PCMC-SECTION-WALL"
 
 
 def placed(
@@ -194,18 +198,15 @@ def placed(
 
 def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -> tuple[int, int]:
     """The scale, 1 to this, and the columns with which views of ``size`` (2,) mm fit a format."""
-    grids = [(columns, math.ceil(count / columns)) for columns in range(1, count + 1)]
+    grids = np.array([(columns, math.ceil(count / columns)) for columns in range(1, count + 1)])
     for one in SCALES if scale is None else (scale,):
-        for grid in grids:
-            if fits(np.array(grid) * (size / one + BEFORE + BEHIND), name):
-                return one, grid[0]
-    one = scale or SCALES[-1]
-    needed = [np.array(grid) * (size / one + BEFORE + BEHIND) for grid in grids]
-    better = next((f for f in FORMATS if any(fits(each, f) for each in needed)), None)
-    least = min(needed, key=lambda each: float(each.max()))
-    text = (
-        f"scale: {title.lower()} at 1:{one} needs {least[0]:.0f} × {least[1]:.0f} mm, more than {name} has;"
-    )
+        needed = grids * (size / one + BEFORE + BEHIND)
+        fitting = {f: (needed <= np.array(drawing_area(f)) + 1e-9).all(axis=1) for f in FORMATS}
+        if fitting[name].any():
+            return one, int(grids[fitting[name].argmax(), 0])
+    better = next((f for f in FORMATS if fitting[f].any()), None)
+    wide, high = needed[needed.max(axis=1).argmin()]
+    text = f"scale: {title.lower()} at 1:{one} needs {wide:.0f} × {high:.0f} mm, more than {name} has;"
     text += f" use sheet {better!r}" if better else " use a smaller scale"
     raise OptionError(text, what="scale", found=scale, expected=better)
 

@@ -36,10 +36,8 @@ def serve(
     Parameters
     ----------
     surface : the surface to start from; it is not changed.
-    host : the address to listen on. The default is this machine alone; ``"0.0.0.0"`` lets everyone
-        on the network in.
+    host : the address to listen on; ``"0.0.0.0"`` lets everyone on the network in.
     port : 0 for any that is free.
-    open_browser : open the page at once.
     title : at the top of the page, such as the name of a file.
     units : of the surface's numbers, such as ``Units("m", "kN")``; a text is the unit of length.
 
@@ -94,18 +92,8 @@ def show(surface: Surface, height: int = 680, title: str = "", units: Units | st
     """The page as the output of a cell in JupyterLab.
 
     The View returned has ``.surface``, the surface with the tensions and pressures now chosen, for the
-    next cell. The browser must run on the machine of the notebook's kernel.
-
-    Parameters
-    ----------
-    surface : the surface to start from; it is not changed.
-    height : of the page in pixels.
-    title : at the top of the page.
-    units : of the surface's numbers, as for ``serve``.
-
-    Raises
-    ------
-    OptionError : for unknown units.
+    next cell. The browser must run on the machine of the notebook's kernel. ``height`` is in pixels; the rest
+    as for ``serve``.
     """
     from .roof import Roof
     from .server import View

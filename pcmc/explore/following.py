@@ -1,18 +1,24 @@
-"""Following values: from a surface at rest to the one with other tensions, in as many steps as needed."""
+"""Following values: from a surface at rest to the one with other values, in as many steps as needed.
+
+Where following leads nowhere, the walls or the start shape of the surface's project may.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import project as projects
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.errors import MissingExtra, PcmcError
 from ..certificate import Certificate, Verdict
-from ..project.values import single_points, values_of
+from ..project.values import single_points, values_of, with_values
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Surface
@@ -20,15 +26,18 @@ from ..surface.values import KINDS, all_values
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
+FIRST_ATTEMPTS = 4  # of following, before the project's own walls are tried
+START_SECONDS = 6.0  # time limit of solving from the start shape
 Values = Mapping[str, Mapping[str, Any]]  # numbers by kind and name; and points, each [x, y, z]
+Stop = Callable[[], bool]
 
 
-def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:
+def until(stop: Stop, end: float) -> Stop:
     """True when ``stop`` is, or when the monotonic clock has passed ``end``."""
     return lambda: stop() or time.monotonic() > end
 
 
-def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Result:
+def attempt(surface: Surface, stop: Stop, **options: Any) -> Result:
     """Solve, and end early when ``stop`` becomes true."""
 
     def check(_: Progress) -> None:
@@ -40,19 +49,14 @@ def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Resul
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """The last surface at rest on the way to other values, and the failed attempt after it, if any.
-
-    ``certificate`` is the surface's, without modes; None if there was no step at all.
-    """
+    """The last surface at rest on the way to other values, and the failed attempt after it, if any."""
 
     surface: Surface
-    certificate: Certificate | None
+    certificate: Certificate | None  # of the surface, without modes; None if there was no step at all
     failed: Certificate | None
 
 
-def reach(
-    start: Surface, asked: Surface, stop: Callable[[], bool], attempts: int = 100, **options: Any
-) -> Reached:
+def reach(start: Surface, asked: Surface, stop: Stop, attempts: int = 100, **options: Any) -> Reached:
     """Follow the equilibrium from ``start`` to the values of ``asked``; a step that fails is halved."""
     here, certificate, done, step = start, None, 0.0, 1.0
     failed = None
@@ -107,3 +111,94 @@ def wanted(surface: Surface, values: Values) -> Surface:
     for name, place in points.items():
         X[known[validate.choice("point", name, tuple(known))]] = place
     return changed if np.array_equal(X, surface.vertices) else changed.moved(X)
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectFallback:
+    """What a project does where following does not reach the values asked for."""
+
+    path: Path = Path()
+    data: Mapping[str, Any] = field(default_factory=dict)  # of the project; without it only following
+    given: frozenset[tuple[str, float]] = frozenset()  # (wall, tension) of the project: others were moved
+
+    def with_walls(self, surface: Surface) -> ProjectFallback:
+        """The same, with the walls of another surface of the project."""
+        return replace(self, given=self.given | _walls(surface))
+
+    def settle(
+        self,
+        here: Surface,
+        asked: Surface,
+        stop: Stop,
+        end: float,
+        progress: Callable[[str], None],
+        **options: Any,
+    ) -> tuple[Reached, str, ProjectFallback]:
+        """Follow to ``asked``; else with the project's walls, in small steps, and from its start shape.
+
+        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, empty where
+        following led to the values, else what did, or why the project does not; and the fallback for the next
+        time.
+        """
+        late = until(stop, end)
+        way = reach(here, asked, late, attempts=FIRST_ATTEMPTS if self.data else 100, **options)
+        if way.failed is None or stop() or not self.data:
+            return way, "", self
+        moved = {name for name, tension in _walls(asked) if (name, tension) not in self.given}
+        start, note = None, ""
+        try:
+            project, start = self.start(asked, moved)
+        except (PcmcError, MissingExtra) as error:
+            note = f"the project's own way to these values: {error}"
+        if start is not None and (new := _walls(start) - _walls(asked)):
+            balanced = reach(here, asked.retensioned(dict(new)), late, attempts=FIRST_ATTEMPTS, **options)
+            if balanced.certificate is not None and balanced.failed is None:
+                tensions = ", ".join(f"{name} {tension:g}" for name, tension in sorted(new))
+                note = f"walls balanced beside the new tensions: {tensions}"
+                return balanced, note, replace(self, given=self.given | new)
+        rest = reach(way.surface, asked, late, **options)
+        rest = replace(rest, certificate=rest.certificate or way.certificate)
+        if rest.failed is None or start is None or stop():
+            return rest, "" if rest.failed is None else note, self
+        progress("from the start shape")
+        try:
+            result = solved_start_shape(project, start, stop)
+        except (PcmcError, MissingExtra) as error:
+            return rest, f"from the start shape of the project: {error}", self
+        finally:
+            progress("")
+        if result is None:
+            return rest, "", self
+        note = "solved from the start shape of the project; the last surface led to none"
+        given = {wall for wall in _walls(start) if wall[0] not in moved}
+        found = Reached(result.surface, result.certificate, None)
+        return found, note, replace(self, given=self.given | given)
+
+    def start(self, asked: Surface, moved: Collection[str] = ()) -> tuple[projects.Project, Surface]:
+        """The project with the values of a surface, and its start shape.
+
+        Walls have the tensions that the project gives them beside the new tensions of its patches; those in
+        ``moved`` have the surface's. Errors as ``with_values``.
+        """
+        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}
+        return with_values(self.path, self.data, asked, left)[1:]
+
+
+def _walls(surface: Surface) -> frozenset[tuple[str, float]]:
+    return frozenset((patch.name, patch.tension) for patch in surface.patches if patch.wall)
+
+
+def solved_start_shape(project: projects.Project, start: Surface, stop: Stop) -> Result | None:
+    """A start shape solved and remeshed as its project asks for, without targets; None where that fails."""
+    stop = until(stop, time.monotonic() + START_SECONDS)
+
+    def check(_: str) -> None:
+        if stop():
+            raise TimeoutError
+
+    try:
+        plain = replace(project, targets=(), wanted=projects.AccuracyWanted(), search=False)
+        result = projects.solve_project(plain, start, check).solved
+    except TimeoutError:
+        return None
+    return result if result.certificate.verdict in AT_REST else None

@@ -1,19 +1,40 @@
-"""Connections: how many wait, and how long one may take to send a request or take an answer."""
+"""HTTP: connections, who may ask, and what goes back. What is asked is the explorer's; see server.py.
+
+It is the standard library's, so that exploring needs the core install alone.
+"""
 
 from __future__ import annotations
 
+import json
 import math
+import re
+import secrets
+import select
 import socket
 import time
 from contextlib import suppress
+from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, quote, urlsplit
 
-from ..base.errors import OptionError
+from ..base.errors import MissingExtra, OptionError, PcmcError
+from .protocol import RequestError
 
 REQUEST_SECONDS = 30.0  # to send a request, from its first byte or the last answer; and to take an answer
 WAITING = 128  # connections that the system keeps until they are accepted
+LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+BYTES = "application/octet-stream"
+HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
+}
 
 
 class Listener(ThreadingHTTPServer):
@@ -64,3 +85,132 @@ def listen(host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> Liste
         text = f"cannot listen on {host!r}, port {port}: {reason}; with port 0 pcmc takes a free one"
         what = "port" if host in LOOPBACK else "host"
         raise OptionError(text, what=what, found=(host, port)) from None
+
+
+class Handler(BaseHTTPRequestHandler):
+    """A connection of a browser."""
+
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True  # else the body waits up to 40 ms for the header
+    wbufsize = -1  # header and body leave together
+    server: Listener
+
+    def do_GET(self) -> None:
+        self._answer(self._get)
+
+    def do_POST(self) -> None:
+        self._answer(self._post)
+
+    def handle_one_request(self) -> None:
+        self.server.limit(self.connection)
+        super().handle_one_request()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: the terminal is the user's."""
+
+    def _answer(self, act: Any) -> None:
+        try:
+            content = self._read_content()
+            self._check_sender()
+            act(content)
+        except (RequestError, PcmcError, MissingExtra) as error:
+            self._refuse(str(error), getattr(error, "status", HTTPStatus.BAD_REQUEST))
+        except OSError:
+            raise  # the browser has left
+        except Exception as error:  # the net: no request may end without an answer
+            self._refuse(f"{type(error).__name__}: {error}", HTTPStatus.INTERNAL_SERVER_ERROR)
+
+    def _read_content(self) -> bytes:
+        """What follows the headers: all of it, or what is left would be read as another request."""
+        length = self.headers.get("Content-Length", "0" if self.command == "GET" else "")
+        sized = re.fullmatch("[0-9]{1,8}", length) and "Transfer-Encoding" not in self.headers
+        if not sized or int(length) > LONGEST_REQUEST:
+            raise RequestError(f"a request needs a length of at most {LONGEST_REQUEST} bytes")
+        content = self.rfile.read(int(length))
+        self.server.limit(self.connection, math.inf)
+        if len(content) < int(length):
+            raise RequestError(f"cut off: {len(content)} of {length} bytes arrived")
+        return content
+
+    def _check_sender(self) -> None:
+        """Refuse requests from pages of other sites, under other names of this machine, and without token."""
+        host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+        explorer = self.server.explorer
+        try:
+            source = None if origin is None else urlsplit(origin).netloc
+            parts = urlsplit(self.path)
+        except ValueError as error:
+            raise RequestError(f"a broken address: {error}") from None
+        if explorer.local and host.rsplit(":", 1)[0].strip("[]") not in LOOPBACK:
+            raise RequestError("open the address that pcmc explore printed", HTTPStatus.FORBIDDEN)
+        if source is not None and source != host:
+            raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
+        given = self.headers.get("X-Token") or parse_qs(parts.query).get("token", [""])[0]
+        known = secrets.compare_digest(given.encode(), explorer.token.encode())
+        if not (known or parts.path.startswith("/page/")):
+            text = "open the address that pcmc explore printed: its token is missing here, or of another run"
+            raise RequestError(text, HTTPStatus.FORBIDDEN)
+
+    def _get(self, content: bytes) -> None:
+        parts = urlsplit(self.path)
+        match parts.path.strip("/").split("/"):
+            case [""]:
+                self._send_file("index.html")
+            case ["page", name]:
+                self._send_file(name)
+            case ["api", session, "export"]:
+                suffix = parse_qs(parts.query).get("suffix", [""])[0]
+                name, body = self.server.explorer.export(session, suffix)
+                self._send(body, BYTES, f"attachment; filename*=UTF-8''{quote(name, safe='')}")
+            case _:
+                raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
+
+    def _post(self, content: bytes) -> None:
+        try:
+            asked = json.loads(content or b"{}")
+        except RecursionError:
+            raise RequestError("not JSON: nested too deep") from None
+        except ValueError as error:
+            raise RequestError(f"not JSON: {error}") from None
+        if not isinstance(asked, dict):
+            raise RequestError("expected a JSON object")
+        match urlsplit(self.path).path.strip("/").split("/"):
+            case ["api", "open"]:
+                body = self.server.explorer.answer("", "open", asked, self._gone)
+            case ["api", session, act] if act in self.server.explorer.acts:
+                body = self.server.explorer.answer(session, act, asked, self._gone)
+            case _:
+                raise RequestError(f"there is nothing at {self.path:.60}", HTTPStatus.NOT_FOUND)
+        self._send(body, BYTES)
+
+    def _gone(self) -> bool:
+        """Whether the page has closed the connection, and waits for no answer."""
+        ready = select.select([self.connection], [], [], 0.0)[0]
+        return bool(ready) and not self.connection.recv(1, socket.MSG_PEEK)
+
+    def _refuse(self, line: str, status: HTTPStatus) -> None:
+        """Answer with one line, and close: what is left of the request must not be read as another one."""
+        self.close_connection = True
+        self._send(json.dumps({"error": " ".join(line.split())}).encode(), "application/json", status=status)
+
+    def _send_file(self, name: str) -> None:
+        kind = TYPES.get(Path(name).suffix)
+        file = files(__package__).joinpath("page", name)
+        if kind is None or not re.fullmatch(r"[\w.-]{1,80}", name) or not file.is_file():
+            raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
+        self._send(file.read_bytes(), f"{kind}; charset=utf-8")
+
+    def _send(
+        self, body: bytes, kind: str, disposition: str = "", status: HTTPStatus = HTTPStatus.OK
+    ) -> None:
+        headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
+        if disposition:
+            headers["Content-Disposition"] = disposition
+        if self.close_connection:
+            headers["Connection"] = "close"
+        self.server.limit(self.connection)
+        self.send_response(status)
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)

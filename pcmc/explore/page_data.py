@@ -1,7 +1,8 @@
-"""The data that the page draws: sheets, lines and supports once, fields at every change."""
+"""The data that the page draws: sheets, lines and supports once, fields and findings at every change."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 from zlib import crc32
 
@@ -9,26 +10,24 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
-from ..certificate.certificate import Certificate
+from ..certificate import Certificate
+from ..certificate.quantities import dimension_of
 from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
 from ..forces.curvature import curvature_error, mean_curvature
-from ..margins import Margin
 from ..margins.varied import named
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import values_of
-from ..quantities import dimension_of
 from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
-from .session import State
-from .variants import Variant
+from .session import State, figures_data
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -40,21 +39,13 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
     ``sheet_faces`` (m,3) index these corners; ``sheet_vertex`` and ``sheet_patch`` are their vertex
     and patch. A surface that ends at mirror planes is drawn whole.
     """
-    values, whole = values_of(surface), whole_of(surface)
-    groups, piece = control_groups(surface, values), surface
-    surface = surface if whole is None else whole.surface
-    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
-    corners, faces = np.unique(corner, return_inverse=True)
-    topo = surface.topology
+    piece, surface = surface, drawn(surface)
+    walls, colours = surface.walls.tolist(), patch_colors(surface).tolist()
+    patches = zip(surface.patches, walls, colours, strict=True)
     header = {
-        "patches": [
-            {"name": p.name, "wall": wall, "color": color}
-            for p, wall, color in zip(
-                surface.patches, surface.walls.tolist(), patch_colors(surface).tolist(), strict=True
-            )
-        ],
-        "controls": groups,
-        "whole": 1 if whole is None else round(whole.surface.m / piece.m),
+        "patches": [{"name": p.name, "wall": wall, "color": colour} for p, wall, colour in patches],
+        "controls": _controls(piece),
+        "whole": round(surface.m / piece.m),
         "vertices": surface.n,
         "triangles": surface.m,
         "size": surface.size,
@@ -65,16 +56,19 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
         "mirrors": [[p.point, p.normal] for p, _ in piece.on_planes if p.mirror],
         "ground": float(surface.plane.height(origin)),
     }
-    curves = topo.curve_edge | on_cables(surface)
-    inner = ~curves
+    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
+    corners, faces = np.unique(corner, return_inverse=True)
+    topo, index = surface.topology, np.array([surface.n, 1])  # an edge is known by its vertices
+    cables = np.sort(surface.cable_edges[0], axis=1) @ index
+    curves = topo.curve_edge | np.isin(np.sort(topo.edges, axis=1) @ index, cables)
     of_wall = np.ones(len(topo.edges), dtype=bool)  # edges all of whose triangles belong to walls
     of_wall[topo.edge_of_face[surface.roof[surface.patch_of_face]]] = False
     return header, {
         "sheet_faces": faces.reshape(-1, 3),
         "sheet_vertex": corners % surface.n,
         "sheet_patch": corners // surface.n,
-        "edges": topo.edges[inner],
-        "edge_wall": of_wall[inner],
+        "edges": topo.edges[~curves],
+        "edge_wall": of_wall[~curves],
         "curves": topo.edges[curves],
         "curve_wall": of_wall[curves],
         "fixed": np.flatnonzero(surface.pinned),
@@ -82,28 +76,15 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
     }
 
 
-def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
+def _controls(surface: Surface) -> list[dict[str, Any]]:
     """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
-    groups = []
+    groups, values = [], values_of(surface)
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
     for kind in ("cables", "volumes", "points"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
     return groups
-
-
-def on_cables(surface: Surface) -> Bools:
-    """(e,) edges that carry a cable."""
-    ends, _ = surface.cable_edges
-    number = np.sort(surface.topology.edges, axis=1) @ np.array([surface.n, 1])
-    return np.isin(number, np.sort(ends, axis=1) @ np.array([surface.n, 1]))
-
-
-def mesh_key(surface: Surface, origin: Floats) -> int:
-    """A number that changes with all that ``outline`` holds."""
-    names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
-    return crc32(surface.faces.tobytes() + origin.tobytes() + names.encode())
 
 
 def whole_of(surface: Surface) -> Whole | None:
@@ -114,6 +95,12 @@ def whole_of(surface: Surface) -> Whole | None:
         return unfolded(surface)
     except SurfaceError:
         return None
+
+
+def drawn(surface: Surface) -> Surface:
+    """The surface that the page draws: the whole of one that ends at mirror planes."""
+    whole = whole_of(surface)
+    return surface if whole is None else whole.surface
 
 
 def unit_texts(units: Units) -> dict[str, Any]:
@@ -130,15 +117,69 @@ def centre(surface: Surface) -> Floats:
     return 0.5 * (X.min(axis=0) + X.max(axis=0))
 
 
+def state_data(state: State, origin: Floats, moving: bool = False) -> dict[str, Any]:
+    """A state in words and numbers; while a slider is ``moving``, without the tables of supports."""
+    surface, certificate = state.surface, state.certificate
+    names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
+    return {
+        "mesh": crc32(surface.faces.tobytes() + origin.tobytes() + names.encode()),  # that ``outline`` has
+        "asked": _patches(state.wanted.patches),
+        "shown": _patches(surface.patches),
+        "values": {"asked": values_of(state.wanted), "shown": values_of(surface)},
+        "verdict": _verdict(state.failure or certificate),
+        "at_rest": state.failure is None,
+        "findings": _findings(certificate, moving),
+        "figures": figures_data(surface, certificate),
+        "undo": state.undo,
+        "redo": state.redo,
+        "message": state.message,
+        "met": state.met,
+        "number": state.number,
+        "way": state.note,
+        "variants": [
+            {"name": one.name, "word": _verdict(one.certificate)["word"], "figures": one.figures}
+            for one in state.variants
+        ],
+        "compared": state.compared,
+    }
+
+
+def _patches(patches: Iterable[Patch]) -> list[dict[str, Any]]:
+    """The tensions and pressures of patches, for the card."""
+    return [
+        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
+        for p in patches
+    ]
+
+
+def _verdict(certificate: Certificate) -> dict[str, str]:
+    """The verdict as a code, ``name``, and in words."""
+    word, _, rest = certificate.verdict.value.partition(": ")
+    name = certificate.verdict.name.lower()
+    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}
+
+
+def _findings(certificate: Certificate, moving: bool) -> dict[str, Any]:
+    """Numbers and tables of a certificate."""
+    tables = {"rooms": certificate.rooms}
+    if not moving:
+        tables |= {"supports": certificate.supports, "balance": certificate.balance}
+    rows: dict[str, Any] = {}
+    for name, table in tables.items():  # pandas' own ``to_dict`` takes ten times as long, at every answer
+        columns = [table[column].tolist() for column in table]
+        rows[name] = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
+    return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
+
+
 def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
-    drawn = surface if whole is None else whole.surface
-    acting = certificate.acting if whole is None else support_forces(drawn)
+    shown = surface if whole is None else whole.surface
+    acting = certificate.acting if whole is None else support_forces(shown)
     arrays: Arrays = {
-        "vertices": drawn.vertices - origin,
-        "curvature": mean_curvature(drawn, "variational"),
-        "error": curvature_error(drawn, "cotangent"),
+        "vertices": shown.vertices - origin,
+        "curvature": mean_curvature(shown, "variational"),
+        "error": curvature_error(shown, "cotangent"),
         "reactions": acting.per_length,
         "points": acting.points,
     }
@@ -152,56 +193,28 @@ def fields(state: State, origin: Floats) -> Arrays:
 
 def families_drawn(state: State) -> Floats:
     """``family_of_face`` of the surface that is drawn. It takes longer than an answer to a slider."""
-    whole = whole_of(state.surface)
-    return family_of_face(state.surface if whole is None else whole.surface)
-
-
-def patch_data(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
-    """The tensions and pressures of patches, for the card."""
-    return [
-        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
-        for p in patches
-    ]
-
-
-def verdict_data(certificate: Certificate) -> dict[str, str]:
-    """The verdict as a code, ``name``, and in words."""
-    word, _, rest = certificate.verdict.value.partition(": ")
-    name = certificate.verdict.name.lower()
-    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}
-
-
-def variant_data(variant: Variant) -> dict[str, Any]:
-    """A variant for the page's table."""
-    word = verdict_data(variant.certificate)["word"]
-    return {"name": variant.name, "word": word, "figures": variant.figures}
+    return family_of_face(drawn(state.surface))
 
 
 def target_choices(surface: Surface) -> list[dict[str, Any]]:
     """The quantities that targets may have on a surface: the names of what each may be of, and "" for all."""
-    roof = surface.roof.tolist()
-    names = {
-        "patch": [p.name for p, kept in zip(surface.patches, roof, strict=True) if kept],
-        "wall": [p.name for p, kept in zip(surface.patches, roof, strict=True) if not kept],
+    names: dict[str, list[str]] = {
+        "patch": [p.name for p, kept in zip(surface.patches, surface.roof, strict=True) if kept],
+        "wall": [p.name for p, kept in zip(surface.patches, surface.roof, strict=True) if not kept],
         "cable": [cable.name for cable in surface.cables],
         "room": [room.name for room in surface.rooms],
     }
+    varied: dict[Any, str] = {}  # of margins, each once
+    for what, parts in named(surface).items():
+        varied.setdefault(parts, what)
     choices = []
     for quantity in MEASURES:
         owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
         if names[owner] and quantity != "height":
             of = names[owner] if quantity in NAMED else ["", *names[owner]]
-            of = _varied(surface) if quantity == "margin" else of
+            of = [*varied.values()] if quantity == "margin" else of
             choices.append({"quantity": quantity, "of": of, "dimension": dimension_of(quantity)})
     return choices
-
-
-def _varied(surface: Surface) -> list[str]:
-    """What a margin of a surface may vary, each once."""
-    once: dict[Any, str] = {}
-    for what, parts in named(surface).items():
-        once.setdefault(parts, what)
-    return [*once.values()]
 
 
 def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[str, Any]:
@@ -212,51 +225,18 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def findings(certificate: Certificate, moving: bool = False) -> dict[str, Any]:
-    """Numbers and tables of a certificate, for the page; while a slider moves, without those of supports."""
-    tables = {"rooms": certificate.rooms}
-    if not moving:
-        tables |= {"supports": certificate.supports, "balance": certificate.balance}
-    rows = {name: _rows(table) for name, table in tables.items()}
-    return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
-
-
-def _rows(table: Any) -> list[dict[str, Any]]:
-    """The rows of a table; pandas' own ``to_dict`` takes ten times as long, at every answer to a slider."""
-    columns = {name: table[name].tolist() for name in table}
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
-def margin_findings(
-    margin: Margin | None, origin: Floats, units: Units = NO_UNITS
-) -> tuple[dict[str, Any], Arrays]:
-    """A margin in words, and the vertices of the surface there as in ``fields``; None is superseded."""
-    if margin is None:
-        return {"superseded": True}, {}
-    whole = whole_of(margin.surface)
-    drawn = margin.surface if whole is None else whole.surface
-    return {"margin": margin.text(units)}, {"vertices": drawn.vertices - origin}
-
-
 def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:
     """The verdict of the mesh check, and its table in words."""
     word, _, sentence = check.verdict.value.partition(": ")
     rows = []
     for row in check.table.to_dict(orient="records"):
         unit = units.behind(dimension_of(row["quantity"]))
-        rows.append(
-            {
-                "name": " of ".join(filter(None, (row["quantity"], row["of"]))),
-                "value": with_bar(row["value"], row["error"], unit),
-                "limit": with_bar(row["limit"], row["limit_error"], unit),
-                "order": float(row["order"]),
-            }
-        )
+        values = {
+            "value": with_bar(row["value"], row["error"], unit),
+            "limit": with_bar(row["limit"], row["limit_error"], unit),
+        }
+        name = " of ".join(filter(None, (row["quantity"], row["of"])))
+        rows.append({"name": name, **values, "order": float(row["order"])})
     detail = "; ".join(filter(None, (check.detail, check.advice)))
-    return {
-        "name": check.verdict.name.lower(),
-        "word": word,
-        "sentence": sentence,
-        "detail": detail,
-        "rows": rows,
-    }
+    words = {"name": check.verdict.name.lower(), "word": word, "sentence": sentence, "detail": detail}
+    return {**words, "rows": rows}

@@ -1,36 +1,31 @@
-"""The roof that a page opens: an outcome, and how its file was when it was read."""
+"""The roof that a page opens: an outcome, how its file was when it was read, and the watch of that file."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from .. import project as projects
+from ..base.errors import MissingExtra, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
 from ..surface import Surface
 
+EVERY = 0.5  # seconds between two looks at the files
 Signature = tuple[tuple[str, tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Roof:
-    """What a page opens.
+    """What a page opens."""
 
-    Attributes
-    ----------
-    outcome : of a project, of its start shape, or of a surface alone.
-    title : at the top of the page; downloads are named after it.
-    signature : of the file and those it refers to, before they were read.
-    """
-
-    outcome: projects.Outcome
-    title: str = ""
-    signature: Signature = ()
+    outcome: projects.Outcome  # of a project, of its start shape, or of a surface alone
+    title: str = ""  # at the top of the page; downloads are named after it
+    signature: Signature = ()  # of the file and those it refers to, before they were read
 
     @classmethod
     def of(cls, surface: Surface, title: str = "", units: Units = NO_UNITS) -> Roof:
@@ -47,11 +42,6 @@ class Roof:
         return self.outcome.surface
 
     @property
-    def units(self) -> Units:
-        """The units of its numbers."""
-        return self.outcome.units
-
-    @property
     def project(self) -> projects.Project | None:
         """The project behind it, also of a drawing; None for any other file, and a surface from a program."""
         project = self.outcome.project
@@ -61,11 +51,6 @@ class Roof:
     def path(self) -> Path | None:
         """The file that it was read from."""
         return None if self.outcome.project is None else self.outcome.project.path
-
-    @property
-    def data(self) -> Mapping[str, Any]:
-        """The data of its project; empty without one."""
-        return {} if self.project is None else self.project.data
 
     @property
     def aims(self) -> tuple[tuple[Target, ...], tuple[Parameter, ...]]:
@@ -129,3 +114,42 @@ def signature(path: Path) -> Signature:
         except (OSError, ValueError):  # missing, or no name of a file
             states.append((str(file), ()))
     return tuple(states)
+
+
+class Watch:
+    """A thread that reads a roof again whenever its files change."""
+
+    def __init__(self, path: Path, seen: Signature, read: Callable[[], Roof], show: Callable[[Roof], None]):
+        self.path, self.seen = path, seen
+        self._read, self._show = read, show
+        self.problem = ""  # why the newest save has no roof, in one line
+        self.working = False  # whether the roof of a save is being computed
+        self._end = threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._end.set()
+
+    def _run(self) -> None:
+        last = self.seen
+        while not self._end.wait(EVERY):
+            now = signature(self.path)
+            if now != self.seen and now == last:  # saved, and no longer being written
+                self.seen = now
+                self._follow()
+            last = now
+
+    def _follow(self) -> None:
+        self.working = True
+        try:
+            roof = self._read()
+            if roof.good:
+                self._show(roof)
+            self.problem = "" if roof.good else roof.note
+        except (PcmcError, MissingExtra, OSError) as error:
+            self.problem = " ".join(str(error).replace(f"{self.path}: ", "").split())
+        except Exception as error:  # the net: the page must learn that its shape is an old one
+            self.problem = " ".join(f"{type(error).__name__}: {error}".split())
+        finally:
+            self.working = False

@@ -21,14 +21,7 @@ from .roof import Roof
 
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
-OUTPUTS = {
-    "files",
-    "picture",
-    "drawings",
-    "panels",
-    "structure",
-    "report",
-}  # keys of [output] that name files
+OUTPUTS = {"files", "picture", "drawings", "panels", "structure", "report"}  # keys of [output] with names
 Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
@@ -37,32 +30,34 @@ def save(
 ) -> tuple[Path, str]:
     """Write a project with the values of a surface into the folder of its file.
 
-    Parameters
-    ----------
-    roof : what the page opened.
-    surface : the one to save.
-    name : of the file, without folder.
-    replace : whether a project of that name may be replaced.
-    aims : targets met by the page, with what they vary.
-
-    Returns
-    -------
-    (path, note) : the file, and what happened to its targets.
+    ``name`` is that of the file, without folder; with ``replace`` it may be that of a project that is there.
+    ``aims`` are targets met by the page, with what they vary. Returns the file, and what happened to its
+    targets.
 
     Raises
     ------
-    FileError
-        For a name that leads elsewhere, a file that is there already, was changed since it was read, or is no
-        project of pcmc.
-    OptionError
-        For a surface whose values the project cannot hold.
-    MissingExtra
-        Without tomlkit.
+    FileError : a name that leads elsewhere, a file that is there already, was changed since it was read, or
+        is no project of pcmc.
+    OptionError : a surface whose values the project cannot hold.
+    MissingExtra : without tomlkit.
     """
     project, path = _place(roof, name)
     text, note, left = project_with(roof, surface, aims, path.stem)
-    if path.exists():
-        _check_replaced(project, path, replace)
+    problem = ""
+    if not path.exists():
+        pass
+    elif not replace:
+        problem = "is there already; check that it may be replaced, or give another name"
+    elif path.resolve() == project.path.resolve():
+        if path.read_text(encoding="utf-8-sig") != project.text:
+            problem = "was changed since the page read it; save under another name"
+    else:
+        try:
+            read_data(path)
+        except FileError:
+            problem = "is no project of pcmc, so it is not replaced; give another name"
+    if problem:
+        raise FileError(f"{path.name} {problem}", what="name", found=path.name)
     with atomic_write(path) as temporary:
         ends = "\r\n" if project.path.exists() and b"\r\n" in project.path.read_bytes() else "\n"
         temporary.write_text(text, encoding="utf-8", newline=ends)
@@ -76,23 +71,6 @@ def save(
             message = f"{path.name} would have another {', '.join(wrong[:5])}; nothing is saved"
             raise OptionError(message, what="values", found=wrong)
     return path, note
-
-
-def _check_replaced(project: Project, path: Path, replace: bool) -> None:
-    """Refuse to replace a file without leave, one that is no project, and one that was changed."""
-    problem = ""
-    if not replace:
-        problem = "is there already; check that it may be replaced, or give another name"
-    elif path.resolve() == project.path.resolve():
-        problem = "was changed since the page read it; save under another name"
-        problem = problem if path.read_text(encoding="utf-8-sig") != project.text else ""
-    else:
-        try:
-            read_data(path)
-        except FileError:
-            problem = "is no project of pcmc, so it is not replaced; give another name"
-    if problem:
-        raise FileError(f"{path.name} {problem}", what="name", found=path.name)
 
 
 def _place(roof: Roof, name: str) -> tuple[Project, Path]:
@@ -155,16 +133,13 @@ def project_with(
     sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
     left = sought - differences(roof.surface, surface).keys() if kept == roof.aims else set()
     data = with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
-    if stem and stem != project.path.stem:
+    old = project.path.stem
+    if stem and stem != old:
         output = data.get("output", {})
         for key in OUTPUTS & output.keys():
             names = output[key]
             one = isinstance(names, str)
-            output[key] = (
-                _renamed(names, project.path.stem, stem)
-                if one
-                else [_renamed(n, project.path.stem, stem) for n in names]
-            )
+            output[key] = _renamed(names, old, stem) if one else [_renamed(n, old, stem) for n in names]
     if found and given is None:
         document["targets"] = tomlkit.table()
         for key, entries in found.items():
@@ -191,18 +166,14 @@ def _renamed(name: str, old: str, new: str) -> str:
 
 
 def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
-    values = [measure(surface, target).value for target in targets]
-    return all(
-        abs(value - t.nearest(value)) <= HELD * t.scale(surface)
-        for t, value in zip(targets, values, strict=True)
-    )
+    values = [(target, measure(surface, target).value) for target in targets]
+    return all(abs(value - t.nearest(value)) <= HELD * t.scale(surface) for t, value in values)
 
 
 def _target(target: Target, points: Mapping[str, Any]) -> dict[str, Any]:
     """A target as in a project: a point that the plan names by its name."""
-    entry = {key: getattr(target, key) for key in FIELDS} | (
-        {"of": target.name} if target.name in points else {}
-    )
+    entry = {key: getattr(target, key) for key in FIELDS}
+    entry |= {"of": target.name} if target.name in points else {}
     return {k: list(v) if isinstance(v, tuple) else v for k, v in entry.items() if v is not None}
 
 

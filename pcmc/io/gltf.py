@@ -74,10 +74,28 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 
 
 def read(path: Path) -> MeshData:
-    """Meshes as patches, by the names of their nodes."""
-    trimesh = load_library("trimesh")
+    """Meshes as patches, by the names of their nodes.
+
+    trimesh believes that parts are files, and that arrays are not larger than the bytes there are.
+    """
+    trimesh, content = load_library("trimesh"), path.read_bytes()
+    size, items = len(content), 0
+    if path.suffix.lower() == ".glb":
+        content = content[20 : 20 + int.from_bytes(content[12:16], "little")]
     with translated_errors("glTF"):
-        _check_header(path)
+        header = json.loads(content)  # in a file that is cut off, trimesh would look for another file
+        for buffer in header.get("buffers", ()):
+            name = buffer.get("uri", "base64,").strip()
+            if "base64," not in name:
+                for place in {name, name.lstrip("/"), os.path.split(name)[-1]}:  # trimesh tries each
+                    check_regular(part := path.parent / place)
+                    size += part.stat().st_size if part.exists() else 0
+        for number, accessor in enumerate(header.get("accessors", ())):
+            count = accessor["count"]
+            items += count
+            if not isinstance(items, int) or count < 0 or items > ITEMS * size:
+                text = f"accessor {number} has {count!r:.30} items, and the file only {size} bytes"
+                raise FileError(text, where=number, found=count, expected=size)
         try:
             scene = trimesh.load_scene(path, process=False, skip_materials=True)
         except FileNotFoundError as error:
@@ -90,24 +108,3 @@ def read(path: Path) -> MeshData:
     support = mesh.scalars.get(SUPPORT)
     held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))
-
-
-def _check_header(path: Path) -> None:
-    """Check what trimesh believes: parts are files, and arrays are not larger than the bytes there are."""
-    data = path.read_bytes()
-    size, items = len(data), 0
-    if path.suffix.lower() == ".glb":
-        data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
-    header = json.loads(data)  # in a file that is cut off, trimesh would look for another file
-    for buffer in header.get("buffers", ()):
-        name = buffer.get("uri", "base64,")
-        if "base64," not in name:
-            for place in {name.strip(), name.strip().lstrip("/"), os.path.split(name)[-1]}:  # it tries each
-                part = path.parent / place
-                check_regular(part)
-                size += part.stat().st_size if part.exists() else 0
-    for number, accessor in enumerate(header.get("accessors", ())):
-        items += accessor["count"]
-        if not isinstance(items, int) or accessor["count"] < 0 or items > ITEMS * size:
-            text = f"accessor {number} has {accessor['count']!r:.30} items, and the file only {size} bytes"
-            raise FileError(text, where=number, found=accessor["count"], expected=size)

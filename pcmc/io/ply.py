@@ -87,12 +87,18 @@ class _Element:
 def read(path: Path) -> MeshData:
     """Binary or text, with triangles, quads or polygons."""
     data = path.read_bytes()
-    header, form, start = _header(data)
+    end = re.search(rb"end_header[^\S\n]*\n", data[: 1 << 20])
+    if not data.startswith(b"ply") or end is None:
+        raise FileError("not a PLY file, or cut off in its header", where="header")
+    header, start = data[: end.start()].decode("utf-8", "replace").replace("\r", ""), end.end()
+    form = re.search(r"^format (ascii|binary_(?:little|big)_endian) ", header, re.M)
+    if form is None:
+        raise FileError("its header names no known format", where="header")
     comment = re.search(rf"^{MARK}(.*)$", header, re.M)
-    order = ">" if form == "binary_big_endian" else "<"
-    kinds = {name: "<f8" if form == "ascii" else order + kind for name, kind in TYPES.items()}
+    order = ">" if form[1] == "binary_big_endian" else "<"
+    kinds = {name: "<f8" if form[1] == "ascii" else order + kind for name, kind in TYPES.items()}
     elements = _elements(header, kinds)
-    if form == "ascii":
+    if form[1] == "ascii":
         try:
             data, start = numbers(data[start:].decode("ascii").split()).tobytes(), 0
         except ValueError as error:
@@ -110,18 +116,6 @@ def read(path: Path) -> MeshData:
     corners, counts = face.pop(key), face.pop(f"{key} count")
     metadata = parse_metadata(comment[1] if comment else None)
     return from_polygons(X, corners, counts, vertex, face, metadata, path.stem)
-
-
-def _header(data: bytes) -> tuple[str, str, int]:
-    """Header, "ascii" or "binary_..._endian", and where the body starts."""
-    end = re.search(rb"end_header[^\S\n]*\n", data[: 1 << 20])
-    if not data.startswith(b"ply") or end is None:
-        raise FileError("not a PLY file, or cut off in its header", where="header")
-    header = data[: end.start()].decode("utf-8", "replace").replace("\r", "")
-    form = re.search(r"^format (ascii|binary_little_endian|binary_big_endian) ", header, re.M)
-    if form is None:
-        raise FileError("its header names no known format", where="header")
-    return header, form[1], end.end()
 
 
 def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:

@@ -25,7 +25,7 @@ from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
 from ..surface.geometry import area_vectors, segment_lengths
-from ..surface.topology import Topology, topology
+from ..surface.topology import topology
 from .formats import FORMATS, READ_ONLY, Format, format_of
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, converted, merged, to_surface, without_unused
@@ -172,7 +172,15 @@ def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tu
     seam, axis = _open_seam(data.vertices, outer), _up(data, outer)
     turn = f"the surface faces {axis}, but z is up here; if {axis} was up, turn it: pcmc repair"
     wrong_up = f"{turn} {os.fspath(path)} -o turned.obj --up {axis}" if axis else ""
-    return tuple(filter(None, (seam, _opposed_patches(data, topo), wrong_up)))
+    opposed, wrong = "", np.flatnonzero(topo.one_way_edge & topo.seam_edge)
+    if len(wrong):
+        faces = np.flatnonzero((topo.edge_of_face == wrong[0]).any(axis=1))
+        a, b = (data.patches[k].name for k in data.patch_of_face[faces])
+        opposed = (
+            f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
+            " sides; unless you want that, reverse the faces of one"
+        )
+    return tuple(filter(None, (seam, opposed, wrong_up)))
 
 
 def _open_seam(X: Floats, outer: Ints) -> str:
@@ -192,18 +200,6 @@ def _open_seam(X: Floats, outer: Ints) -> str:
         f"a seam is open: {np.count_nonzero(close)} boundary vertices are within"
         f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
         " drew the mesh, or with pcmc repair --weld"
-    )
-
-
-def _opposed_patches(data: MeshData, topo: Topology) -> str:
-    wrong = np.flatnonzero(topo.one_way_edge & topo.seam_edge)
-    if not len(wrong):
-        return ""
-    faces = np.flatnonzero((topo.edge_of_face == wrong[0]).any(axis=1))
-    a, b = (data.patches[k].name for k in data.patch_of_face[faces])
-    return (
-        f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
-        " sides; unless you want that, reverse the faces of one"
     )
 
 

@@ -38,10 +38,10 @@ def write(path: Path, surface: Surface, _: Content) -> str:
     normal = area_vectors(P)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
-    for patch in surface.patches:
-        if word := SPECIAL.search(patch.name):
-            text = f"the patch name {patch.name!r} has the word {word[0]!r} of the format; rename the patch"
-            raise FileError(text, where="patches", found=patch.name)
+    for name in (patch.name for patch in surface.patches):
+        if word := SPECIAL.search(name):
+            text = f"the patch name {name!r} has the word {word[0]!r} of the format; rename the patch"
+            raise FileError(text, where="patches", found=name)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]
@@ -56,17 +56,8 @@ def write(path: Path, surface: Surface, _: Content) -> str:
 
 
 def read(path: Path) -> MeshData:
-    """Solids as patches."""
-    trimesh = load_library("trimesh")
-    _complete(path)
-    with translated_errors("STL"):
-        scene = trimesh.load_scene(path, file_type="stl", process=False)
-    return from_scene(scene, path.stem, Metadata())
-
-
-def _complete(path: Path) -> None:
-    """Text must end with ``endsolid``, binary must have all its triangles: trimesh checks neither."""
-    data = path.read_bytes()
+    """Solids as patches. Text must end with ``endsolid``, binary must have all its triangles."""
+    trimesh, data = load_library("trimesh"), path.read_bytes()
     if data[:5] == b"solid" and b"facet" in data[:2000]:
         lines = data.rstrip().split(b"\n")
         last = lines[-1].decode().strip()[:40]
@@ -77,9 +68,11 @@ def _complete(path: Path) -> None:
         if not last.startswith("endsolid"):
             text = f"line {len(lines)}: cut off before 'endsolid', found {last!r}"
             raise FileError(text, where=len(lines))
-        return
-    count = int.from_bytes(data[80:84], "little")
-    size = 84 + 50 * count
-    if len(data) < size:
-        found = f"{count} triangles need {size} bytes, found {len(data)}"
-        raise FileError(f"not an STL file, or cut off: {found}", where=count)
+    else:
+        count = int.from_bytes(data[80:84], "little")
+        if len(data) < (size := 84 + 50 * count):
+            found = f"{count} triangles need {size} bytes, found {len(data)}"
+            raise FileError(f"not an STL file, or cut off: {found}", where=count)
+    with translated_errors("STL"):
+        scene = trimesh.load_scene(path, file_type="stl", process=False)
+    return from_scene(scene, path.stem, Metadata())

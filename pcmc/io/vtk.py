@@ -51,17 +51,6 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 def read(path: Path) -> MeshData:
     """Triangles, quads and polygons of either; lines and points are left out."""
     require("vtkmodules", "pyvista")
-    _check_text(path)
-    arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
-    corners, counts, chosen = _cells(arrays)
-    metadata = parse_metadata(arrays["text"])
-    points = np.asarray(arrays["points"]).reshape(-1, 3)
-    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
-    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)
-
-
-def _check_text(path: Path) -> None:
-    """Refuse a file without its end, and counts that no file of its size can have."""
     data = path.read_bytes()
     if not data[-64:].rstrip().endswith(b"</VTKFile>"):
         raise FileError("not a VTK XML file, or cut off before '</VTKFile>'", expected="</VTKFile>")
@@ -69,6 +58,12 @@ def _check_text(path: Path) -> None:
         if len(match[1]) > 18 or int(match[1]) > ITEMS * len(data):
             text = f"{match[0][:60].decode()}, but the file has only {len(data)} bytes"
             raise FileError(text, where=1 + data.count(b"\n", 0, match.start()), found=match[1][:60].decode())
+    arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
+    corners, counts, chosen = _cells(arrays)
+    points = np.asarray(arrays["points"]).reshape(-1, 3)
+    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
+    metadata = parse_metadata(arrays["text"])
+    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)
 
 
 def _cells(arrays: Mapping[str, Any]) -> tuple[Ints, Ints, Ints]:

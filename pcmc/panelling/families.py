@@ -25,18 +25,11 @@ TURNS = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])  # the edges counter-clockwi
 
 
 class Families(NamedTuple):
-    """A partition of triangles into families.
+    """A partition of triangles into families."""
 
-    Attributes
-    ----------
-    family : (m,) int, from 0; larger families first.
-    order : (m,3) int: edge ``order[f, k]`` of triangle f corresponds to edge k of its family.
-    at_least : no partition has fewer families.
-    """
-
-    family: Ints
-    order: Ints
-    at_least: int
+    family: Ints  # (m,) from 0; larger families first
+    order: Ints  # (m,3) edge ``order[f, k]`` of triangle f corresponds to edge k of its family
+    at_least: int  # no partition has fewer families
 
 
 def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families:
@@ -64,8 +57,12 @@ def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families
     family, turn = np.empty((2, len(rank)), dtype=np.int64)
     family[rank], turn[rank] = _cover(points[rank], tolerance, at_least)
     order = orders[np.arange(len(rank)), turn]
-    aligned = np.take_along_axis(lengths, order, axis=1)
-    return Families(_numbered(family, aligned), order, at_least)
+    count = np.bincount(family)
+    least = np.full((len(count), 3), np.inf)
+    np.minimum.at(least, family, np.take_along_axis(lengths, order, axis=1))
+    number = np.empty(len(count), dtype=np.int64)  # families of one size by their smallest lengths
+    number[np.lexsort((least[:, 2], least[:, 1], least[:, 0], -count))] = np.arange(len(count))
+    return Families(number[family], order, at_least)
 
 
 def family_of_face(surface: Surface) -> Floats:
@@ -86,21 +83,11 @@ def family_of_face(surface: Surface) -> Floats:
     return family
 
 
-def _numbered(family: Ints, aligned: Floats) -> Ints:
-    """Numbers from 0, by descending size; among families of one size by their smallest lengths."""
-    count = np.bincount(family)
-    least = np.full((len(count), 3), np.inf)
-    np.minimum.at(least, family, aligned)
-    place = np.empty(len(count), dtype=np.int64)
-    place[np.lexsort((least[:, 2], least[:, 1], least[:, 0], -count))] = np.arange(len(count))
-    return place[family]
-
-
 def _cover(points: Floats, tolerance: float, at_least: int) -> tuple[Ints, Ints]:
     """The family (m,) of each triangle, and its turn (m,), from points (m,w,3) in canonical order.
 
-    The best of several greedy covers, swept along different axes, is improved by search: families near one
-    another are dissolved and covered anew, along another axis.
+    The best of several greedy covers, swept along different axes, is improved by search: families around a
+    random one are dissolved and covered anew, along another axis, which is kept if there are no more of them.
     """
     count, turns, _ = points.shape
     axes = (0, 1, 2) if turns == 1 else (0,)  # turning makes the axes alike
@@ -109,38 +96,24 @@ def _cover(points: Floats, tolerance: float, at_least: int) -> tuple[Ints, Ints]
     best = min(found, key=lambda cover: int(cover[0].max()))
     random = np.random.default_rng(0)
     for k in range(min(ROUNDS, WORK // (count * int(best[0].max() + 1)))):
-        if best[0].max() < at_least:  # no cover has fewer
+        family, turn = best
+        size = int(family.max()) + 1
+        if size <= at_least:  # no cover has fewer
             break
-        best = _improved(points, best, sweeps[k % len(sweeps)], tolerance, random)
+        placed = points[np.arange(count), turn]
+        total = np.stack([np.bincount(family, column) for column in placed.T], axis=1)
+        centre = total / np.bincount(family)[:, None]
+        distance = np.abs(centre - centre[random.integers(size)]).max(axis=1)
+        away = distance > np.sort(distance)[max(1, int(SHARE * random.random() * size))]
+        family, turn, new = np.where(away, np.cumsum(away) - 1, -1)[family], turn.copy(), int(away.sum())
+        _absorb(points, family, turn, new, tolerance)
+        loose = np.flatnonzero(family < 0)
+        if len(loose):
+            again, turn[loose] = _sweep(points, loose, *sweeps[k % len(sweeps)], tolerance)
+            family[loose] = again + new
+            new += int(again.max()) + 1
+        best = (family, turn) if new <= size else best
     return best
-
-
-def _improved(
-    points: Floats,
-    cover: tuple[Ints, Ints],
-    sweep: tuple[int, float],
-    tolerance: float,
-    random: np.random.Generator,
-) -> tuple[Ints, Ints]:
-    """A cover with as many families or fewer: those around a random one are dissolved and covered anew."""
-    family, turn = cover
-    count = int(family.max()) + 1
-    placed = points[np.arange(len(points)), turn]
-    total = np.stack([np.bincount(family, column) for column in placed.T], axis=1)
-    centre = total / np.bincount(family)[:, None]
-    middle = centre[random.integers(count)]
-    distance = np.abs(centre - middle).max(axis=1)
-    away = distance > np.sort(distance)[max(1, int(SHARE * random.random() * count))]
-    number = np.where(away, np.cumsum(away) - 1, -1)
-    kept, kept_turn = number[family], turn.copy()
-    _absorb(points, kept, kept_turn, int(away.sum()), tolerance)
-    loose = np.flatnonzero(kept < 0)
-    new = int(away.sum())
-    if len(loose):
-        again, turned = _sweep(points, loose, *sweep, tolerance)
-        kept[loose], kept_turn[loose] = again + new, turned
-        new += int(again.max()) + 1
-    return (kept, kept_turn) if new <= count else cover
 
 
 def _sweep(points: Floats, chosen: Ints, axis: int, side: float, tolerance: float) -> tuple[Ints, Ints]:

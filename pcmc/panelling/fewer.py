@@ -42,21 +42,13 @@ OnRound = Callable[[int, int], object]  # called with the round and the number o
 
 @dataclass(frozen=True, eq=False)
 class FewerFamilies:
-    """The panels of a surface before and after its vertices moved. ``print`` compares them.
-
-    Attributes
-    ----------
-    before, after : the panels, with their surfaces and certificates.
-    change : the largest distance of a panel's corner from the shape before, length.
-    moved : the largest motion of a panel's corner, along the shape for the most part, length.
-    rounds : how many rounds were made.
-    """
+    """The panels of a surface before and after its vertices moved. ``print`` compares them."""
 
     before: Panels
     after: Panels
-    change: float
-    moved: float
-    rounds: int
+    change: float  # the largest distance of a panel's corner from the shape before, length
+    moved: float  # the largest motion of a panel's corner, along the shape for the most part, length
+    rounds: int  # how many were made
 
     @property
     def surface(self) -> Surface:
@@ -150,7 +142,10 @@ class _Search:
         while made < rounds and misses < len(settings):
             surface = self._round(*settings[current])
             made += 1
-            count = self.count if surface is None else self._families(surface.vertices)
+            count = self.count
+            if surface is not None:
+                lengths = self._lengths(surface.vertices)
+                count = int(families(lengths, self.tolerance, self.apart).family.max()) + 1
             if surface is not None and count < self.count:
                 self.best, self.count, misses = surface, count, 0
             else:
@@ -163,16 +158,21 @@ class _Search:
         """The largest distance of a panel's corner from the shape before."""
         return float(distances(X[self.corners], self.start.vertices, self.faces).max())
 
-    def _families(self, X: Floats) -> int:
-        return int(families(self._lengths(X), self.tolerance, self.apart).family.max()) + 1
-
     def _lengths(self, X: Floats) -> Floats:
         return np.asarray(np.linalg.norm(edge_vectors(X[self.faces]), axis=2))
 
     def _round(self, wider: float, inside: float) -> Surface | None:
-        """The best surface, its vertices moved towards wider families; None where that fails."""
+        """The best surface, its edges moved towards the middle of the range that those of the family have,
+        in families within a wider tolerance; None where that fails."""
         X = self.best.vertices
-        targets = self._targets(X, wider * self.tolerance)
+        lengths = self._lengths(X)
+        family, order, _ = families(lengths, wider * self.tolerance, self.apart)
+        aligned = np.take_along_axis(lengths, order, axis=1)
+        low, high = np.full((2, family.max() + 1, 3), np.inf)
+        np.minimum.at(low, family, aligned)
+        np.minimum.at(high, family, -aligned)
+        targets = np.empty_like(lengths)
+        np.put_along_axis(targets, order, 0.5 * (low - high)[family], axis=1)
         for _ in range(STEPS):
             moved = self._step(X, targets, inside * self.tolerance)
             if moved is None:
@@ -187,18 +187,6 @@ class _Search:
                 return None
             surface = result.surface
         return surface if self.leaves(surface.vertices) <= self.change else None
-
-    def _targets(self, X: Floats, tolerance: float) -> Floats:
-        """(m,3) the middle of the range that the family's corresponding edges have."""
-        lengths = self._lengths(X)
-        family, order, _ = families(lengths, tolerance, self.apart)
-        aligned = np.take_along_axis(lengths, order, axis=1)
-        low, high = np.full((2, family.max() + 1, 3), np.inf)
-        np.minimum.at(low, family, aligned)
-        np.minimum.at(high, family, -aligned)
-        targets = np.empty_like(lengths)
-        np.put_along_axis(targets, order, 0.5 * (low - high)[family], axis=1)
-        return targets
 
     def _step(self, X: Floats, targets: Floats, inside: float) -> Floats | None:
         """A damped Gauss-Newton step on the edges farther than ``inside`` from their targets, or None.
@@ -218,7 +206,11 @@ class _Search:
         frame, damping = self._frames(space.basis, space.dimension, part.resting | part.walls.held)
         unit = edges[face, side] / lengths[face, side][:, None]
         tail, head = self.faces[face, (side + 1) % 3], self.faces[face, (side + 2) % 3]
-        J = _length_jacobian(unit, tail, head, frame)
+        towards = np.einsum("ej,ekj->ek", unit, frame[head]), -np.einsum("ej,ekj->ek", unit, frame[tail])
+        columns = 3 * np.stack([head, tail], axis=1)[:, :, None] + np.arange(3)
+        rows = np.repeat(np.arange(len(unit)), 6)  # J: the derivatives of the lengths
+        values = np.stack(towards, axis=1).ravel()
+        J = csr_array((values, (rows, columns.ravel())), shape=(len(unit), 3 * len(frame)))
         system = csc_array(J.T @ J + diags_array(damping.ravel()))
         move = -splu(system, permc_spec="MMD_AT_PLUS_A").solve(J.T @ excess[face, side])
         motion = np.einsum("vk,vkj->vj", move.reshape(-1, 3), frame)
@@ -245,12 +237,3 @@ class _Search:
             frame[sheet, 2] = basis[sheet, 0]
             frame[curve, 1:] = basis[curve, :2]
         return frame, damping
-
-
-def _length_jacobian(unit: Floats, tail: Ints, head: Ints, frame: Floats) -> csr_array:
-    """(k,3n) derivatives of the lengths of edges from ``tail`` to ``head`` along ``unit`` (k,3)."""
-    towards = np.einsum("ej,ekj->ek", unit, frame[head]), -np.einsum("ej,ekj->ek", unit, frame[tail])
-    columns = 3 * np.stack([head, tail], axis=1)[:, :, None] + np.arange(3)
-    rows = np.repeat(np.arange(len(unit)), 6)
-    values = np.stack(towards, axis=1)
-    return csr_array((values.ravel(), (rows, columns.ravel())), shape=(len(unit), 3 * len(frame)))

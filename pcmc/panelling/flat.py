@@ -52,14 +52,18 @@ def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
     start = np.flatnonzero(np.append(True, edge[1:] != edge[:-1]))
     count = np.diff(np.append(start, len(edge)))
     lead = np.repeat(start, count)  # the first triangle at each edge: angles are seen from it
-    inward, normal = _frames(X[F], order)
+    face, side = order // 3, order % 3
+    along, normal = edge_vectors(X[F])[face, side], area_vectors(X[F])[face]
+    inward, normal = (
+        v / np.maximum(np.linalg.norm(v, axis=1), 1e-300)[:, None] for v in (np.cross(normal, along), normal)
+    )
     angle = np.arctan2(
         -np.einsum("ij,ij->i", inward, normal[lead]), np.einsum("ij,ij->i", inward, inward[lead])
     )
     angle = np.degrees(angle) % 360.0
     angle[start] = 0.0
     turn = np.lexsort((angle, edge))
-    edge, face, angle = edge[turn], order[turn] // 3, angle[turn]
+    edge, face, angle = edge[turn], face[turn], angle[turn]
     after = np.arange(len(edge)) + 1
     last = start + count - 1
     after[last] = start
@@ -70,15 +74,6 @@ def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
     once[last[count == 2]] = False  # two triangles are one pair
     table = pd.DataFrame({"edge": edge, "first": face, "second": second, "dihedral": between})
     return table[once].reset_index(drop=True)
-
-
-def _frames(P: Floats, sides: Ints) -> tuple[Floats, Floats]:
-    """Unit vectors (k,3) of sides 3 f + j: into the triangle, across its edge j; and its normal."""
-    face, side = sides // 3, sides % 3
-    along = edge_vectors(P)[face, side]
-    normal = area_vectors(P)[face]
-    inward = np.cross(normal, along)
-    return tuple(v / np.maximum(np.linalg.norm(v, axis=1), 1e-300)[:, None] for v in (inward, normal))
 
 
 def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple[int, Floats]]:

@@ -85,12 +85,12 @@ class Panels:
     @property
     def largest(self) -> pd.Series:
         """The row of the panel with the largest area."""
-        return self.panels.iloc[int(self.panels["area"].to_numpy().argmax())]
+        return self.panels.iloc[self.panels["area"].argmax()]
 
     @property
     def smallest(self) -> pd.Series:
         """The row of the panel with the smallest area."""
-        return self.panels.iloc[int(self.panels["area"].to_numpy().argmin())]
+        return self.panels.iloc[self.panels["area"].argmin()]
 
     @property
     def edge_totals(self) -> pd.DataFrame:
@@ -217,17 +217,9 @@ def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, o
 def _family_table(table: pd.DataFrame) -> pd.DataFrame:
     groups = table.groupby("family")
     least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()
-    middle = 0.5 * (least + most)
-    return pd.DataFrame(
-        {
-            "family": least.index,
-            "count": groups.size().to_numpy(),
-            "mirrored": groups["mirrored"].sum().to_numpy(),
-            **{name: middle[name].to_numpy() for name in "abc"},
-            "spread": (most - least).max(axis=1).to_numpy(),
-            "area": groups["area"].sum().to_numpy(),
-        }
-    )
+    counts = pd.DataFrame({"count": groups.size(), "mirrored": groups["mirrored"].sum()})
+    spread, area = (most - least).max(axis=1), groups["area"].sum()
+    return counts.join(0.5 * (least + most)).assign(spread=spread, area=area).reset_index()
 
 
 def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:

@@ -1,10 +1,9 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
 ``plan`` holds Plan, ``parts`` dividers, holes, patches and cables; ``build`` makes the Surface from the
-``draft`` (``lines``, their ``arrangement``, ``edges``), its ``areas`` and ``heights``, by ``curves`` and
-``meshing``.
-``drawing`` reads CAD files (``strokes``, joined to ``paths``), ``proposal`` chooses what they do not say.
-May import ``io`` and the rooms below it.
+``draft`` (``lines``, their ``arrangement``, ``edges``) and its ``walls``, by ``curves`` and ``meshing``.
+``drawing`` reads CAD files (``strokes`` on ``layers``, joined to ``paths``), ``proposal`` chooses what they
+do not say. May import ``io`` and the rooms below it.
 """
 
 from ..curves.curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline

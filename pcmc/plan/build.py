@@ -21,7 +21,7 @@ from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
 from .draft import Draft, drafted
-from .edges import HELD, NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
+from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
 from .lines import SNAP, Kind, Line
 from .parts import PatchSpec, PlanData
 from .walls import Roof, rooms_of, upright_planes, walls_of
@@ -91,7 +91,7 @@ def build_surface(plan: PlanData) -> Surface:
 def _supports(draft: Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
-    fixed[draft.edges.vertices("fixed", HELD)] = True
+    fixed[draft.edges.vertices("fixed", "held")] = True
     sliding[draft.edges.vertices("sliding")] = True
     for chain in draft.drawn.chains:
         if draft.lines[chain.line].kind is Kind.SUPPORT:
@@ -264,7 +264,7 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
     """
     curves = []
     supports = [Line("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
-    fixed = dict(zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", HELD), strict=True))
+    fixed = dict(zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", "held"), strict=True))
     for chain in draft.drawn.chains:
         line = draft.lines[chain.line]
         if line.kind is Kind.DIVIDER:

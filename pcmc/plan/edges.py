@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,8 +20,6 @@ from .arrangement import Arrangement
 from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData, cable_label
 
-MIRROR, HELD = "mirror", "held"
-STATES = (*EDGES, MIRROR, HELD)  # of an edge of the boundary; held is a free one along a support
 ON_MIRROR = 1e-9  # of the plan's size: a boundary this near to a mirror is on it
 NONE = -1  # the cable of an edge without one
 
@@ -31,7 +30,7 @@ class Boundary:
 
     ends: Ints  # (e,2) vertices; each line runs from edge to edge and returns to its first vertex
     line: Ints  # (e,) the number of the line
-    state: Ints  # (e,) index into ``STATES``
+    state: Any  # (e,) one of EDGES, "mirror", or "held": a free one along a support
     cable: Ints  # (e,) index into ``cables``, -1 for none
     cables: tuple[
         tuple[float, str], ...
@@ -39,7 +38,7 @@ class Boundary:
 
     def among(self, *states: str) -> Bools:
         """(e,) the edges in any of these states."""
-        return np.isin(self.state, [STATES.index(state) for state in states])
+        return np.isin(self.state, states)
 
     def vertices(self, *states: str) -> Ints:
         """The ends of the edges in any of these states."""
@@ -56,7 +55,7 @@ def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], dr
     ends = np.concatenate([chain.edges for chain in chains])
     line = np.repeat([chain.line for chain in chains], [len(chain.edges) for chain in chains])
     parts = [(plan.edge, plan.cable), *((hole.edge, hole.cable) for hole in plan.holes)]
-    state = np.array([STATES.index(edge) for edge, _ in parts])[line]
+    state = np.array([edge for edge, _ in parts], dtype="<U8")[line]
     cables = [(tension, "") for _, tension in parts if tension is not None]
     with_cable = np.array([tension is not None for _, tension in parts])
     cable = np.where(with_cable, np.cumsum(with_cable) - 1, NONE)[line]
@@ -66,18 +65,18 @@ def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], dr
             name = cable_label(part, number)
             problem = f"{name} is on no edge of the outline or of a hole; draw it along one"
             raise PlanError(problem, what=name)
-        state[along], cable[along] = STATES.index("cable"), len(cables)
+        state[along], cable[along] = "cable", len(cables)
         cables.append((part.tension, part.name))
     for support in on_edge:  # a held stretch needs no cable
         along = _along(support, drawn.points, ends, SNAP * plan.edge_length)
-        loose = along & np.isin(state, [STATES.index("free"), STATES.index("cable")])
-        state[along & ~loose], state[loose], cable[along] = STATES.index("fixed"), STATES.index(HELD), NONE
+        state[along] = np.where(np.isin(state[along], ["free", "cable"]), "held", "fixed")
+        cable[along] = NONE
     for number, distance in enumerate(_mirror_distances(plan, drawn.points), start=1):
         along = (distance == 0.0)[ends].all(axis=1)
         if not along.any():
             problem = f"mirror {number} is no straight edge of the outline; draw it from corner to corner"
             raise PlanError(problem, what=f"mirror {number}")
-        state[along], cable[along] = STATES.index(MIRROR), NONE
+        state[along], cable[along] = "mirror", NONE
     return Boundary(ends, line, state, cable, tuple(cables))
 
 
@@ -201,7 +200,7 @@ def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bo
         if known.any():
             period = float(lengths.sum())
             heights[vertices] += np.interp(at, at[known], change[vertices[known]], period=period)
-    heights[np.setdiff1d(edges.vertices(MIRROR), edges.vertices(*EDGES, HELD))] = np.nan
+    heights[np.setdiff1d(edges.vertices("mirror"), edges.vertices(*EDGES, "held"))] = np.nan
     return heights
 
 

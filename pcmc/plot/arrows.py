@@ -13,10 +13,9 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate.reactions import support_forces
 from ..surface import Surface
-from .figure import INK, SMALL, TEXT, Image, Path, finish
-from .pictures import DOTS_FROM, EDGES_FROM, ViewName, fit_frames, frame_axes, frames_of
-from .raster import paint
-from .scene import mean_edge, scene, view_of
+from .figure import INK, SMALL, Image, Path
+from .pictures import ViewName, compose
+from .scene import Drawing, view_of
 
 ARROW, AT_POINTS = "#B2182B", "#2166AC"
 
@@ -33,10 +32,8 @@ def vectors(
     points: npt.ArrayLike | None = None,
     points_label: str = "",
     title: str = "",
-    supports: bool = True,
-    edges: bool | None = None,
     width: int = 900,
-    renderer: str = "auto",
+    **options: Any,
 ) -> Image:
     """Vectors at the vertices (a mode, the reactions, the forces) as arrows on the surface.
 
@@ -48,7 +45,7 @@ def vectors(
     label : the unit, beside an arrow of round length that shows the scale.
     points, points_label : (n,3) vectors of another unit, such as forces at points beside forces per length,
         drawn in blue with a scale of their own; all of them are drawn.
-    view, title, supports, edges, width, renderer : as in ``draw``.
+    view, title, width, options : as in ``draw``; options are supports, edges, renderer.
     """
     seen, fields = view_of(surface, view), []
     for what, values, unit, color in (
@@ -62,29 +59,22 @@ def vectors(
             fields.append((arrows, length * surface.size / longest, longest, unit, color))
     at = seen.project(surface.vertices)
     tips = [at + stretch * seen.project(arrows) for arrows, stretch, *_ in fields]
-    (frame,) = frames_of([np.concatenate([at, *tips])], 1, width)
-    spacing = mean_edge(surface) * frame.scale
-    dotted, meshed = supports and spacing >= DOTS_FROM, spacing >= EDGES_FROM if edges is None else edges
-    painted = scene(surface, seen, None, supports=dotted, edges=meshed)
-    figure, (axes,) = frame_axes([frame], 1, width)
-    axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
-    if label or points_label:
-        figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
-    fit_frames(figure, [axes], [frame], 1)
-    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size, renderer))
-    for k, ((arrows, stretch, longest, unit, color), tip) in enumerate(zip(fields, tips, strict=True)):
-        size = np.linalg.norm(arrows, axis=1)
-        chosen = _thinned(at, size, most if color == ARROW else surface.n)
-        in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
-        heads = {"headwidth": 4.0, "headlength": 5.0, "headaxislength": 4.5}
-        arrow = [*at[chosen].T, *(tip - at)[chosen].T]
-        quiver = axes.quiver(*arrow, color=color, width=2.2 / width, **in_plane, **heads)
-        if unit:
-            rounded, middle = float(f"{longest:.1g}"), 0.5 * axes.get_position().y0
-            look = {"labelpos": "E", "fontproperties": {"size": SMALL}, "labelcolor": INK}
-            place, text = (2 * k + 1) / (2 * len(fields)), f"{rounded:g} {unit}"
-            axes.quiverkey(quiver, place, middle, rounded * stretch, text, coordinates="figure", **look)
-    return finish(figure, path)
+
+    def add_arrows(axes: Any) -> None:
+        for k, ((arrows, stretch, longest, unit, color), tip) in enumerate(zip(fields, tips, strict=True)):
+            chosen = _thinned(at, np.linalg.norm(arrows, axis=1), most if color == ARROW else surface.n)
+            in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
+            heads = {"headwidth": 4.0, "headlength": 5.0, "headaxislength": 4.5}
+            arrow = [*at[chosen].T, *(tip - at)[chosen].T]
+            quiver = axes.quiver(*arrow, color=color, width=2.2 / width, **in_plane, **heads)
+            if unit:  # an arrow at the foot tells the scale
+                rounded, middle = float(f"{longest:.1g}"), 0.5 * axes.get_position().y0
+                look = {"labelpos": "E", "fontproperties": {"size": SMALL}, "labelcolor": INK}
+                place, text = (2 * k + 1) / (2 * len(fields)), f"{rounded:g} {unit}"
+                axes.quiverkey(quiver, place, middle, rounded * stretch, text, coordinates="figure", **look)
+
+    drawing, foot = Drawing(surface, seen, title, None, None, None), " " if label or points_label else ""
+    return compose([drawing], path, 1, width, around=tips, foot=foot, overlay=add_arrows, **options)
 
 
 def reactions(

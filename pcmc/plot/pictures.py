@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -86,18 +86,10 @@ def panel(
     columns: int | None = None,
     views: ViewName | Sequence[ViewName] = "diagonal",
     scalars: Sequence[npt.ArrayLike | None] | None = None,
-    label: str = "",
-    limits: tuple[float, float] | None = None,
-    cmap: str | None = None,
-    supports: bool = True,
-    edges: bool | None = None,
     numbers: Sequence[npt.ArrayLike | None] | None = None,
-    form: str = ".3f",
-    legend: bool = False,
     patches: Sequence[str] | Sequence[Sequence[str] | None] | None = None,
-    one_scale: bool = True,
     width: int = 1200,
-    renderer: str = "auto",
+    **options: Any,
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
@@ -107,12 +99,43 @@ def panel(
     """
     drawings = _drawings(surfaces, views, titles, scalars, numbers, patches)
     columns = min(columns or (3 if len(drawings) not in (1, 2, 4) else 2), len(drawings))
-    frames = frames_of([drawing.points(one_scale) for drawing in drawings], columns, width, one_scale)
+    return compose(drawings, path, columns, width, **options)
+
+
+def compose(
+    drawings: Sequence[Drawing],
+    path: Path | None,
+    columns: int,
+    width: int,
+    *,
+    label: str = "",
+    limits: tuple[float, float] | None = None,
+    cmap: str | None = None,
+    supports: bool = True,
+    edges: bool | None = None,
+    form: str = ".3f",
+    legend: bool = False,
+    one_scale: bool = True,
+    renderer: str = "auto",
+    around: Sequence[Floats] = (),
+    foot: str = "",
+    overlay: Callable[[Any], None] | None = None,
+) -> Image:
+    """The picture of all drawings; the options are those of ``draw`` and ``panel``.
+
+    Points ``around`` (k,2) have a place in it, too, as has a text at its ``foot``; ``overlay`` draws on the
+    last of the axes.
+    """
+    points = [np.concatenate([drawing.points(one_scale), *around]) for drawing in drawings]
+    frames = frames_of(points, columns, width, one_scale)
     edge = [mean_edge(d.surface) * f.scale for d, f in zip(drawings, frames, strict=True)]
     dotted = [supports and length >= DOTS_FROM for length in edge]
     colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
-    figure, axes = frame_axes(frames, columns, width)
+    heights = [frame.size[1] for frame in frames[::columns]]
+    figure = new(width, sum(heights) + 100.0, pad=0.0)
+    axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):
+        place.set_axis_off()
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
     if colors is not None:
         colors.bar(figure, axes, label)
@@ -125,26 +148,23 @@ def panel(
         images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
     if legend:
         add_legend(figure, list(zip(drawings, dotted, images, strict=True)))
-    fit_frames(figure, axes, frames, columns)
+    if foot:
+        figure.supxlabel(foot, fontsize=2.0 * SMALL)
+    first = zip(axes[::columns], frames[::columns], strict=True)
+    fit_height(figure, {one: frame.size[1] / frame.size[0] for one, frame in first})
     for drawing, frame, image, place in zip(drawings, frames, images, axes, strict=True):
         frame.show(place, image)
         if drawing.numbers is not None:
             _print_numbers(place, drawing.surface, drawing.view, drawing.numbers, form)
+    if overlay is not None:
+        overlay(axes[-1])
     return finish(figure, path)
 
 
 def families(schedule: Panels, path: Path | None = None, **options: Any) -> Image:
-    """The panels of a roof, each in the colour of its family.
+    """The panels of a roof that ``pcmc.panels`` returns, each in the colour of its family.
 
-    Parameters
-    ----------
-    schedule : what ``pcmc.panels`` returns.
-    path : PNG file to write, or None.
-    options : as in ``draw``, such as ``view`` and ``width``.
-
-    Returns
-    -------
-    (h,w,3) uint8 array, the picture.
+    ``options`` are as in ``draw``, such as ``view`` and ``width``.
 
     >>> from pcmc import Patch, Surface, panels
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
@@ -228,22 +248,6 @@ def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: boo
             low = lows[k] - np.array([beside, MARGIN / scales[k]])
             frames.append(Frame((wide, high), low, float(scales[k])))
     return frames
-
-
-def frame_axes(frames: Sequence[Frame], columns: int, width: int) -> tuple[Any, list[Any]]:
-    """A figure with axes for the frames, without ticks and lines."""
-    heights = [frame.size[1] for frame in frames[::columns]]
-    figure = new(width, sum(heights) + 100.0, pad=0.0)
-    axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
-    for one in axes:
-        one.set_axis_off()
-    return figure, axes
-
-
-def fit_frames(figure: Any, axes: Sequence[Any], frames: Sequence[Frame], columns: int) -> None:
-    """Give the figure the height that its frames need."""
-    first = zip(axes[::columns], frames[::columns], strict=True)
-    fit_height(figure, {one: frame.size[1] / frame.size[0] for one, frame in first})
 
 
 def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, form: str) -> None:

@@ -25,10 +25,20 @@ from .cache import folder as cache_folder
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, load, project_of, read_data, with_rise
 from .keys import json_schema, reference, sections
-from .outcome import MOST_CHECKED, Outcome
-from .output import OnStep, check_outputs, paint, schedule_jobs, write_all
+from .outcome import MOST_CHECKED, OnStep, Outcome
 from .planning import drawing_reference, project_text, proposal_text
-from .running import designed, opened, run, run_project, surface_files, vertex_fields
+from .running import (
+    check_outputs,
+    designed,
+    opened,
+    paint,
+    run,
+    run_project,
+    schedule_jobs,
+    surface_files,
+    vertex_fields,
+    write_all,
+)
 from .settings import (
     AccuracyWanted,
     Output,

@@ -33,18 +33,7 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = [
-    "plan",
-    "mesh",
-    "method",
-    "options",
-    "wanted",
-    "search",
-    "remeshing",
-    "targets",
-    "vary",
-    "target_tolerance",
-]
+PARTS = ("plan", "mesh", "method", "options", "wanted", "search", "remeshing", "targets", "vary")
 NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a result
 
 
@@ -135,6 +124,7 @@ def _path(project: Project) -> Path | None:
     try:
         for name in PARTS:
             sha.update(_bytes(getattr(project, name)))
+        sha.update(_bytes(project.target_tolerance))
         sha.update(_bytes(project.target_tolerance))
         if project.mesh is not None:
             sha.update(read_bytes(project.path.parent / project.mesh.file))

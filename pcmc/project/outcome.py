@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
@@ -20,23 +20,27 @@ from .settings import Output
 
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
+    from ..certificate.quantities import Figure
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..margins import Margin
     from ..panelling import Panels
-    from ..quantities import Figure
     from ..report import RoofReport
-    from ..structure import StructuralModel
+    from ..structure.model import StructuralModel, Structure
     from ..verification import Theorem
     from .file import Project
-    from .output import OnStep
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 EXTENSIVE = ("area", "volume")  # targets of a part that are not those of the whole
 KEPT = ("certificate", "whole", "figures", "theorem")  # what the files written do not change
+OnStep = Callable[[str], object]  # called with a few words at each step of a project
 Finding = TypeVar("Finding")
+
+
+def ignore(step: str) -> None:
+    """An ``OnStep`` that shows nothing."""
 
 
 class Whole(NamedTuple):
@@ -132,7 +136,7 @@ class Outcome:
     @cached_property
     def figures(self) -> list[Figure]:
         """The key figures of what is shown."""
-        from ..quantities import figures
+        from ..certificate.quantities import figures
 
         return figures(*self.shown)
 
@@ -192,12 +196,9 @@ class Outcome:
         from ..panelling import panels
 
         surface, certificate = self.shown
-        options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
-
-        def sort() -> Panels:
-            return panels(surface, tolerance, **options, anyway=anyway, certificate=certificate)
-
-        return self._once(("panels", tolerance, *options.values()), sort)
+        options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
+        sort = partial(panels, surface, tolerance, **options, certificate=certificate)
+        return self._once(("panels", tolerance, mirror_images, walls), sort)
 
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
@@ -235,11 +236,9 @@ class Outcome:
             "anyway": anyway,
         }
 
-    def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
+    def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
-        surface, certificate = self.shown
-        model = structure.model(surface, anyway, certificate=certificate, units=self.units)
-        return cast("StructuralModel", model)
+        return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
 
     @property
     def mesh_check(self) -> MeshCheck | None:
@@ -286,12 +285,10 @@ class Outcome:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
         from ..margins import margin  # takes long to import
 
-        def find() -> Margin:
-            surface, certificate = self.shown
-            callback = _reporter(f"margin of {what}", progress)
-            return margin(surface, what, corners=self.corners, callback=callback, certificate=certificate)
-
-        return self._once(("margin", what), find)
+        surface, certificate = self.shown
+        callback = _reporter(f"margin of {what}", progress)
+        find = partial(margin, surface, what, callback=callback, certificate=certificate)
+        return self._once(("margin", what), lambda: find(corners=self.corners))
 
     @property
     def margins(self) -> list[Margin]:

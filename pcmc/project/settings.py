@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from .. import io
-from ..accuracy.adaptive import ACCURACY_OF, TRIANGLES
-from ..accuracy.goals import accuracies
+from ..accuracy.adaptive import ACCURACY_OF, TRIANGLES, accuracies
 from ..advice.rises import Rise
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown

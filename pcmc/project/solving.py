@@ -21,8 +21,7 @@ from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .checking import in_file
 from .file import Project
-from .outcome import EXTENSIVE, Outcome
-from .output import OnStep, ignore
+from .outcome import EXTENSIVE, OnStep, Outcome, ignore
 from .settings import AccuracyWanted
 from .start import start_of
 
@@ -179,13 +178,11 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     from ..design import DesignStatus, meet  # needed by projects with targets only
 
     _newton_alone(project, "meet targets")
-    solves, tolerance = count(1), project.target_tolerance
-
-    def callback(row: object) -> None:
-        report(f"meeting the targets: solve {next(solves)}")
-
-    options = dict(project.options) | ({} if tolerance is None else {"tolerance": tolerance})
-    design = meet(surface, project.targets, project.vary, callback=callback, **options)
+    solves, options = count(1), dict(project.options)
+    options["callback"] = lambda row: report(f"meeting the targets: solve {next(solves)}")
+    if project.target_tolerance is not None:
+        options["tolerance"] = project.target_tolerance
+    design = meet(surface, project.targets, project.vary, **options)
     if design.status is DesignStatus.STOPPED:  # by Ctrl-C, which ends the command
         raise KeyboardInterrupt
     return _certified(design.result, report, design)

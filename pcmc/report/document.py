@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from .. import quantities
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
-from ..certificate import Certificate
+from ..certificate import Certificate, quantities
+from ..certificate.quantities import Figure
 from ..certificate.required import certified, warning_mark
 from ..drawings.pdf import register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png
-from ..quantities import Figure
 from ..surface import Surface, expect_surface
 from . import tables
 from .plan import PaperPlan, paper_plan

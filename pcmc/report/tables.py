@@ -11,8 +11,8 @@ import pandas as pd
 
 from ..base.units import Units
 from ..certificate import Certificate
+from ..certificate.quantities import Figure, dimension_of
 from ..panelling import Panels
-from ..quantities import Figure, dimension_of
 from ..surface import Surface
 from .plan import PaperPlan
 

@@ -12,7 +12,7 @@ from ..base import validate
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
-from ..stability.softness import clear_of_zero
+from ..stability.modes import clear_of_zero
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped
 from .state import State

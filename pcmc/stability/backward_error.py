@@ -37,8 +37,6 @@ def backward_error(lower: csc_array, upper: csc_array) -> float:
     exchanges. If it is below the distance of A's spectrum from zero, D has as many negative entries as A has
     negative eigenvalues. Infinite where L or U is not finite.
 
-    Examples
-    --------
     >>> from scipy.sparse.linalg import splu
     >>> def bound(a):
     ...     lu = splu(csc_array([[a, 1.0], [1.0, 0.0]]), "NATURAL", 0.0, options={"SymmetricMode": True})

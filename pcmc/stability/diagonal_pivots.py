@@ -41,12 +41,8 @@ def count_negative(matrix: csc_array, lu: Any, factorise: Callable[[csc_array], 
     [[B, C], [Cᵀ, Σ]], whose Schur complements are A and Σ - CᵀB⁻¹C, takes that back:
     neg A = neg B + neg(Σ - CᵀB⁻¹C) - neg Σ.
 
-    Raises
-    ------
-    SingularMatrix : the inertia cannot be told, also with stronger pivots.
+    SingularMatrix if the inertia cannot be told, also with stronger pivots.
 
-    Examples
-    --------
     >>> from scipy.sparse.linalg import splu
     >>> def factorise(matrix):
     ...     return splu(matrix, "NATURAL", 0.0, options={"SymmetricMode": True})

@@ -1,10 +1,8 @@
 """One equilibrium: a surface at positions X, and all that tells whether it is at rest there and stable.
 
 A P-CMC surface at rest solves r = Bᵀ∇E = 0, with B the basis of the motion space at X. Where rooms prescribe
-volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation.
-
-Solvers, branches, sensitivities and the certificate all read the same values here. Each is computed once,
-when it is first asked for.
+volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation. Each value is
+computed once, when a solver, a branch, a sensitivity or the certificate first asks for it.
 """
 
 from __future__ import annotations
@@ -12,7 +10,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -39,29 +36,14 @@ CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its si
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
-class _Unknowns(NamedTuple):
-    """The pattern of A, and what factorises matrices of this pattern."""
-
-    pattern: Pattern
-    factoriser: Factoriser
-
-
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """The standing part of a surface with its vertices at X, at rest or on the way there.
+    """The standing part of a surface with its vertices at X, at rest or on the way there."""
 
-    Attributes
-    ----------
-    part : what stands; its surface has the tensions and pressures, not the positions.
-    X : (n,3) the positions.
-    backend : of the factorisation; None for the fastest here.
-    least_volume : smaller prescribed volumes count as this large in ``volume_units``, length³.
-    """
-
-    part: StandingPart
-    X: Floats
-    backend: str | None = None
-    least_volume: float = 0.0
+    part: StandingPart  # its surface has the tensions and pressures, not the positions
+    X: Floats  # (n,3)
+    backend: str | None = None  # of the factorisation; None for the fastest here
+    least_volume: float = 0.0  # smaller prescribed volumes count as this large in ``volume_units``, length³
 
     @classmethod
     def of(cls, surface: Surface, backend: str | None = None) -> Equilibrium:
@@ -216,24 +198,19 @@ class Equilibrium:
     # The second variation
 
     @cached_property
-    def unknowns(self) -> _Unknowns:
-        """The pattern of A and its factoriser; they stay while each vertex has as many unknowns."""
-        pattern = hessian_pattern(self.classes, self.space)
-        return _Unknowns(pattern, factoriser(pattern, self.backend, self._strength_units()))
+    def unknowns(self) -> tuple[Pattern, Factoriser]:
+        """The pattern of A and its factoriser; they stay while each vertex has as many unknowns.
 
-    def _strength_units(self) -> Floats | None:
-        """(N,) 1/√α of the tension around each unknown, as powers of two; None if all are of one order.
-
-        Factorised in these units, a patch that pulls far less than another still counts.
+        Where tensions are of different orders, it factorises in units 1/√α of the tension around each
+        unknown, as powers of two: so a patch that pulls far less than another still counts.
         """
-        surface, classes = self.surface, self.classes
-        tension = surface.tensions[np.unique(classes.patch_of_face)]
-        if not len(tension) or tension.min() >= STRONG * tension.max():
-            return None
-        strongest = np.zeros(surface.n)
-        np.maximum.at(strongest, classes.faces, surface.tensions[classes.patch_of_face, None])
-        unknown = np.repeat(strongest, self.space.dimension)
-        return np.asarray(2.0 ** -np.round(0.5 * np.log2(unknown)))
+        pattern, patch = hessian_pattern(self.classes, self.space), self.classes.patch_of_face
+        tension, units = self.surface.tensions[np.unique(patch)], None
+        if len(tension) and tension.min() < STRONG * tension.max():
+            strongest = np.zeros(len(self.X))
+            np.maximum.at(strongest, self.classes.faces, self.surface.tensions[patch, None])
+            units = 2.0 ** -np.round(0.5 * np.log2(np.repeat(strongest, self.space.dimension)))
+        return pattern, factoriser(pattern, self.backend, units)
 
     @cached_property
     def mass(self) -> Floats:
@@ -271,7 +248,7 @@ class Equilibrium:
 
     def matrix(self, hessian: float = 1.0, stiffness: float = 0.0) -> Floats:
         """Values of hessian · A + stiffness · BᵀLB in the pattern."""
-        pattern = self.unknowns.pattern
+        pattern = self.unknowns[0]
         return assemble(self.surface, self.classes, self.space, pattern, self.X, hessian, stiffness)
 
     @cached_property
@@ -291,7 +268,7 @@ class Equilibrium:
         ------
         SingularMatrix : it is singular, also with a little stiffness added.
         """
-        pattern, solver = self.unknowns.pattern, self.unknowns.factoriser
+        pattern, solver = self.unknowns
         for added in (0.0, SOFT) if soften else (0.0,):
             plain = stiffness + added == 0.0
             data = self._plain_matrix if plain else self.matrix(1.0, stiffness + added)
@@ -308,20 +285,13 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class SecondVariation:
-    """A = Bᵀ(∂²E)B of a surface at its positions, factorised, perhaps shifted.
-
-    Attributes
-    ----------
-    of : the surface at its positions.
-    factor : of A + (stiffness + added) BᵀLB, less a shift of its diagonal.
-    stiffness, added : what was asked for, and what was added to a singular matrix.
-    """
+    """A = Bᵀ(∂²E)B of a surface at its positions, factorised, perhaps shifted."""
 
     of: Equilibrium
     pattern: Pattern
-    factor: Factor
-    stiffness: float = 0.0
-    added: float = 0.0
+    factor: Factor  # of A + (stiffness + added) BᵀLB, less a shift of its diagonal
+    stiffness: float = 0.0  # asked for
+    added: float = 0.0  # to a singular matrix
 
     @cached_property
     def negative(self) -> int:
@@ -388,14 +358,8 @@ def morse_index(surface: Surface) -> int:
     """Number of independent motions that lower the energy of a surface at rest to second order.
 
     Counted in the motion space, by inertia; rigid motions that no support resists are left out. Where rooms
-    prescribe volumes, only motions that keep them count.
+    prescribe volumes, only motions that keep them count. SingularMatrix if the inertia cannot be counted.
 
-    Raises
-    ------
-    SingularMatrix : the second variation has no inertia that can be counted.
-
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

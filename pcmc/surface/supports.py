@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
 from ..curves.guides import Circle, Guide, Line, Plane
@@ -91,6 +92,86 @@ class Admissible(NamedTuple):
         for guide, mask in lines:
             freedom[mask], axis[mask] = 1, guide.directions(X[mask])
         return cls(read_only(freedom), read_only(axis))
+
+
+class Supported:
+    """A surface as its supports see it: which vertices they hold, and how these may move."""
+
+    vertices: Floats
+    fixed: Bools
+    on_plane: Bools
+    plane: Plane
+    on_line: tuple[tuple[Guide, Bools], ...]
+    on_planes: tuple[tuple[Plane, Bools], ...]
+    given_supports: Supports
+
+    @cached_property
+    def meeting_lines(self) -> tuple[tuple[Guide, Bools], ...]:
+        """The lines of ``on_line`` that were not given: there two planes meet."""
+        return self.on_line[len(self.given_supports.on_line) :]
+
+    @cached_array
+    def pinned(self) -> Bools:
+        """(n,) vertices that cannot move, or only along a line that was given.
+
+        These are the ``fixed`` ones but for those that slide along the line where two planes meet.
+        """
+        return self.fixed & ~members(self.meeting_lines, len(self.fixed))
+
+    @cached_array
+    def on_ground(self) -> Bools:
+        """(n,) vertices that slide on Π, also those on another plane, which slide along the common line."""
+        return self.on_plane | (members(self.meeting_lines, len(self.fixed)) & self.given_supports.on_plane)
+
+    @cached_property
+    def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
+        """The planes that vertices slide on, Π first, each with the (n,) mask of those on it alone."""
+        others = ((plane, read_only(mask & ~self.fixed)) for plane, mask in self.on_planes)
+        return tuple((p, mask) for p, mask in ((self.plane, self.on_plane), *others) if mask.any())
+
+    @cached_array
+    def held(self) -> Bools:
+        """(n,) vertices that some support holds: fixed, or sliding on a plane, line or circle."""
+        return self.fixed | self.on_plane | members(self.on_planes, len(self.fixed))
+
+    @property
+    def free(self) -> Bools:
+        """(n,) vertices that no support holds at all."""
+        return ~self.held
+
+    @property
+    def on_circle(self) -> tuple[tuple[Circle, Bools], ...]:
+        """The part of ``on_line`` that is round."""
+        return tuple((line, along) for line, along in self.on_line if isinstance(line, Circle))
+
+    @cached_property
+    def admissible(self) -> Admissible:
+        """The directions in which the supports let each vertex move, where it is now."""
+        return Admissible.of(self.fixed, self.sliding, self.on_line, self.vertices)
+
+    def admissible_at(self, X: Floats) -> Admissible:
+        """The same with the vertices at X (n,3): only along circles do the directions change."""
+        return Admissible.of(self.fixed, self.sliding, self.on_line, X) if self.on_circle else self.admissible
+
+    @cached_array
+    def support_columns(self) -> Bools:
+        """(n,c) whether a vertex is fixed, slides on Π, on each of ``on_planes``, along each given line."""
+        given, others = self.given_supports, (*self.on_planes, *self.given_supports.on_line)
+        return np.stack([*given.fixed_and_sliding(), *(mask for _, mask in others)], axis=1)
+
+    def onto_supports(self, X: Floats) -> Floats:
+        """X (n,3) with fixed vertices where they are, and sliding ones put on their plane, line or circle.
+
+        >>> from pcmc import Patch, Surface
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=[0], on_plane=[1])
+        >>> flat.onto_supports(flat.vertices + 1.0).tolist()
+        [[0.0, 0.0, 0.0], [2.0, 1.0, 0.0], [1.0, 2.0, 1.0]]
+        """
+        put = np.where(self.fixed[:, None], self.vertices, X)
+        for support, sliding in (*self.on_line, *self.sliding):
+            put[sliding] = support.nearest(X[sliding])
+        return put
 
 
 def apply_supports(surface: Any, vectors: Floats, X: Floats | None = None) -> Floats:

@@ -14,23 +14,13 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
-from ..curves.guides import Circle, Guide, Plane
-from . import checks
+from ..curves.guides import Guide, Plane
+from . import checks, supports
 from .checked import checked_parts
 from .geometry import FAR, bounding_size
 from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
 from .summary import summary
-from .supports import (
-    Admissible,
-    Supports,
-    check_on,
-    checked_lines,
-    common_point,
-    members,
-    mirror_edges,
-    uncancelled_pressures,
-)
 from .topology import Topology, topology
 from .values import wall_changes, with_values
 from .walls import wall_patches
@@ -43,20 +33,23 @@ FIELDS = (*PARTS, "given_supports")
 GROUND = Plane()
 
 
-def expect_surface(value: object) -> None:
-    """Refuse anything but a Surface.
+def _of_patches(field: str) -> cached_property[Any]:
+    """The values of a field of the patches of a Surface, as a cached (k,) array."""
 
-    >>> expect_surface(None)
-    Traceback (most recent call last):
-    ...
-    pcmc.base.errors.SurfaceError: surface: expected a Surface, found 'NoneType'
-    """
+    def values(surface: Surface) -> Any:
+        return np.array([getattr(patch, field) for patch in surface.patches])
+
+    return cached_array(values)
+
+
+def expect_surface(value: object) -> None:
+    """Refuse anything but a Surface."""
     if not isinstance(value, Surface):
         validate.refuse("surface", type(value).__name__, "a Surface", error=SurfaceError)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Surface:
+class Surface(supports.Supported):
     """A triangle mesh of several patches, with its supports.
 
     Parameters
@@ -69,11 +62,11 @@ class Surface:
     on_plane : index array or (n,) bool mask: vertices that slide on ``plane`` (fixed wins).
     plane : Π.
     on_line : mapping from a Line or a Circle to an index array or (n,) mask: vertices that slide along it
-        and are fixed but for that. On a straight or round boundary the end of a junction can slide so; let
-        the other vertices of the boundary slide too, but for its corners, so that they can make room.
+        and are fixed but for that, such as the end of a junction on a straight or round boundary; let the
+        other vertices of that boundary slide too, but for its corners, so that they can make room.
     on_planes : mapping from a Plane to an index array or (n,) mask: vertices that slide on a plane other than
-        Π. Those on two planes slide along the line where these meet; those on three are fixed. At a plane
-        with ``mirror=True`` the surface goes on as its mirror image.
+        Π. Those on two slide along their common line; those on three are fixed. At a plane with
+        ``mirror=True`` the surface goes on as its mirror image.
     cables : sequence of Cable, names unique: edges with a line tension.
     rooms : sequence of Room, names unique: volumes that are prescribed instead of pressures.
     curves : sequence of HeldCurve: the curves that fixed vertices were drawn on. The new vertices of finer
@@ -91,8 +84,6 @@ class Surface:
     SurfaceError
         Naming the first offending index, for arrays that are not such a mesh.
 
-    Examples
-    --------
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
     >>> square.n, square.m, square.size
@@ -111,7 +102,7 @@ class Surface:
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
     curves: tuple[HeldCurve, ...] = ()
-    given_supports: Supports = field(init=False, repr=False)
+    given_supports: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         vars(self).update(checked_parts({name: getattr(self, name) for name in PARTS}))
@@ -150,17 +141,17 @@ class Surface:
 
     def _uncancelled(self, pressures: Floats) -> Floats:
         masks = [self.fixed | self.on_plane, *(mask for _, mask in self.on_planes)]
-        return uncancelled_pressures(self.topology, pressures[self.patch_of_face], masks)
+        return supports.uncancelled_pressures(self.topology, pressures[self.patch_of_face], masks)
 
     @cached_array
     def origin(self) -> Floats:
         """(3,) the point that volumes are seen from: that of Π, or one near a surface far from it.
 
-        Forces do not change with it as long as the pressures cancel along all edges that are not held; where
-        they do not cancel, the origin stays the point of Π. Far from that point, as in survey coordinates,
-        volumes would lose their digits. There the origin is the point of Π below the middle of the surface;
-        or the middle itself, if that is far above Π and nothing slides there. It is moved along Π to lie on
-        as many of the other planes as possible: these then add nothing to volumes (``flat_pieces``).
+        Forces do not change with it where the pressures cancel along all edges that are not held; elsewhere
+        it stays the point of Π. Far from that, as in survey coordinates, volumes would lose digits: there it
+        is the point of Π below the middle of the surface, or the middle itself, if that is far above Π and
+        nothing slides there. It is moved along Π to lie on as many of the other planes as possible: these
+        then add nothing to volumes (``flat_pieces``).
         """
         point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
         if self.uncancelled.any():
@@ -169,7 +160,12 @@ class Surface:
             low = abs(self.plane.height(middle)) <= FAR * self.size
             point = self.plane.nearest(middle) if low or self.given_supports.on_plane.any() else middle
         planes = [self.plane, *(plane for plane, _ in self.on_planes)]
-        return common_point(point, planes) if self.on_planes else point
+        return supports.common_point(point, planes) if self.on_planes else point
+
+    @cached_array
+    def mirror_edge(self) -> Bools:
+        """(e,) edges of the boundary in a mirror plane, where the surface goes on behind it."""
+        return supports.mirror_edges(self.on_planes, self.topology)
 
     @cached_property
     def edges_on_curves(self) -> EdgesOnCurves:
@@ -187,65 +183,6 @@ class Surface:
         """
         return followed(self.curves, self.vertices, self.size)
 
-    @cached_array
-    def mirror_edge(self) -> Bools:
-        """(e,) edges of the boundary in a mirror plane, where the surface goes on behind it."""
-        return mirror_edges(self.on_planes, self.topology)
-
-    @cached_property
-    def meeting_lines(self) -> tuple[tuple[Guide, Bools], ...]:
-        """The lines of ``on_line`` that were not given: there two planes meet."""
-        return self.on_line[len(self.given_supports.on_line) :]
-
-    @cached_array
-    def pinned(self) -> Bools:
-        """(n,) vertices that cannot move, or only along a line that was given.
-
-        These are the ``fixed`` ones but for those that slide along the line where two planes meet.
-        """
-        return self.fixed & ~members(self.meeting_lines, self.n)
-
-    @cached_array
-    def on_ground(self) -> Bools:
-        """(n,) vertices that slide on Π, also those on another plane, which slide along the common line."""
-        return self.on_plane | (members(self.meeting_lines, self.n) & self.given_supports.on_plane)
-
-    @cached_property
-    def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
-        """The planes that vertices slide on, Π first, each with the (n,) mask of those on it alone."""
-        others = ((plane, read_only(mask & ~self.fixed)) for plane, mask in self.on_planes)
-        return tuple((p, mask) for p, mask in ((self.plane, self.on_plane), *others) if mask.any())
-
-    @cached_array
-    def held(self) -> Bools:
-        """(n,) vertices that some support holds: fixed, or sliding on a plane, line or circle."""
-        return self.fixed | self.on_plane | members(self.on_planes, self.n)
-
-    @property
-    def free(self) -> Bools:
-        """(n,) vertices that no support holds at all."""
-        return ~self.held
-
-    @property
-    def on_circle(self) -> tuple[tuple[Circle, Bools], ...]:
-        """The part of ``on_line`` that is round."""
-        return tuple((line, along) for line, along in self.on_line if isinstance(line, Circle))
-
-    @cached_property
-    def admissible(self) -> Admissible:
-        """The directions in which the supports let each vertex move, where it is now."""
-        return Admissible.of(self.fixed, self.sliding, self.on_line, self.vertices)
-
-    def admissible_at(self, X: Floats) -> Admissible:
-        """The same with the vertices at X (n,3): only along circles do the directions change."""
-        return Admissible.of(self.fixed, self.sliding, self.on_line, X) if self.on_circle else self.admissible
-
-    @cached_array
-    def support_columns(self) -> Bools:
-        """(n,c) whether a vertex is fixed, slides on Π, on each of ``on_planes``, along each given line."""
-        given, others = self.given_supports, (*self.on_planes, *self.given_supports.on_line)
-        return np.stack([*given.fixed_and_sliding(), *(mask for _, mask in others)], axis=1)
-
     def with_mesh(self, columns: Bools, **changes: Any) -> Surface:
         """``rebuilt`` on another mesh, with its ``support_columns`` (n,c)."""
         fixed, sliding, *others = np.ascontiguousarray(columns.T)
@@ -253,11 +190,6 @@ class Surface:
         on_planes = [(plane, mask) for (plane, _), mask in zip(self.on_planes, others[:split], strict=True)]
         on_line = [(line, mask) for (line, _), mask in zip(lines, others[split:], strict=True)]
         return self.rebuilt(fixed=fixed, on_plane=sliding, on_planes=on_planes, on_line=on_line, **changes)
-
-    @cached_array
-    def auxiliary(self) -> Bools:
-        """(k,) bool: the patches without pressure and the declared walls, which solvers let pinch."""
-        return np.array([p.auxiliary for p in self.patches])
 
     @cached_array
     def walls(self) -> Bools:
@@ -269,30 +201,12 @@ class Surface:
         """(k,) bool: the patches that are no walls."""
         return ~self.walls
 
-    @cached_array
-    def tensions(self) -> Floats:
-        """(k,) tension α of each patch."""
-        return np.array([p.tension for p in self.patches])
-
-    @cached_array
-    def pressures(self) -> Floats:
-        """(k,) pressure p of each patch, that of the air: snow is not taken off."""
-        return np.array([p.pressure for p in self.patches])
-
-    @cached_array
-    def snows(self) -> Floats:
-        """(k,) snow s on each patch, force per area of the plan."""
-        return np.array([p.snow for p in self.patches])
-
-    @cached_array
-    def net_pressures(self) -> Floats:
-        """(k,) p - s of each patch: the pressure in the energy."""
-        return np.array([p.net_pressure for p in self.patches])
-
-    @cached_array
-    def weights(self) -> Floats:
-        """(k,) weight w of each patch, force/area."""
-        return np.array([p.weight for p in self.patches])
+    auxiliary = _of_patches("auxiliary")  # (k,) bool: declared as walls, or without pressure: these may pinch
+    tensions = _of_patches("tension")  # (k,) α
+    pressures = _of_patches("pressure")  # (k,) p, that of the air: snow is not taken off
+    snows = _of_patches("snow")  # (k,) s, force per area of the plan
+    net_pressures = _of_patches("net_pressure")  # (k,) p - s, the pressure in the energy
+    weights = _of_patches("weight")  # (k,) w, force/area
 
     @cached_property
     def cable_edges(self) -> CableEdges:
@@ -323,36 +237,16 @@ class Surface:
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
-        check_on(((self.plane, self.on_plane), *self.on_planes, *self.on_line), X, self.size)
+        supports.check_on(((self.plane, self.on_plane), *self.on_planes, *self.on_line), X, self.size)
         return self._with(vertices=read_only(X))
-
-    def onto_supports(self, X: Floats) -> Floats:
-        """X (n,3) with fixed vertices where they are, and sliding ones put on their plane, line or circle.
-
-        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-        >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=[0], on_plane=[1])
-        >>> flat.onto_supports(flat.vertices + 1.0).tolist()
-        [[0.0, 0.0, 0.0], [2.0, 1.0, 0.0], [1.0, 2.0, 1.0]]
-        """
-        put = np.where(self.fixed[:, None], self.vertices, X)
-        for support, sliding in (*self.on_line, *self.sliding):
-            put[sliding] = support.nearest(X[sliding])
-        return put
 
     def rebuilt(self, **changes: Any) -> Surface:
         """The surface with other parts, checked anew; all others as they were given to this one.
 
         Parts with an entry per vertex (``fixed``, ``on_plane``, ``on_line``, ``on_planes``, ``cables``,
         ``curves``) must be among the changes where the vertices are others. Curves stay along the edges that
-        stay fixed. Of a surface that nothing holds the user was
-        warned when it was made, and not again.
+        stay fixed. Of a surface that nothing holds the user was warned when it was made, and not again.
 
-        Raises
-        ------
-        SurfaceError : as for ``Surface``.
-
-        Examples
-        --------
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=range(3))
         >>> over = flat.rebuilt(faces=[[0, 2, 1]])
@@ -367,7 +261,7 @@ class Surface:
                 raise SurfaceError(text, what="curves", found=len(X), expected=self.n)
             held, edges = followed(self.curves, X, bounding_size(X)), self.topology.edges
             fixed = checks.mask(given["fixed"], self.n, "fixed")
-            fixed &= ~members(checked_lines(given["on_line"], X), self.n)
+            fixed &= ~supports.members(supports.checked_lines(given["on_line"], X), self.n)
             stay = np.all(fixed[edges], axis=1)
             given["curves"] = EdgesOnCurves.of(held, self.topology)[stay].joined(edges[stay])
         made = object.__new__(Surface)
@@ -398,8 +292,6 @@ class Surface:
         ------
         SurfaceError : an edge under one of the ``snows`` is free; see ``with_snow``.
 
-        Examples
-        --------
         >>> from pcmc.plan import Divider, Plan
         >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=1.0,
         ...             patches={"west": {"tension": 4.0}, "east": {"tension": 4.0}}).surface()
@@ -429,17 +321,15 @@ class Surface:
         snowed = bool(snows) and not np.array_equal(changed.snows, self.snows)
         return changed.with_held_snow() if snowed else changed
 
-    def __repr__(self) -> str:
-        """Size, patches, walls and supports, a line each."""
-        return summary(self)
+    __repr__ = summary
 
     def with_snow(self, snow: float, patches: Iterable[str] | None = None) -> Surface:
         """The same surface under snow, which acts as a lower pressure, p - s for p.
 
-        A load s on the plan area has the potential s ∫ z dA_plan = s V, V the volume over Π; so E changes by
-        s V, as it does when the pressure falls by s. This holds where the boundary of the patches is held,
-        lies on Π, or meets other patches under the same snow: at a free edge V is that of cones to Π's point,
-        whose sides would carry snow, too.
+        A load s on the plan area has the potential s ∫ z dA_plan = s V, V the volume over Π, as a pressure
+        lower by s has. This holds where the boundary of the patches is held, lies on Π, or meets other
+        patches under the same snow: at a free edge V is that of cones to Π's point, whose sides would carry
+        snow, too.
 
         Parameters
         ----------
@@ -449,11 +339,8 @@ class Surface:
         Raises
         ------
         SurfaceError
-            Where an edge of these patches is free. There a weight per area of the patch itself can stand for
-            snow: ``retensioned(weights={"roof": s})``.
+            Where an edge of these patches is free; there ``retensioned(weights={"roof": s})`` can do.
 
-        Examples
-        --------
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         >>> roof = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0, 1.0)], fixed=range(3))
         >>> snowy = roof.with_snow(0.25)
@@ -480,13 +367,11 @@ class Surface:
             checks.refuse_snow(most.snow, most.name, len(edges), topo.edges[first], step)
         return self
 
-    def __copy__(self) -> Surface:
+    def __copy__(self, memo: object = None) -> Surface:
         """The surface itself: it never changes."""
         return self
 
-    def __deepcopy__(self, memo: dict[int, object]) -> Surface:
-        """The surface itself: it never changes."""
-        return self
+    __deepcopy__ = __copy__
 
     def __getstate__(self) -> dict[str, object]:
         """What describes the surface, and the point it is seen from; the rest is computed anew."""

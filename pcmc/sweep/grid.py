@@ -38,8 +38,6 @@ class Sweep:
     OptionError : a function that cannot be found, a parameter it does not take or lacks, an empty
         grid, a value that cannot be written to a file or occurs twice.
 
-    Examples
-    --------
     >>> sweep = Sweep("math:ldexp", grid={})
     Traceback (most recent call last):
     pcmc.base.errors.OptionError: the grid is empty; give at least one parameter a list of values

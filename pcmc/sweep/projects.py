@@ -36,18 +36,13 @@ def project_sweep(
         ``NAME.pressure`` of patches, the numbers of the file, such as ``plan.edge_length``, and shifts of
         lines, such as ``wall 1.x``.
     method : replaces the project's method and its options.
-    mesh_check : whether to check the mesh of each case, as ``solve_case`` does; the project's own key
-        ``solve.mesh_check`` asks for it, too.
-    search : whether a case whose start leads to no equilibrium tries further ones, as ``pcmc.solve`` does:
-        slower where there is none; ``message`` has what was tried, and any proof.
+    mesh_check, search : as of ``solve_case``; the project's own key ``solve.mesh_check`` counts, too.
 
     Raises
     ------
     OptionError, FileError, PlanError : before any case runs: for a project that cannot be read or meshed, an
         unknown name (with the nearest known one), or a value that is not allowed.
 
-    Examples
-    --------
     >>> sweep = project_sweep("notebooks/roof.toml", {"corner.tension": [5, 6, 7]})
     >>> len(sweep), sweep.fixed["project"]
     (3, 'notebooks/roof.toml')

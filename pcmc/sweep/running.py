@@ -59,12 +59,10 @@ def run(
 
     Parameters
     ----------
-    sweep : the cases.
-    store : file for the records: an SQLite database. Run the same sweep with the same file again after a
-        crash, and only the missing cases run. A grid with more values runs only the new cases; one with
-        fewer leaves the other records in the file. None: keep the records in memory.
-    executor : runs the cases; it is not shut down. Its processes finish the cases that they have begun,
-        also after Ctrl-C. Default: ``workers`` local processes.
+    store : file for the records, an SQLite database; None keeps them in memory. The same sweep with the same
+        file runs only the missing cases: after a crash, or with more values in the grid. With fewer values
+        the other records stay in the file.
+    executor : runs the cases; it is not shut down, and finishes what it has begun, also after Ctrl-C.
     scheduler : address of a Dask scheduler whose workers run the cases: ``"tcp://127.0.0.1:8786"``.
     workers : number of local processes; default one for each processor.
     time_limit : per case, in seconds; None for no limit.
@@ -75,18 +73,15 @@ def run(
 
     Returns
     -------
-    DataFrame : one row per case (see ``table``). After Ctrl-C, which ends local processes at once, it has
-        only the cases stored so far: fewer rows than ``len(sweep)``.
+    DataFrame : one row per case (see ``table``); after Ctrl-C only the cases stored so far.
 
     Raises
     ------
     OptionError, FileError, SweepError, MissingExtra : before any case runs: for a bad option, a store of
         another sweep or version, a scheduler that does not answer, or if ``distributed`` is missing.
-    FileError : a record cannot be written. SweepError : the executor broke, or a worker cannot load the
-        case function. The cases stored before stay stored.
+    FileError, SweepError : a record cannot be written; the executor broke, or a worker cannot load the case
+        function. The cases stored before stay stored.
 
-    Examples
-    --------
     >>> halves = Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2, 3]}, {"under": 2})
     >>> run(halves, workers=1)[["over", "status", "value"]]
           over    status  value

@@ -61,32 +61,26 @@ def solve_case(
     Parameters
     ----------
     generator : a function that returns a Surface: ``"generators:two_caps"``.
-    method : as of ``pcmc.solve``.
+    method, search : as of ``pcmc.solve``; with a search ``message`` has what was tried, and any proof.
     mesh_check : whether to solve each surface at rest on two finer meshes, too (``pcmc.check_mesh``).
-    search : whether further starts are tried where the first leads to no equilibrium, as ``pcmc.solve``
-        does: slower where there is none; ``message`` has what was tried, and any proof.
     arguments : parameters of the generator and options of the method. A name that both have is the
         generator's.
 
     Returns
     -------
     dict : ``status`` (the solver's, in small letters), ``verdict`` of the certificate, ``message``;
-        ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the
-        paper's squared sum); the certificate's numbers; each number of its tables as
-        ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``; and, of a surface at rest, the
-        key figures of ``pcmc.quantities``: ``large.apex``, and ``rise`` or ``reaction per length`` of the
-        whole roof. A number with the name of one of the arguments is called ``name_reached``. With
-        ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the height, volume, energy, reaction
-        and lowest eigenvalue ``height_error``, ``height_limit``, ``height_limit_error``, ``height_order`` and
-        so on.
+        ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the paper's
+        squared sum); the certificate's numbers, those of its tables as ``large.area``, ``junction 0.length``,
+        ``boundary 0.reaction_z``; and, of a surface at rest, the key figures of the roof:
+        ``large.apex``, and ``rise`` of the whole roof. A number with the name of one of the arguments is
+        called ``name_reached``. With ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the
+        height, volume, energy, reaction and lowest eigenvalue ``height_error``, ``height_limit``,
+        ``height_limit_error``, ``height_order`` and so on.
 
     Raises
     ------
-    OptionError : an unknown generator, method or parameter name. A sweep raises it before any case
-        is run.
+    OptionError : an unknown generator, method or parameter name; a sweep raises it before any case is run.
 
-    Examples
-    --------
     >>> case = solve_case("generators:two_squares", "lbfgs", alpha_aux=1.0)
     >>> case["status"], round(case["energy"], 4), round(case["left.area"], 3)
     ('converged', 58.5059, 17.583)
@@ -108,7 +102,7 @@ def row(result: Result, names: Container[str], outcome: Outcome | None = None) -
     With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between
     mirror planes: see the column ``extent``. Without an equilibrium the row has no numbers of the shape.
     """
-    from ..quantities import figures  # takes long to import
+    from ..certificate.quantities import figures  # takes long to import
 
     surface, certificate = result.surface, result.certificate
     numbers = {

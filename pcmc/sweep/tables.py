@@ -129,7 +129,7 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
     >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
     ['west.tension [kN/m]', 'hem.tension [kN]']
     """
-    from ..quantities import dimension_of  # takes long to import
+    from ..certificate.quantities import dimension_of  # takes long to import
 
     shown = {}
     for name in names if units else ():

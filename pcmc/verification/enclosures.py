@@ -30,32 +30,21 @@ from .balls import Ball, Balls, U, exact, gather, minus, plus, times
 
 
 class Elements(NamedTuple):
-    """Triangles and cable edges with what acts on them, for compiled loops.
+    """Triangles and cable edges with what acts on them, for compiled loops."""
 
-    Attributes
-    ----------
-    X : (n+k,3) positions, those of the k flat pieces' apices last.
-    faces, offset : (m,3) corners, and as in ``Pattern``; a flat piece has its apex last.
-    patch : (m,) the patch of each.
-    tension, weight, pressure : (m,) of each.
-    origin, point, normal : (3,) where volumes are seen from; Π.
-    ends, pull : (c,2) and (c,) cable edges and their tension.
-    corner, push : (e,) and (e,3) vertices where flat pieces end, and the normals there (``FlatPieces``).
-    """
-
-    X: Floats
-    faces: Ints
-    offset: Ints
-    patch: Ints
-    tension: Floats
-    weight: Floats
-    pressure: Floats
-    origin: Floats
-    point: Floats
+    X: Floats  # (n+k,3) positions, those of the k flat pieces' apices last
+    faces: Ints  # (m,3) corners; a flat piece has its apex last
+    offset: Ints  # (m,3) as in ``Pattern``
+    patch: Ints  # (m,)
+    tension: Floats  # (m,)
+    weight: Floats  # (m,)
+    pressure: Floats  # (m,)
+    origin: Floats  # (3,) where volumes are seen from
+    point: Floats  # (3,) of Π, and its normal
     normal: Floats
-    ends: Ints
+    ends: Ints  # (c,2) cable edges, and their tension (c,)
     pull: Floats
-    corner: Ints
+    corner: Ints  # (e,) vertices where flat pieces end, and the normals there (e,3)
     push: Floats
 
     def of_volume(self, signs: Floats) -> Elements:
@@ -66,9 +55,7 @@ class Elements(NamedTuple):
 
 def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elements:
     """The elements of a standing part at its own vertices."""
-    F: Ints = classes.faces
-    offset: Ints = pattern.offset
-    patch: Ints = classes.patch_of_face
+    F, offset, patch = classes.faces, pattern.offset, classes.patch_of_face
     X, ends, pull = surface.vertices, *surface.cable_edges
     tension, weight = surface.tensions[patch], surface.weights[patch]
     corner: Ints = np.empty(0, dtype=np.int64)
@@ -105,7 +92,6 @@ def forces(items: Elements, pressures: Floats) -> tuple[Floats, Floats]:
 
 @inlined
 def _triangle(items: Elements, f: int) -> tuple[Balls, Balls, Balls]:
-    """The corners of triangle f."""
     F, X = items.faces, items.X
     return balls.row(X, F[f, 0]), balls.row(X, F[f, 1]), balls.row(X, F[f, 2])
 
@@ -161,11 +147,8 @@ def coordinates(space: MotionSpace, value: Floats, radius: Floats) -> tuple[Floa
     """Bᵀ of vectors (n,3) in balls: (N,) values and radii."""
     out, error = np.zeros(space.start[-1]), np.zeros(space.start[-1])
     for v in range(len(space.dimension)):
-        force = (
-            (value[v, 0], radius[v, 0]),
-            (value[v, 1], radius[v, 1]),
-            (value[v, 2], radius[v, 2]),
-        )
+        x, r = value[v], radius[v]
+        force = ((x[0], r[0]), (x[1], r[1]), (x[2], r[2]))
         for c in range(space.dimension[v]):
             out[space.start[v] + c], error[space.start[v] + c] = balls.dot(
                 balls.row(space.basis[v], c), force

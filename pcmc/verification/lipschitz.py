@@ -42,9 +42,7 @@ from ..surface.geometry import add, cross, dot, norm, point, scaled, sub, vector
 from .balls import SAFE
 from .enclosures import Elements
 
-ROUNDING = (
-    1.0 + 1e-9
-)  # on bounds made of positive terms: far more than the rounding of a few hundred operations
+ROUNDING = 1.0 + 1e-9  # on bounds of positive terms: far more than the rounding of some hundred operations
 BLUR = 1e-13  # of the coordinates: far more than the rounding of differences of them and their products
 
 

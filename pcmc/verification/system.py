@@ -39,31 +39,21 @@ CUBIC = 1.0 / np.sqrt(27.0)  # |det(d_0, d_1, d_2)| ≤ this times |d|³
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """F and K at the given vertices, s = 0 and η = 0.
-
-    Attributes
-    ----------
-    items, space, pattern : the elements, the frozen frames, and the upper triangle of K.
-    forces, forces_radius : (n,3) ∇E and the radii of its balls.
-    matrix, matrix_error : (k,) values of K in the pattern, and a bound of ‖K - its values‖₂.
-    left, left_error : (N,) values of F and the radii of their balls; ``residual`` is a bound of ‖F‖₂, force.
-    borders : r + k.
-    coupling : a bound of ‖Σ κ_r ζ_r B₀ᵀ∇²V_r B₀‖₂ for |ζ| = 1, per |ζ|; ``scales`` (r,) are κ.
-    """
+    """F and K at the given vertices, s = 0 and η = 0."""
 
     items: Elements
-    space: MotionSpace
-    pattern: Pattern
-    forces: Floats
+    space: MotionSpace  # the frozen frames
+    pattern: Pattern  # of the upper triangle of K
+    forces: Floats  # (n,3) ∇E, and the radii of its balls
     forces_radius: Floats
-    matrix: Floats
+    matrix: Floats  # (k,) values of K in the pattern, and a bound of ‖K - these values‖₂
     matrix_error: float
-    left: Floats
+    left: Floats  # (N,) values of F, the radii of their balls, and a bound of ‖F‖₂, force
     left_error: Floats
     residual: float
-    borders: int
-    scales: Floats
-    coupling: float
+    borders: int  # r + k
+    scales: Floats  # (r,) κ
+    coupling: float  # a bound of ‖Σ κ_r ζ_r B₀ᵀ∇²V_r B₀‖₂ for |ζ| = 1, per |ζ|
 
     def left_after(self, y: Floats) -> float:
         """A bound of ‖F - K y‖₂. Row i of the product is a sum of k_i terms, off by γ_(k_i+1) |K| |y|."""

@@ -29,13 +29,11 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import StandingPart, standing_part
+from ..contact.pinching import StandingPart
 from ..contact.pull import pull_and_capacity
-from ..forces.loose_parts import relative_forces
-from ..forces.motion_space import MotionSpace, motion_space
-from ..forces.rigid_motions import rigid_modes, rigid_motions
-from ..forces.rooms import volume_defects
+from ..forces.motion_space import MotionSpace
 from ..stability.backward_error import backward_error
+from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
 from ..surface import Surface, expect_surface
 from .balls import SAFE, U
@@ -57,17 +55,13 @@ class Theorem:
     Attributes
     ----------
     proved, reason : whether all below is proved; if not, why.
-    radius : the exact equilibrium is at most this far from the given vertices, length: each vertex, and the
-        root of the sum of the squares of all.
+    radius : the root of the sum of squares of the vertices' distances to the exact equilibrium, at most.
     unique_within : there is no other one within this distance, in the same norm and frames.
-    index : the Morse index of the exact equilibrium.
-    gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe
-        volumes, among motions that keep these.
+    index, gap : its Morse index; no eigenvalue of B₀ᵀ∇²E B₀ there is within the gap of zero, force/length.
     beta, lipschitz, step, forces : β, length/force; L, force/length²; η, length; a bound of ‖f(0)‖, force.
-    symmetric_in, volumes_kept : the mirror planes that motions are symmetric in, the rooms whose volumes they
-        keep: index and gap are about such motions.
-    rigid : the rigid motions that no support resists: index and gap are about motions across these, and it is
-        alone but for them.
+    symmetric_in, volumes_kept : index and gap are about motions symmetric in these mirror planes that keep
+        the volumes of these rooms.
+    rigid : the number of rigid motions that no support resists: all is about motions across these.
     spare : how much of their walls' capacity resting vertices have left, at least; None without any.
     """
 
@@ -147,13 +141,12 @@ def verify(surface: Surface) -> Theorem:
 
 
 def _proved(surface: Surface) -> Theorem:
-    part = standing_part(surface)
-    space = motion_space(part.surface, part.classes, part.surface.vertices)
-    rigid = rigid_motions(part.surface)
-    free = rigid_modes(space, rigid, part.surface.vertices)
-    _refuse(part, space, rigid if free.shape[1] else rigid[:0])
+    at = Equilibrium.of(surface)
+    part, space, free = at.part, at.space, at.rigid
+    _refuse(part, space, at.rigid_motions if free.shape[1] else at.rigid_motions[:0])
+    if not at.residual <= TOLERANCE:
+        raise _Unproved(f"it is not at rest: the residual is {at.residual:.1e}; solve it first")
     found = system(part, space, free)
-    _refuse_moving(part, found)
     index, gap, newton = _inertia(found)
     beta = SAFE / gap
     _, stiffness, height = lipschitz(found.items, space, 0.0, 0.0)
@@ -173,14 +166,14 @@ def _proved(surface: Surface) -> Theorem:
             " neutral for its thinnest triangles; solve to a smaller tolerance, or improve these"
         )
     root = np.sqrt(1.0 - 2.0 * h) / SAFE
-    radius = first / (1.0 + root) * _stretch(space) * SAFE
+    # a bound of ‖B₀‖₂, which rounding keeps from 1: the root of the largest row sum of |B₀ᵀB₀|
+    sums = np.abs(space.basis @ space.basis.transpose(0, 2, 1)).sum(axis=2)
+    radius = first / (1.0 + root) * float(np.sqrt(sums.max()) * SAFE) * SAFE
     unique = min(reach, (1.0 + root) / (beta * rate)) / SAFE
     spare = _rests(surface, part, found, stiffness, radius)
     left = (gap - rate * radius) / SAFE
     if not left > 0.0:
         raise _Unproved("no gap is left between the eigenvalues and zero at the exact equilibrium")
-    mirrors = tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror)
-    rooms = tuple(room.name for room in surface.rooms)
     return Theorem(
         proved=True,
         radius=float(radius),
@@ -191,8 +184,8 @@ def _proved(surface: Surface) -> Theorem:
         lipschitz=rate,
         step=step,
         forces=found.residual,
-        symmetric_in=mirrors,
-        volumes_kept=rooms,
+        symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
+        volumes_kept=tuple(room.name for room in surface.rooms),
         spare=spare,
         rigid=free.shape[1],
     )
@@ -211,17 +204,6 @@ def _refuse(part: StandingPart, space: MotionSpace, rigid: Floats) -> None:
     )
     if len(rigid) and (surface.uncancelled.any() or (surface.weights.any() and not level)):
         raise _Unproved("its weight or pressure pushes along rigid motions that no support resists")
-
-
-def _refuse_moving(part: StandingPart, found: System) -> None:
-    """Refuse a surface that is not at rest by the certificate's measure."""
-    surface, X = part.surface, part.surface.vertices
-    left = found.space.project(found.forces[: surface.n])
-    residual = relative_forces(surface, part.classes, X, left)
-    if surface.rooms:
-        residual = float(np.hypot(residual, np.linalg.norm(volume_defects(surface))))
-    if not residual <= TOLERANCE:
-        raise _Unproved(f"it is not at rest: the residual is {residual:.1e}; solve it first")
 
 
 def _inertia(found: System) -> tuple[int, float, Floats]:
@@ -256,12 +238,6 @@ def _inertia(found: System) -> tuple[int, float, Floats]:
             break
         sigma *= 0.5
     raise _Unproved(f"its Morse index is not certain: {reason}")
-
-
-def _stretch(space: MotionSpace) -> float:
-    """A bound of ‖B₀‖₂, which rounding keeps from 1: the root of the largest row sum of |B₀ᵀB₀|."""
-    b = space.basis
-    return float(np.sqrt(np.abs(b @ b.transpose(0, 2, 1)).sum(axis=2).max()) * SAFE)
 
 
 def _rests(

@@ -7,11 +7,11 @@ from support_cases import cables_between_walls, half_with_mirror
 import pcmc
 from generators import spherical_cap, two_squares
 from pcmc import Parameter, Patch, Plane, Surface, Target
+from pcmc.certificate.quantities import figures
 from pcmc.certificate.reactions import support_forces
 from pcmc.design.targets import measure
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
-from pcmc.quantities import figures
 
 PULL = ["pull_x", "pull_y", "pull_z"]
 SQUARE = [[0, 0], [6, 0], [6, 6], [0, 6]]

@@ -14,7 +14,7 @@ from pcmc.certificate.balance import coarseness, load_ratio
 from pcmc.certificate.proof import Attempt
 from pcmc.certificate.verdict import Findings, judge
 from pcmc.solvers.result import Status
-from pcmc.stability.softness import Spectrum
+from pcmc.stability.modes import Spectrum
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 

@@ -163,7 +163,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     assert cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"]) == 0
     assert cli.main(["explore", "roof.pcmc", "--watch"]) == 0
     assert seen[0][1:] == ("127.0.0.1", 0, None, False)
-    assert (seen[0][0].title, seen[0][0].units) == ("roof.pcmc", NO_UNITS)
+    assert (seen[0][0].title, seen[0][0].outcome.units) == ("roof.pcmc", NO_UNITS)
     assert seen[1][1:] == ("127.0.0.1", 8, None, True)
     assert seen[1][0].name == "two_squares"
     assert seen[1][0].surface.patches

@@ -17,6 +17,7 @@ from generators.grid import grid_faces
 from pcmc import Cable, Direction, Parameter, Patch, Plane, Surface, Target, Verdict, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate.balance import load_ratio, unbalanced
+from pcmc.certificate.quantities import figures
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy_and_gradient, energy_at
 from pcmc.forces.motion_space import vertex_classes
@@ -24,7 +25,6 @@ from pcmc.forces.second_variation import hessian
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
-from pcmc.quantities import figures
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.surface.topology import CURVE, POINT, SHEET
 from studies.reference import evolver

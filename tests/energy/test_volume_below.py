@@ -10,11 +10,11 @@ import pcmc
 from generators import catenoid, double_bubble, four_fans, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Plane, Target
 from pcmc.accuracy.quantities import given_volume
+from pcmc.certificate.quantities import figures
 from pcmc.design.targets import measure
 from pcmc.forces.functional import patch_volumes, volume
 from pcmc.forces.volume_below import volume_below, volume_below_gradient, volumes_below
 from pcmc.plan import Divider, Plan
-from pcmc.quantities import figures
 from pcmc.surface.geometry import area_vectors
 from pcmc.sweep.solving import row
 from studies.forces.cases import tube

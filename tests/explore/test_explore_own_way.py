@@ -10,9 +10,8 @@ from explore_cases import followed
 import pcmc
 from generators import spherical_cap
 from pcmc import explore
-from pcmc.explore import own_way
-from pcmc.explore.following import Reached
-from pcmc.explore.own_way import OwnWay
+from pcmc.explore import following
+from pcmc.explore.following import ProjectFallback, Reached
 from pcmc.explore.roof import read_roof
 from pcmc.explore.session import Session, solved_start
 
@@ -35,7 +34,7 @@ def path(tmp_path):
 
 
 def own(path):
-    return OwnWay(path, read_roof(path, start_shape=True).data)
+    return ProjectFallback(path, read_roof(path, start_shape=True).project.data)
 
 
 def tensions(surface):
@@ -46,7 +45,7 @@ def test_walls_that_a_project_leaves_open_follow_the_tensions(path):
     start = solved_start(read_roof(path, use_cache=False).surface)
     asked = {"tensions": {"east": 9.0}}
     assert Session(start).settle(asked).failure is not None  # 9 against 5 and the wall
-    session = Session(start, own_way=own(path))
+    session = Session(start, fallback=own(path))
     state = session.settle(asked)
     path.write_text(OPEN_WALL.replace("east = {tension = 5.0}", "east = {tension = 9.0}"))
     again = read_roof(path, use_cache=False).surface
@@ -61,11 +60,11 @@ def test_walls_that_a_project_leaves_open_follow_the_tensions(path):
 
 def test_walls_that_were_moved_stay(path):
     start = solved_start(read_roof(path, use_cache=False).surface)
-    state = Session(start, own_way=own(path)).settle({"tensions": {"east": 9.0, "wall 1": 1.0}})
+    state = Session(start, fallback=own(path)).settle({"tensions": {"east": 9.0, "wall 1": 1.0}})
     assert state.failure is not None
     assert "cannot balance" in state.failure.detail
     assert state.note == ""
-    state = Session(start, own_way=own(path)).settle({"tensions": {"wall 1": 1.0}})
+    state = Session(start, fallback=own(path)).settle({"tensions": {"wall 1": 1.0}})
     assert state.failure is None
     assert tensions(state.surface)["wall 1"] == 1.0
 
@@ -73,9 +72,9 @@ def test_walls_that_were_moved_stay(path):
 def test_a_roof_that_following_does_not_reach_is_solved_from_the_start_shape(path, monkeypatch):
     start = solved_start(read_roof(path, use_cache=False).surface)
     nowhere = Reached(start.surface, None, pcmc.certify(CAP.retensioned({"cap": 0.01})))
-    monkeypatch.setattr(own_way, "reach", lambda *arguments, **options: nowhere)
+    monkeypatch.setattr(following, "reach", lambda *arguments, **options: nowhere)
     path.write_text(OPEN_WALL + "[remesh]\nedge_length = 0.8\n")
-    state = Session(start, own_way=own(path)).settle({"tensions": {"east": 4.0}})
+    state = Session(start, fallback=own(path)).settle({"tensions": {"east": 4.0}})
     assert state.failure is None
     assert "from the start shape" in state.note
     assert tensions(state.surface)["east"] == 4.0
@@ -103,10 +102,10 @@ def test_a_project_with_one_tension_or_a_rise_has_its_own_way_too(path, key, ask
 def test_why_a_project_has_no_own_way_is_said(path, monkeypatch):
     start = solved_start(read_roof(path, use_cache=False).surface)
     nowhere = Reached(start.surface, None, pcmc.certify(CAP.retensioned({"cap": 0.01})))
-    monkeypatch.setattr(own_way, "reach", lambda *arguments, **options: nowhere)
+    monkeypatch.setattr(following, "reach", lambda *arguments, **options: nowhere)
     way = own(path)
     del way.data["plan"]["patches"]["west"]  # as if the plan were another one
-    state = Session(start, own_way=way).settle({"tensions": {"east": 4.0}})
+    state = Session(start, fallback=way).settle({"tensions": {"east": 4.0}})
     assert state.failure is nowhere.failed
     assert "one for each part" in state.note
 

@@ -308,7 +308,7 @@ def test_sliders_agree_with_their_numbers(page, explorer):
     page.slider("Pressure p of left").send_keys("\ue014" * 20)  # to the right
     page.idle()
     shown = float(page.number("Pressure p of left").get_attribute("value"))
-    asked = explorer.sessions[next(reversed(explorer.sessions))].state().asked[0].pressure
+    asked = explorer.sessions[next(reversed(explorer.sessions))].state().wanted.patches[0].pressure
     assert shown == asked  # to the last digit
     page.complaints()
 

@@ -16,8 +16,7 @@ from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import Roof, read_roof
-from pcmc.explore.session import Session
-from pcmc.explore.variants import figures_data
+from pcmc.explore.session import Session, figures_data
 from pcmc.panelling.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
@@ -95,7 +94,7 @@ def test_a_search_tells_its_progress_and_can_be_stopped(hall_session, monkeypatc
         told.append(hall_session.progress)
         stopping = threading.Thread(target=real, args=(hall_session,))
         stopping.start()
-        until(lambda: hall_session._arrived == 2, "the stop")
+        until(lambda: hall_session.arrived == 2, "the stop")
         with pytest.raises(StopIteration):
             callback(None)
         return pcmc.meet(surface, targets, vary, solves=1)

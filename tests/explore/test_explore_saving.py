@@ -20,7 +20,7 @@ from pcmc import explore
 from pcmc.base.errors import FileError, OptionError
 from pcmc.design import Parameter, Target
 from pcmc.explore import saving
-from pcmc.explore.requests import RequestError
+from pcmc.explore.protocol import RequestError
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.panelling.distance import difference

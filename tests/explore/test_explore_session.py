@@ -67,11 +67,11 @@ def test_where_no_equilibrium_exists_the_last_surface_stays(cap):
     state = session.follow({"tensions": {"cap": 0.3}})
     assert state.surface is cap.surface
     assert state.failure.verdict is Verdict.NO_EQUILIBRIUM
-    assert [p.tension for p in state.asked] == [0.3]
+    assert [p.tension for p in state.wanted.patches] == [0.3]
     assert (state.undo, state.redo) == (1, 0)
     back = session.undo()
     assert back.failure is None
-    assert back.asked == back.surface.patches
+    assert back.wanted.patches == back.surface.patches
     assert (back.undo, back.redo) == (0, 0)
 
 
@@ -100,7 +100,7 @@ def test_following_goes_halfway_where_the_whole_way_fails(cap):
     state = session.follow({"tensions": {"cap": 0.45}})
     assert state.failure is None
     assert state.surface.patches[0].tension == pytest.approx(0.525)
-    assert state.asked[0].tension == 0.45
+    assert state.wanted.patches[0].tension == 0.45
 
 
 def test_settling_is_steps_that_can_be_undone_and_done_again(cap):
@@ -109,7 +109,7 @@ def test_settling_is_steps_that_can_be_undone_and_done_again(cap):
     assert heights == sorted(heights, reverse=True)
     state = session.undo()
     assert rise(state.surface) == heights[1]
-    assert [p.tension for p in state.asked] == [0.8]
+    assert [p.tension for p in state.wanted.patches] == [0.8]
     assert (state.undo, state.redo) == (2, 1)
     assert rise(session.redo().surface) == heights[2]
     session.undo()
@@ -142,10 +142,10 @@ def test_a_newer_request_ends_the_work_on_an_older_one(cap):
     with turn:
         old = threading.Thread(target=ask, args=("old", 0.7))
         old.start()
-        until(lambda: session._arrived == 1, "the first request")
+        until(lambda: session.arrived == 1, "the first request")
         new = threading.Thread(target=ask, args=("new", 0.8))
         new.start()
-        until(lambda: session._arrived == 2, "the second request")
+        until(lambda: session.arrived == 2, "the second request")
     old.join()
     new.join()
     assert states["old"].superseded
@@ -169,7 +169,7 @@ def test_acts_are_done_in_order_and_none_is_dropped(cap, hall):
     with turn:
         for number, thread in enumerate(threads, 1):
             thread.start()
-            until(lambda number=number: session._arrived == number, "the request")
+            until(lambda number=number: session.arrived == number, "the request")
     for thread in threads:
         thread.join()
     state = session.state()
@@ -216,7 +216,7 @@ def test_values_that_cannot_be_are_refused_and_change_nothing(cap):
     with refused(SurfaceError, what="tension", where="cap", found=-1.0):
         session.settle({"tensions": {"cap": -1.0}})
     state = session.state()
-    assert state.asked == cap.surface.patches
+    assert state.wanted.patches == cap.surface.patches
     assert state.failure is None
 
 

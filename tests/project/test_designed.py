@@ -15,11 +15,11 @@ from small_project import SMALL
 import pcmc
 from pcmc import cli, explore
 from pcmc.base.units import Units
+from pcmc.certificate.quantities import QUANTITIES, dimension_of
 from pcmc.design.quantities import MEASURES
 from pcmc.design.targets import KINDS, SHORT
 from pcmc.explore.page_data import unit_texts
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
-from pcmc.quantities import QUANTITIES, dimension_of
 
 GOAL = """
 [targets]

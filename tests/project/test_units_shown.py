@@ -13,9 +13,9 @@ from pcmc import cli, explore
 from pcmc.accuracy.quantities import given_volume
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units, as_units
+from pcmc.certificate.quantities import dimension_of
 from pcmc.explore.page_data import mesh_findings
 from pcmc.explore.session import Session, solved_start
-from pcmc.quantities import dimension_of
 from pcmc.report.tables import mesh_table, target_table
 
 METRES = Units("m", "kN")

@@ -170,7 +170,7 @@ def test_it_is_written_whole_as_pdf_or_not_at_all(tmp_path, small_cap, monkeypat
     monkeypatch.setattr(RoofReport, "pdf", lambda report: b"%PDF")
     with refused(FileError, what=str(tmp_path / "no" / "roof.pdf")):
         report.write(tmp_path / "no" / "roof.pdf")
-    monkeypatch.setitem(sys.modules, "reportlab.pdfbase", None)
+    monkeypatch.setitem(sys.modules, "reportlab", None)
     with pytest.raises(MissingExtra, match=r"\[report\]"):
         roof_report(small_cap, "m")
     assert not list(tmp_path.iterdir())

@@ -9,8 +9,7 @@ from pcmc import BoundaryMotion, Patch, Surface, Verdict, certify, solve
 from pcmc.stability import modes as stability_modes
 from pcmc.stability.equilibrium import Equilibrium
 from pcmc.stability.factorisation import SingularMatrix
-from pcmc.stability.modes import ArpackError, lowest
-from pcmc.stability.softness import count_soft
+from pcmc.stability.modes import ArpackError, count_soft, lowest
 
 
 def needle(height):

@@ -1,28 +1,61 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { capital, element } from "./elements.js";
+import { capital, choice, digits, element } from "./elements.js";
+import { addSaving, follow } from "./file.js";
 import {
   arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
-import { digits, Panel } from "./panel.js";
-import { addSaving } from "./saving.js";
+import { Panel } from "./panel.js";
 import { ask, fetchFile } from "./server.js";
 import { Targets } from "./targets.js";
 import { Tools } from "./tools.js";
 import { Variants } from "./variants.js";
 import { Viewer } from "./viewer.js";
-import { follow } from "./watching.js";
 
 const REPLACE_AFTER = 400; // milliseconds, at least, before a newer request replaces one under way
 const POOR = 0.3; // of the worst triangle: new triangles are offered below it
-const find = (selector) => document.querySelector(selector);
-const KINDS = {
+const ACTS = { undo: "undo", redo: "redo", reset: "reset", stabilise: "stabilise", remesh: "remesh", back: "undo" };
+const ENDING = [...Object.values(ACTS), "recall"]; // the words about targets are then of another surface
+const SHOWS = { mesh: "Mesh", supports: "Supports", walls: "Walls", smooth: "Smooth", grid: "Grid" };
+const FORMATS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
   ".ply": "with the numbers", ".stl": "printing", ".vtp": "ParaView, with the numbers", ".fe": "Surface Evolver",
+};
+const find = (selector) => document.querySelector(selector);
+const prefersDark = matchMedia("(prefers-color-scheme: dark)");
+
+// questions about the surface shown: the words of their button meanwhile, and what shows the answer
+const QUESTIONS = {
+  check: {
+    busy: "Solving on finer meshes…",
+    show: (page, { check }) => check && showCheck(find("#check-result"), check),
+  },
+  margin: {
+    busy: "Following to the edge…",
+    body: () => ({ what: find("#margin-of").value }),
+    show(page, { margin }, { vertices }) {
+      if (!margin) return;
+      page.edge = vertices;
+      find("#margin-result .detail").textContent = capital(margin);
+      find("#margin-result").hidden = false;
+      page.showEdge(false);
+    },
+  },
+  verify: {
+    show: (page, { badge, text }) =>
+      Object.assign(find("#theorem"), { hidden: false, textContent: capital(badge), title: capital(text) }),
+  },
+  families: {
+    show(page, header, { family }) {
+      page.arrays.family = family;
+      page.colour();
+    },
+  },
 };
 
 class Page {
   pending = 0; // requests without an answer yet
+  choice = "patches";
 
   async open() {
     const known = new URLSearchParams(location.search).get("session") || sessionStorage.getItem("session");
@@ -32,7 +65,6 @@ class Page {
     const answer = await ask("api/open", known ? { session: known } : {})
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
     this.name = answer.header.session;
-    this.choice = "patches";
     this.startViewer();
     this.variants = new Variants(find("#variants"), (name, body) => this.act(name, body), () => this.canvas());
     this.begin(answer);
@@ -63,7 +95,7 @@ class Page {
     this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
     this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
     const varied = header.quantities.find(({ quantity }) => quantity === "margin")?.of ?? [];
-    find("#margin-of").replaceChildren(...varied.map((what) => element("option", "", what)));
+    find("#margin-of").replaceChildren(...varied.map((what) => element("option", what)));
     if (header.note && opened) this.targets.say(header.note, header.note_met ? "met" : "missed");
     find("#together-row").hidden = header.patches.length < 2;
     addSaving(find("#save-project"), find("#saving"), header, () => this.name, (text) => this.notify(text));
@@ -76,9 +108,8 @@ class Page {
   }
 
   canvas() {
-    if (!this.viewer) return null;
-    this.viewer.draw();
-    return find("#canvas");
+    this.viewer?.draw();
+    return this.viewer ? find("#canvas") : null;
   }
 
   startViewer() {
@@ -108,7 +139,7 @@ class Page {
   }
 
   act(name, values = {}) {
-    if (["undo", "redo", "reset", "recall", "stabilise", "remesh"].includes(name)) this.targets.say("");
+    if (ENDING.includes(name)) this.targets.say("");
     this.flush();
     return this.send(name, values);
   }
@@ -159,11 +190,11 @@ class Page {
 
   showWork() {
     const card = find("#verdict");
+    const work = card.querySelector(".work");
     card.dataset.busy = String(Boolean(this.pending || this.next));
     if (this.pending && this.slow) return; // it counts already
     clearTimeout(this.slow);
     this.slow = null;
-    const work = card.querySelector(".work");
     work.hidden = true;
     card.classList.remove("working");
     card.removeAttribute("aria-busy");
@@ -194,22 +225,23 @@ class Page {
     }
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
+    const { at_rest: atRest, findings, figures, verdict } = header;
     showVerdict(find("#verdict"), header);
-    showFindings(find("#findings tbody"), header.findings, header.figures, this.units);
-    showParts(find("#parts"), header.figures, this.units);
-    if (header.findings.supports) showSupports(find("#supports"), header.findings, this.units);
+    showFindings(find("#findings tbody"), findings, figures, this.units);
+    showParts(find("#parts"), figures, this.units);
+    if (findings.supports) showSupports(find("#supports"), findings, this.units);
     this.variants.show(header, this.units);
-    find("#check-result").hidden = true; // it was about the last surface
-    find("#theorem").hidden = true;
-    for (const name of ["check", "margin", "verify"]) find(`#${name}`).disabled = !header.at_rest;
-    find("#margin-result").hidden = true;
     if (!this.next) this.panel.show(header.values, values);
-    find("#undo").disabled = !header.undo;
-    find("#redo").disabled = !header.redo;
-    find("#stabilise").hidden = !(header.at_rest && header.verdict.name === "saddle");
-    find("#remesh").hidden = header.verdict.name !== "degenerate" && !(header.findings.quality < POOR);
-    find("#back").hidden = header.at_rest || !header.undo;
-    find("#sway").hidden = !arrays.mode || !header.at_rest || !this.viewer;
+    const disabled = { check: !atRest, margin: !atRest, verify: !atRest, undo: !header.undo, redo: !header.redo };
+    for (const [id, off] of Object.entries(disabled)) find(`#${id}`).disabled = off;
+    const shown = {
+      "check-result": false, theorem: false, "margin-result": false, // they were about the last surface
+      stabilise: atRest && verdict.name === "saddle",
+      remesh: verdict.name === "degenerate" || findings.quality < POOR,
+      back: !atRest && header.undo,
+      sway: arrays.mode && atRest && this.viewer,
+    };
+    for (const [id, on] of Object.entries(shown)) find(`#${id}`).hidden = !on;
     if (!this.swaying || !arrays.mode) {
       this.sway(false);
       this.viewer?.setVertices(arrays.vertices);
@@ -225,65 +257,29 @@ class Page {
 
   colour() {
     if (this.choice === "family" && !this.arrays.family) {
-      this.sortPanels(); // until then the colours stay
+      this.look("families"); // until then the colours stay
       return;
     }
     const field = fieldOf(this.choice, this.arrays);
     const than = this.header.variants[this.header.compared]?.name;
     showLegend(find("#legend"), this.choice, field, this.units, than);
-    if (!this.viewer) return;
-    this.viewer.setField(field);
-    this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
+    this.viewer?.setField(field);
+    this.viewer?.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
   }
 
-  /** Ask for the families of panels of the surface shown; a newer surface leaves the answer behind. */
-  async sortPanels() {
-    const { header } = this;
+  /** Ask about the surface shown; a newer surface leaves the answer behind. */
+  async look(name) {
+    const [{ busy, body = () => ({}), show }, { header: shown }] = [QUESTIONS[name], this];
+    const asking = find(`#${name}`);
+    const words = asking?.textContent;
+    if (asking) Object.assign(asking, { disabled: true, textContent: busy ?? words });
     try {
-      const { arrays } = await ask(`api/${this.name}/families`);
-      if (this.header !== header) return;
-      this.arrays.family = arrays.family;
-      this.colour();
+      const { header, arrays } = await ask(`api/${this.name}/${name}`, body());
+      if (this.header === shown) show(this, header, arrays);
     } catch (error) {
       this.notify(error.message);
     }
-  }
-
-  /** Check the surface shown on finer meshes; a newer surface leaves the answer behind. */
-  async check() {
-    const [button, { header: checked }] = [find("#check"), this];
-    const label = button.textContent;
-    button.disabled = true;
-    button.textContent = "Solving on finer meshes…";
-    try {
-      const { header } = await ask(`api/${this.name}/check`);
-      if (header.check && this.header === checked) showCheck(find("#check-result"), header.check);
-    } catch (error) {
-      this.notify(error.message);
-    }
-    button.textContent = label;
-    button.disabled = !this.header.at_rest;
-  }
-
-  /** Follow the surface shown to the edge of its stability; a newer surface leaves the answer behind. */
-  async margin() {
-    const [button, { header: shown }] = [find("#margin"), this];
-    const label = button.textContent;
-    button.disabled = true;
-    button.textContent = "Following to the edge…";
-    try {
-      const { header, arrays } = await ask(`api/${this.name}/margin`, { what: find("#margin-of").value });
-      if (header.margin && this.header === shown) {
-        this.edge = arrays.vertices;
-        find("#margin-result .detail").textContent = capital(header.margin);
-        find("#margin-result").hidden = false;
-        this.showEdge(false);
-      }
-    } catch (error) {
-      this.notify(error.message);
-    }
-    button.textContent = label;
-    button.disabled = !this.header.at_rest;
+    if (asking) Object.assign(asking, { disabled: !this.header.at_rest, textContent: words });
   }
 
   /** Show the shape at the edge instead of the roof, or the roof again. */
@@ -293,26 +289,11 @@ class Page {
     this.viewer?.setVertices(on ? this.edge : this.arrays.vertices);
   }
 
-  /** Prove that an exact equilibrium is near the surface shown; a newer surface leaves the answer behind. */
-  async verify() {
-    const { header: shown } = this;
-    find("#verify").disabled = true;
-    try {
-      const { header } = await ask(`api/${this.name}/verify`);
-      const badge = { hidden: false, textContent: capital(header.badge), title: capital(header.text) };
-      if (this.header === shown) Object.assign(find("#theorem"), badge);
-    } catch (error) {
-      this.notify(error.message);
-    }
-    find("#verify").disabled = !this.header.at_rest;
-  }
-
   /** Move slowly along the softest mode and back. */
   sway(on) {
     this.swaying = on;
     find("#sway").setAttribute("aria-pressed", String(on));
     cancelAnimationFrame(this.frame);
-    if (!on) return;
     const start = performance.now();
     const step = (time) => {
       const { vertices, mode } = this.arrays;
@@ -321,14 +302,13 @@ class Page {
       this.viewer.setVertices(vertices.map((x, i) => x + part * mode[i]));
       this.frame = requestAnimationFrame(step);
     };
-    this.frame = requestAnimationFrame(step);
+    if (on) this.frame = requestAnimationFrame(step);
   }
 
   /** Show one line for a few seconds. */
   notify(text) {
     const note = find("#note");
-    note.textContent = text;
-    note.hidden = false;
+    Object.assign(note, { textContent: text, hidden: false });
     clearTimeout(this.noted);
     this.noted = setTimeout(() => { note.hidden = true; }, 8000);
   }
@@ -343,27 +323,18 @@ class Page {
       return; // the one in use keeps the focus
     }
     find("#colours").replaceChildren(...possible.map((name) => choice(
-      "radio", COLOURS[name].label, name === this.choice, () => { this.choice = name; this.colour(); }, name)));
-    const shows = { mesh: "Mesh", supports: "Supports", walls: "Walls", smooth: "Smooth", grid: "Grid" };
-    find("#shows").replaceChildren(...Object.entries(shows).map(([name, label]) => choice(
-      "checkbox", label, this.viewer?.options[name],
-      (on) => this.viewer?.setOptions({ [name]: on }), name)));
+      "radio", COLOURS[name].label, name === this.choice, () => { this.choice = name; this.colour(); },
+      { name: "colour", value: name })));
+    find("#shows").replaceChildren(...Object.entries(SHOWS).map(([name, label]) => choice(
+      "checkbox", label, this.viewer?.options[name], (on) => this.viewer?.setOptions({ [name]: on }),
+      { name, value: name })));
   }
 
   addExports(formats) {
     const menu = find("#export");
-    const kinds = Object.entries(KINDS).filter(([suffix]) => formats.includes(suffix));
-    menu.querySelector("div").replaceChildren(...[...kinds, [".png", "picture of this view"]].map(
-      ([suffix, words]) => {
-        const button = document.createElement("button");
-        const name = document.createElement("b");
-        button.type = "button";
-        button.value = suffix;
-        name.textContent = suffix;
-        button.append(name, ` ${words}`);
-        button.addEventListener("click", () => this.save(suffix));
-        return button;
-      }));
+    const kinds = [...Object.entries(FORMATS).filter(([suffix]) => formats.includes(suffix)), [".png", "picture of this view"]];
+    menu.querySelector("div").replaceChildren(...kinds.map(([value, words]) =>
+      element("button", { type: "button", value, onclick: () => this.save(value) }, element("b", value), ` ${words}`)));
     menu.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !menu.open) return;
       menu.open = false;
@@ -379,7 +350,9 @@ class Page {
     try {
       const body = suffix === ".png"
         ? await this.viewer.picture() : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
-      download(body, `${this.download}${suffix}`);
+      const link = element("a", { href: URL.createObjectURL(body), download: `${this.download}${suffix}` });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
       if (!this.header.at_rest) this.notify("Saved: the surface shown, with its own values, not those you asked for.");
     } catch (error) {
       this.notify(error.message);
@@ -387,27 +360,26 @@ class Page {
   }
 
   addActs() {
-    for (const name of ["undo", "redo", "reset", "stabilise", "remesh"]) {
-      find(`#${name}`).addEventListener("click", () => this.act(name));
+    const clicks = {
+      "#margin-result button": ({ currentTarget }) => this.showEdge(currentTarget.getAttribute("aria-pressed") !== "true"),
+      "#sway": () => {
+        if (this.swaying) this.viewer.setVertices(this.arrays.vertices);
+        this.sway(!this.swaying);
+      },
+      "#theme": () => {
+        const { style } = document.documentElement;
+        const now = style.colorScheme || (prefersDark.matches ? "dark" : "light");
+        style.colorScheme = now === "dark" ? "light" : "dark";
+        this.viewer?.setOptions({});
+      },
+    };
+    for (const [id, act] of Object.entries(ACTS)) clicks[`#${id}`] = () => this.act(act);
+    for (const name of ["check", "margin", "verify"]) clicks[`#${name}`] = () => this.look(name);
+    for (const [selector, clicked] of Object.entries(clicks)) find(selector).onclick = clicked;
+    for (const view of document.querySelectorAll("#views [data-view]")) {
+      view.onclick = () => this.viewer?.camera.look(view.dataset.view);
     }
-    for (const name of ["check", "margin", "verify"]) find(`#${name}`).addEventListener("click", () => this[name]());
-    find("#margin-result button").addEventListener("click", (event) =>
-      this.showEdge(event.currentTarget.getAttribute("aria-pressed") !== "true"));
-    find("#back").addEventListener("click", () => this.act("undo"));
-    find("#sway").addEventListener("click", () => {
-      if (this.swaying) this.viewer.setVertices(this.arrays.vertices);
-      this.sway(!this.swaying);
-    });
-    for (const button of document.querySelectorAll("#views [data-view]")) {
-      button.addEventListener("click", () => this.viewer?.camera.look(button.dataset.view));
-    }
-    find("#theme").addEventListener("click", () => {
-      const { style } = document.documentElement;
-      const dark = style.colorScheme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-      style.colorScheme = dark === "dark" ? "light" : "dark";
-      this.viewer?.setOptions({});
-    });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.viewer?.setOptions({}));
+    prefersDark.addEventListener("change", () => this.viewer?.setOptions({}));
     addEventListener("keydown", (event) => {
       if (!(event.ctrlKey || event.metaKey) || event.target.type === "number") return;
       const key = event.key.toLowerCase();
@@ -417,23 +389,6 @@ class Page {
       if (!find(`#${act}`).disabled) this.act(act);
     });
   }
-}
-
-function choice(type, label, checked, chosen, value) {
-  const root = document.createElement("label");
-  const input = document.createElement("input");
-  Object.assign(input, { type, name: type === "radio" ? "colour" : value, value, checked });
-  input.addEventListener("change", () => chosen(input.checked));
-  root.append(input, label);
-  return root;
-}
-
-function download(body, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(body);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
 const page = new Page();

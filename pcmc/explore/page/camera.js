@@ -1,14 +1,9 @@
 // The camera, and how mouse, fingers and keys move it.
 
+import { cross, dot, minus, plus, scaled, unit } from "./geometry.js";
+
 // azimuth, elevation and angle of view in degrees; a narrow angle keeps parallels parallel
 const NAMED = { diagonal: [-60, 28, 28], elevation: [-90, 0, 1], plan: [-90, 89.9, 1] };
-
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const scaled = (a, s) => a.map((x) => x * s);
-const plus = (...all) => all.reduce((a, b) => a.map((x, k) => x + b[k]));
-const unit = (a) => scaled(a, 1 / Math.hypot(...a));
 
 export class Camera {
   /** `changed` is called after every turn. */
@@ -55,10 +50,8 @@ export class Camera {
 
   /** Right, upward and backward unit vectors. */
   axes() {
-    const away = plus(scaled(this.first, Math.cos(this.azimuth)),
-      scaled(this.second, Math.sin(this.azimuth)));
-    const back = plus(scaled(away, Math.cos(this.elevation)),
-      scaled(this.up, Math.sin(this.elevation)));
+    const away = plus(scaled(this.first, Math.cos(this.azimuth)), scaled(this.second, Math.sin(this.azimuth)));
+    const back = plus(scaled(away, Math.cos(this.elevation)), scaled(this.up, Math.sin(this.elevation)));
     const right = cross(this.up, away);
     return [right, cross(back, right), back];
   }
@@ -77,11 +70,11 @@ export class Camera {
     // as near as the box allows: each corner must lie within all four sides of the view
     let distance = 0;
     for (const corner of this.corners()) {
-      const p = plus(corner, scaled(middle, -1));
+      const p = minus(corner, middle);
       distance = Math.max(distance, dot(p, back) + Math.abs(dot(p, right)) / (0.9 * wide),
         dot(p, back) + Math.abs(dot(p, upward)) / (0.76 * tall));
     }
-    const reach = Math.hypot(...plus(this.box[1], scaled(this.box[0], -1)));
+    const reach = Math.hypot(...minus(this.box[1], this.box[0]));
     distance /= this.zoom;
     const target = plus(middle, scaled(right, -this.shift[0] * distance),
       scaled(upward, -this.shift[1] * distance + 0.03 * reach / this.zoom));
@@ -90,18 +83,9 @@ export class Camera {
     const near = Math.max(0.02 * distance, distance - 2 * reach);
     const far = distance + 3 * reach;
     const [a, b] = [(far + near) / (near - far), (2 * far * near) / (near - far)];
-    const m = new Float32Array(16);
-    for (let k = 0; k < 3; k++) {
-      m[4 * k] = right[k] / wide;
-      m[4 * k + 1] = upward[k] / tall;
-      m[4 * k + 2] = a * back[k];
-      m[4 * k + 3] = -back[k];
-    }
-    m[12] = -dot(right, this.eye) / wide;
-    m[13] = -dot(upward, this.eye) / tall;
-    m[14] = -a * dot(back, this.eye) + b;
-    m[15] = dot(back, this.eye);
-    return m;
+    const columns = [0, 1, 2].map((k) => [right[k] / wide, upward[k] / tall, a * back[k], -back[k]]);
+    const eye = [right, upward, back].map((axis) => dot(axis, this.eye));
+    return Float32Array.from([...columns, [-eye[0] / wide, -eye[1] / tall, b - a * eye[2], eye[2]]].flat());
   }
 
   /** The eye, and the direction through a place of the picture, x and y from -1 to 1. */
@@ -114,7 +98,7 @@ export class Camera {
   /** Where a point is in the picture, x and y from -1 to 1, and how far before the eye. */
   seen(point) {
     const [right, upward, back] = this.axes();
-    const from = plus(point, scaled(this.eye, -1));
+    const from = minus(point, this.eye);
     const depth = -dot(from, back);
     const tall = Math.tan(this.angle / 2) * depth;
     return [dot(from, right) / (tall * this.aspect), dot(from, upward) / tall, depth];
@@ -143,14 +127,15 @@ export class Camera {
       const old = held.size === 2 ? span() : null;
       held.set(event.pointerId, { x: event.clientX, y: event.clientY });
       const part = 1 / element.clientHeight;
+      const [right, down] = [(event.clientX - before.x) * part, (event.clientY - before.y) * part];
       if (old) {
         const now = span();
         this.move((now.x - old.x) * part, (old.y - now.y) * part);
         this.closer(now.apart / Math.max(old.apart, 1));
       } else if (event.shiftKey || event.buttons & 6) {
-        this.move((event.clientX - before.x) * part, (before.y - event.clientY) * part);
+        this.move(right, -down);
       } else {
-        this.turn(5 * (event.clientX - before.x) * part, 5 * (event.clientY - before.y) * part);
+        this.turn(5 * right, 5 * down);
       }
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
@@ -167,16 +152,16 @@ export class Camera {
       const lines = event.deltaMode === 1 ? 30 : 1;
       this.closer(Math.exp(-0.0012 * lines * event.deltaY));
     }, { passive: false });
-    const keys = {
-      ArrowLeft: (go) => go(-0.1, 0), ArrowRight: (go) => go(0.1, 0),
-      ArrowUp: (go) => go(0, 0.1), ArrowDown: (go) => go(0, -0.1),
-      "+": () => this.closer(1.15), "=": () => this.closer(1.15), "-": () => this.closer(1 / 1.15),
-      Home: () => this.look("diagonal"),
-    };
+    const arrows = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+    const zooms = { "+": 1.15, "=": 1.15, "-": 1 / 1.15 };
     element.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
+      const { key } = event;
+      if (event.ctrlKey || event.metaKey || event.altKey || !(key in arrows || key in zooms || key === "Home")) return;
       event.preventDefault();
-      keys[event.key]((x, y) => (event.shiftKey ? this.move(0.3 * x, 0.3 * y) : this.turn(x, y)));
+      if (key === "Home") this.look("diagonal");
+      else if (key in zooms) this.closer(zooms[key]);
+      else if (event.shiftKey) this.move(...scaled(arrows[key], 0.3));
+      else this.turn(...arrows[key]);
     });
   }
 }

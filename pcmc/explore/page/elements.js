@@ -1,55 +1,51 @@
 // Elements of the page, made in one line each.
 
-export function element(tag, kind = "", text = "") {
-  const made = document.createElement(tag);
-  if (kind) made.className = kind;
-  if (text !== "") made.textContent = text;
+/** An element: "tag.class", then objects of properties, attributes and listeners, texts and nodes. */
+export function element(name, ...parts) {
+  const [tag, className = ""] = name.split(".");
+  const made = Object.assign(document.createElement(tag), className && { className });
+  for (const part of parts) {
+    if (typeof part !== "object" || part instanceof Node) {
+      made.append(part);
+    } else {
+      for (const [key, value] of Object.entries(part)) {
+        if (key in made) made[key] = value;
+        else made.setAttribute(key, value);
+      }
+    }
+  }
   return made;
 }
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-export function input(type, name, attributes = {}) {
-  const made = element("input");
-  made.type = type;
-  made.setAttribute("aria-label", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
+/** Four digits, without trailing zeros. */
+export function digits(x, count = 4) {
+  if (x === null || x === undefined || !Number.isFinite(x)) return "–";
+  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(count - 2);
+  return String(Number(x.toPrecision(count)));
 }
 
-export function button(text, clicked, name = "") {
-  const made = element("button", "", text);
-  made.type = "button";
-  if (name) made.setAttribute("aria-label", name);
-  made.addEventListener("click", clicked);
-  return made;
-}
+export const input = (type, name, attributes = {}) => element("input", { type, "aria-label": name }, attributes);
 
-export function select(name, options) {
-  const made = element("select");
-  made.setAttribute("aria-label", name);
-  made.append(...options.map(([value, text]) => Object.assign(element("option", "", text), { value })));
-  return made;
-}
+export const button = (text, onclick, name = text) =>
+  element("button", { type: "button", onclick, ...(name !== text && { "aria-label": name }) }, text);
+
+export const select = (name, options) =>
+  element("select", { "aria-label": name }, ...options.map(([value, text]) => element("option", { value }, text)));
+
+/** A box or a radio button with its label; `chosen(checked)` is called when it changes. */
+export const choice = (type, label, checked, chosen, attributes) =>
+  element("label", element("input", { type, checked, onchange: (event) => chosen(event.target.checked) }, attributes), label);
 
 /** A row of a table: its head, and a cell for each further text or node. */
-export function tableRow(head, cells, title = "") {
-  const row = element("tr");
-  const th = element("th");
-  th.scope = "row";
-  th.append(head);
-  if (title) row.title = title;
-  row.append(th, ...cells.map((cell) => {
-    const td = element("td");
-    td.append(cell);
-    return td;
-  }));
-  return row;
-}
+export const tableRow = (head, cells) =>
+  element("tr", element("th", { scope: "row" }, head), ...cells.map((cell) => element("td", cell)));
 
-/** A term whose meaning opens below it, by mouse and keys. */
-export function term(name, meaning) {
-  const details = element("details", "term");
-  details.append(element("summary", "", name), element("p", "", meaning));
-  return details;
+/** A table with a heading; columns are [name, unit], rows [name, texts]. */
+export function tableOf(title, columns, rows) {
+  const heads = columns.map(([name, unit]) =>
+    element("th", { scope: "col" }, name, ...(unit ? [element("span.unit", unit)] : [])));
+  return element("table.parts", element("caption", title), element("thead", element("tr", element("td"), ...heads)),
+    element("tbody", ...rows.map(([name, texts]) => tableRow(name, texts))));
 }

@@ -1,9 +1,7 @@
 // The verdict, the numbers of the surface, and the fields that colours show.
 
-import { colourOf, diverging, sequential } from "./colours.js";
-import { capital, element, tableRow, term } from "./elements.js";
-import { familyField, showClasses } from "./families.js";
-import { digits } from "./panel.js";
+import { colourOf, diverging, familyField, sequential } from "./colours.js";
+import { capital, digits, element, tableOf, tableRow } from "./elements.js";
 
 const SIGNS = {
   stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", ran_away: "↗",
@@ -43,35 +41,31 @@ function drawn({ asked, shown }) {
   return `Shown: the last surface at rest, ${listed}`;
 }
 
-/** Numbers of the surface shown. */
+const percent = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
+const smallPercent = (x) => (x !== null && x < 1e-6 ? "below 0.0001 %" : percent(x));
+
+/** Numbers of the surface shown: [name, text, meaning]; the meaning opens below the name, by mouse and keys. */
 export function showFindings(body, findings, figures, units) {
   const of = (name) => figures.find(({ owner, quantity }) => owner === "roof" && quantity === name)?.value;
   const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
-  const percent = (x) => (x === null ? "–" : x < 1e-6 ? "below 0.0001 %" : `${digits(100 * x, 3)} %`);
   const rows = [
     ["Rise above the plane", measured(of("apex"), "length"), `The largest height above the plane Π, ${units.length}.`],
     ["Area under pressure", measured(of("area"), "area"), `Of all patches except walls, ${units.area}.`],
     ["Volume", measured(findings.volume, "volume"), `Between the patches with pressure and the plane Π, ${units.volume}.`],
     ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
     ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],
-    ["Load over capacity", percentOf(findings.load_ratio), "The pressure's total push, as a part of the most that the tensions along the supports can carry, when all of them pull straight down. Above 100 % no smooth surface stands on fixed edges alone: raise tensions or lower pressures."],
-    ["Largest error of H", percent(findings.curvature_error), "The mean curvature that balances the forces at each vertex, against H̄ = p / 2α. Exact at rest."],
-    ["Error by Meyer's measure", percent(findings.curvature_error_cotangent), "Meyer's measure reads the mean curvature from the angles of the triangles, with Voronoi areas, as in the paper's figures. It differs from H̄ by an error of the mesh, which finer triangles reduce."],
+    ["Load over capacity", percent(findings.load_ratio), "The pressure's total push, as a part of the most that the tensions along the supports can carry, when all of them pull straight down. Above 100 % no smooth surface stands on fixed edges alone: raise tensions or lower pressures."],
+    ["Largest error of H", smallPercent(findings.curvature_error), "The mean curvature that balances the forces at each vertex, against H̄ = p / 2α. Exact at rest."],
+    ["Error by Meyer's measure", smallPercent(findings.curvature_error_cotangent), "Meyer's measure reads the mean curvature from the angles of the triangles, with Voronoi areas, as in the paper's figures. It differs from H̄ by an error of the mesh, which finer triangles reduce."],
     ["Worst triangle", digits(findings.quality, 3), "4√3 area / Σ edge²: 1 is equilateral, 0 degenerate."],
     ["Residual", digits(findings.residual, 3), "The unbalanced forces, relative to the forces of single triangles. Below 1e-8 the surface counts as at rest."],
+    ...(findings.pinched ? [["Pinched wall", `${findings.pinched} vertices`, "Here the valley between two patches has come down to the plane: it rests there, and the wall below it has no height."]] : []),
+    ...findings.rooms.map(({ room, pressure }) =>
+      [`Pressure of ${room}`, measured(pressure, "pressure"), "The volume of this room is prescribed; its pressure is the result."]),
   ];
-  if (findings.pinched) {
-    rows.push(["Pinched wall", `${findings.pinched} vertices`, "Here the valley between two patches has come down to the plane: it rests there, and the wall below it has no height."]);
-  }
-  for (const room of findings.rooms) {
-    rows.push([`Pressure of ${room.room}`, measured(room.pressure, "pressure"), "The volume of this room is prescribed; its pressure is the result."]);
-  }
-  const open = new Set([...body.querySelectorAll("details[open] summary")].map((s) => s.textContent));
-  body.replaceChildren(...rows.map(([name, text, meaning]) => {
-    const explained = term(name, meaning);
-    explained.open = open.has(name);
-    return tableRow(explained, [text]);
-  }));
+  const known = new Set([...body.querySelectorAll("details[open] summary")].map((s) => s.textContent));
+  body.replaceChildren(...rows.map(([name, text, meaning]) => tableRow(
+    element("details.term", { open: known.has(name) }, element("summary", name), element("p", meaning)), [text])));
 }
 
 const COLUMNS = { // of the parts of a roof, in the order of their tables
@@ -85,44 +79,28 @@ export function showParts(root, figures, units) {
   root.replaceChildren(...Object.entries(COLUMNS).flatMap(([owner, wanted]) => {
     const own = figures.filter((one) => one.owner === owner || (owner === "patch" && one.owner === "roof"));
     const parts = [...new Set(own.map(({ of }) => of))];
-    if (parts.filter(Boolean).length < 1) return [];
+    if (!parts.some(Boolean)) return [];
     if (parts.length === 2 && parts.includes("")) parts.splice(parts.indexOf(""), 1); // the only patch is all
     const columns = wanted.filter((name) => own.some(({ quantity }) => quantity === name));
+    const heads = columns.map((name) => [SHORT[name] ?? capital(name),
+      units.given ? units[own.find(({ quantity }) => quantity === name).dimension] : ""]);
     const value = (of, name) => own.find((one) => one.of === of && one.quantity === name)?.value;
-    return [tableOf(`${capital(owner)}${owner === "patch" ? "es" : "s"}`, columns.map((name) => {
-      const { dimension } = own.find(({ quantity }) => quantity === name);
-      return [SHORT[name] ?? capital(name), units.given ? units[dimension] : ""];
-    }), parts.map((of) => [of || "all", columns.map((name) => digits(value(of, name)))]))];
+    return [tableOf(`${capital(owner)}${owner === "patch" ? "es" : "s"}`, heads,
+      parts.map((of) => [of || "all", columns.map((name) => digits(value(of, name)))]))];
   }));
 }
 
 /** The forces of the supports, whose rows add up to the loads. */
 export function showSupports(root, { supports, balance }, units) {
   const rows = [...supports, ...balance.filter(({ of }) => of !== "supports")];
-  const axes = ["x", "y", "z"];
-  const most = Math.max(...rows.flatMap((row) => axes.map((axis) => Math.abs(row[`force_${axis}`]))));
-  const force = (x) => digits(Math.abs(x) > 1e-4 * most ? x : 0, 3);
-  root.replaceChildren(...(supports.length ? [tableOf("Forces of the supports",
-    [["Length", units.given ? units.length : ""], ...axes.map((axis) => [axis, units.given ? units.force : ""])],
-    rows.map((row) => [row.of ? capital(row.of) : `${row.support} ${row.name === row.support ? row.kind : row.name}`, [
-      row.length ? digits(row.length, 3) : "",
-      ...axes.map((axis) => force(row[`force_${axis}`]))]]))] : []));
-}
-
-/** A table with a heading; columns are [name, unit], rows [name, texts]. */
-function tableOf(title, columns, rows) {
-  const table = element("table", "parts");
-  const head = element("tr");
-  head.append(element("td"), ...columns.map(([name, unit]) => {
-    const th = element("th", "", name);
-    th.scope = "col";
-    if (unit) th.append(element("span", "unit", unit));
-    return th;
-  }));
-  table.createCaption().textContent = title;
-  table.createTHead().append(head);
-  table.createTBody().append(...rows.map(([name, texts]) => tableRow(name, texts)));
-  return table;
+  const forces = (row) => ["x", "y", "z"].map((axis) => row[`force_${axis}`]);
+  const most = Math.max(...rows.flatMap(forces).map(Math.abs));
+  const name = ({ of, support, name: own, kind }) => (of ? capital(of) : `${support} ${own === support ? kind : own}`);
+  const heads = ["Length", "x", "y", "z"].map((one, k) => [one, units.given ? (k ? units.force : units.length) : ""]);
+  const texts = (row) => [row.length ? digits(row.length, 3) : "",
+    ...forces(row).map((x) => digits(Math.abs(x) > 1e-4 * most ? x : 0, 3))];
+  root.replaceChildren(...(supports.length
+    ? [tableOf("Forces of the supports", heads, rows.map((row) => [name(row), texts(row)]))] : []));
 }
 
 /** The answer of the mesh check. */
@@ -132,45 +110,41 @@ export function showCheck(root, check) {
   root.querySelector(".word").textContent = capital(`${check.word}: ${check.sentence}`);
   root.querySelector(".detail").textContent = capital(check.detail);
   root.querySelector("tbody").replaceChildren(...check.rows.flatMap(({ name, value, limit, order }) => {
-    const [title, values] = [document.createElement("tr"), document.createElement("tr")];
-    values.title = order === null ? "No settled order" : `The error falls with order ${digits(order, 2)} of the edge length`;
-    const head = document.createElement("th");
-    Object.assign(head, { scope: "rowgroup", colSpan: 2, textContent: capital(name) });
-    title.append(head);
-    values.append(...[value, limit].map((text) => {
-      const cell = document.createElement("td");
-      cell.textContent = text;
-      return cell;
-    }));
-    return [title, values];
+    const title = order === null ? "No settled order" : `The error falls with order ${digits(order, 2)} of the edge length`;
+    return [element("tr", element("th", { scope: "rowgroup", colSpan: 2 }, capital(name))),
+      element("tr", { title }, element("td", value), element("td", limit))];
   }));
 }
 
-const percentOf = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
-
-/** Values, limits and colour map of the chosen field; null for the patches' own colours. */
-export function fieldOf(choice, arrays) {
-  if (choice === "patches" || !arrays[choice]) return null;
-  if (choice === "error") {
-    const values = arrays.error.map((x) => 100 * x);
-    const most = Math.max(1e-4, ...ends(values).map(Math.abs));
-    return { values, limits: [-most, most], map: diverging };
-  }
-  if (choice === "difference") {
-    const most = Math.max(1e-12, ...ends(arrays.difference, arrays.underPressure).map(Math.abs));
-    return { values: arrays.difference, limits: [-most, most], map: diverging, skipWalls: true };
-  }
-  if (choice === "family") return familyField(arrays.family);
-  if (choice === "reactions") {
+const FIELDS = {
+  error({ error }) {
+    const values = error.map((x) => 100 * x);
+    return { values, ...centred(values, 1e-4) };
+  },
+  difference: ({ difference, underPressure }) =>
+    ({ values: difference, ...centred(difference, 1e-12, underPressure), skipWalls: true }),
+  family: ({ family }) => familyField(family),
+  reactions(arrays) {
     const sizes = (all) => Float32Array.from({ length: all.length / 3 }, (_, v) => Math.hypot(...all.subarray(3 * v, 3 * v + 3)));
     const [values, points] = [sizes(arrays.reactions), sizes(arrays.points)];
     return { values, points, limits: [0, ends(values)[1] || 1], map: sequential, linesOnly: true };
-  }
-  let [low, high] = ends(arrays.curvature, arrays.underPressure);
-  if (high - low <= 1e-5 * Math.max(Math.abs(low), Math.abs(high))) {
-    [low, high] = [Math.min(0.9 * low, 1.1 * low), Math.max(0.9 * high, 1.1 * high)];
-  }
-  return { values: arrays.curvature, limits: [low, high], map: sequential, skipWalls: true };
+  },
+  curvature({ curvature, underPressure }) {
+    let [low, high] = ends(curvature, underPressure);
+    if (high - low <= 1e-5 * Math.max(Math.abs(low), Math.abs(high))) {
+      [low, high] = [Math.min(0.9 * low, 1.1 * low), Math.max(0.9 * high, 1.1 * high)];
+    }
+    return { values: curvature, limits: [low, high], map: sequential, skipWalls: true };
+  },
+};
+
+/** Values, limits and colour map of the chosen field; null for the patches' own colours. */
+export const fieldOf = (choice, arrays) => (arrays[choice] ? FIELDS[choice](arrays) : null);
+
+/** Limits as far on either side of zero, and a colour map with a middle. */
+function centred(values, least, chosen) {
+  const most = Math.max(least, ...ends(values, chosen).map(Math.abs));
+  return { limits: [-most, most], map: diverging };
 }
 
 /** Least and greatest of the finite values. */
@@ -196,18 +170,21 @@ export function arrowsOf(arrays, field, size) {
   return arrows;
 }
 
-/** The scale beside the surface. */
+/** The scale beside the surface: a bar, or a colour and its words for each class. */
 export function showLegend(root, choice, field, units, than) {
   root.hidden = !field;
   if (!field) return;
+  const [bar, limits] = [".bar", ".ends"].map((part) => root.querySelector(part));
   const [low, high] = field.limits;
   const most = ends(field.points ?? [])[1];
   const points = field.points?.some((x) => x > 0) ? `; blue: at points, up to ${digits(most, 3)} ${units.force}` : "";
   root.querySelector(".name").textContent = (field.name ?? COLOURS[choice].name(units, than)) + points;
-  showClasses(root.querySelector("ul"), field.scale);
-  for (const part of [".bar", ".ends"]) root.querySelector(part).hidden = Boolean(field.scale);
-  root.querySelector(".bar").style.background = field.map.css;
-  root.querySelector(".low").textContent = digits(low, 3);
-  root.querySelector(".middle").textContent = digits((low + high) / 2, 3);
-  root.querySelector(".high").textContent = digits(high, 3);
+  root.querySelector("ul").replaceChildren(...(field.scale ?? []).map(({ colour, text }) => {
+    const item = element("li", element("span"), text);
+    item.firstChild.style.background = colour;
+    return item;
+  }));
+  bar.hidden = limits.hidden = Boolean(field.scale);
+  bar.style.background = field.map.css;
+  [low, (low + high) / 2, high].forEach((x, k) => { limits.children[k].textContent = digits(x, 3); });
 }

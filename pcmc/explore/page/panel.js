@@ -1,6 +1,6 @@
 // A card for each patch, cable and room, with a slider and a number for each of its values.
 
-import { element, input } from "./elements.js";
+import { digits, element, input } from "./elements.js";
 
 const STEPS = 1000;
 const ROOM = 2; // times a value beyond the slider's end: where it ends then
@@ -13,13 +13,6 @@ const QUANTITIES = {
   cables: { label: "Tension τ", unit: "force" },
   volumes: { label: "Volume V", unit: "volume" },
 };
-
-/** Four digits, without trailing zeros. */
-export function digits(x, count = 4) {
-  if (x === null || x === undefined || !Number.isFinite(x)) return "–";
-  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(count - 2);
-  return String(Number(x.toPrecision(count)));
-}
 
 /** Slider positions 0..STEPS for values: by ratio for values that cannot be zero, else evenly. */
 class Range {
@@ -71,39 +64,28 @@ export class Panel {
   }
 
   card(group, index, patches, asked) {
-    const card = element("fieldset");
-    const legend = element("legend");
-    const head = element("span", "head");
-    const target = element("span", "target");
+    const target = element("span.target");
+    const head = element("span.head", element("span.name", group.name), target);
     if (group.patch !== null) {
-      const swatch = element("span", "swatch");
-      const { color } = patches[group.patch];
-      swatch.style.background = `rgb(${color.map((c) => Math.round(255 * c)).join(" ")})`;
-      head.append(swatch);
+      const swatch = element("span.swatch");
+      swatch.style.background = `rgb(${patches[group.patch].color.map((c) => Math.round(255 * c)).join(" ")})`;
+      head.prepend(swatch);
     }
-    head.append(element("span", "name", group.name), target);
-    legend.append(head);
-    card.append(legend, ...group.kinds.map((kind) => (kind === "points" ? this.point(group, asked)
-      : this.row(group, index, kind, asked[kind][group.name], target))));
-    return card;
+    return element("fieldset", element("legend", head), ...group.kinds.map((kind) => (kind === "points"
+      ? this.point(group, asked) : this.row(group, index, kind, asked[kind][group.name], target))));
   }
 
   /** A single held point: three numbers, which dragging it in the picture changes, too. */
   point(group, asked) {
-    const row = element("div", "point");
     const entry = { group, kind: "points", value: asked.points[group.name] };
-    entry.numbers = AXES.map((axis, k) => {
-      const number = input("number", `${axis} of ${group.name}`, { step: "any" });
-      number.addEventListener("change", () => {
-        const place = entry.value.map((x, i) => (i === k && Number.isFinite(number.valueAsNumber) ? number.valueAsNumber : x));
-        this.movePoint(group.name, place, true);
-      });
-      return number;
-    });
-    row.append(...entry.numbers.flatMap((number, k) => [element("span", "", AXES[k]), number]));
+    entry.numbers = AXES.map((axis, k) => input("number", `${axis} of ${group.name}`, {
+      step: "any",
+      onchange: ({ target: { valueAsNumber: x } }) =>
+        this.movePoint(group.name, Number.isFinite(x) ? entry.value.with(k, x) : entry.value, true),
+    }));
     this.rows.push(entry);
     this.put(entry, entry.value);
-    return row;
+    return element("div.point", ...entry.numbers.flatMap((number, k) => [element("span", AXES[k]), number]));
   }
 
   movePoint(name, place, final) {
@@ -112,35 +94,24 @@ export class Panel {
   }
 
   row(group, index, kind, value, target) {
-    const row = element("div", "slider");
     const { label: text, unit } = QUANTITIES[kind];
-    const name = `${text} of ${group.name}`;
-    const id = `${kind}-${index}`;
-    const label = element("label", "", text);
-    label.htmlFor = id;
-    label.title = this.units[unit];
-    const track = element("span", "track");
-    const shown = element("span", "shown");
-    shown.hidden = true;
-    const slider = input("range", name, { id, min: 0, max: STEPS, step: 1 });
-    const number = input("number", `${name}, as a number`, { step: "any" });
-    track.append(slider, shown);
-    row.append(label, track, number);
-    const evenly = group.wall || kind === "cables";
-    const entry = {
-      group, index, kind, slider, number, shown, target, value, range: new Range(value, evenly, this.usual),
-    };
-    this.rows.push(entry);
-    slider.addEventListener("input", () => this.change(entry, entry.range.value(slider.value), false));
-    slider.addEventListener("change", () => this.changed(true));
-    number.addEventListener("change", () => {
-      if (number.value.trim() === "" || !Number.isFinite(number.valueAsNumber)) {
-        this.put(entry, entry.value);
-      } else {
-        this.change(entry, number.valueAsNumber, true);
-      }
+    const [name, id] = [`${text} of ${group.name}`, `${kind}-${index}`];
+    const shown = element("span.shown", { hidden: true });
+    const range = new Range(value, group.wall || kind === "cables", this.usual);
+    const entry = { group, index, kind, shown, target, value, range };
+    entry.slider = input("range", name, {
+      id, min: 0, max: STEPS, step: 1,
+      oninput: () => this.change(entry, range.value(entry.slider.value), false),
+      onchange: () => this.changed(true),
     });
-    return row;
+    entry.number = input("number", `${name}, as a number`, {
+      step: "any",
+      onchange: ({ target: { valueAsNumber: x } }) =>
+        (Number.isFinite(x) ? this.change(entry, x, true) : this.put(entry, entry.value)),
+    });
+    this.rows.push(entry);
+    return element("div.slider", element("label", { htmlFor: id, title: this.units[unit] }, text),
+      element("span.track", entry.slider, shown), entry.number);
   }
 
   /** The user changes a value; similar patches change by the same ratio if the box is checked. */
@@ -149,9 +120,7 @@ export class Panel {
     if (this.together.checked) {
       for (const other of this.rows) {
         const similar = other.kind === entry.kind && other.group.wall === entry.group.wall;
-        if (similar && other !== entry) {
-          this.put(other, entry.value ? other.value * ratio : value);
-        }
+        if (similar && other !== entry) this.put(other, entry.value ? other.value * ratio : value);
       }
     }
     this.put(entry, value, !final);
@@ -174,7 +143,9 @@ export class Panel {
     const [alpha, p, s, w] = ["tensions", "pressures", "snows", "weights"]
       .map((k) => mine.find((r) => r.kind === k)?.value);
     const curved = alpha !== undefined && p !== undefined && w === undefined;
-    entry.target.textContent = entry.group.wall ? "wall" : curved ? `${s ? `p − s = ${digits(p - s)}, H̄ =` : "H̄ = p / 2α ="} ${digits((p - (s ?? 0)) / (2 * alpha), 3)}` : "";
+    const net = s ? `p − s = ${digits(p - s)}, H̄ =` : "H̄ = p / 2α =";
+    entry.target.textContent = entry.group.wall ? "wall"
+      : curved ? `${net} ${digits((p - (s ?? 0)) / (2 * alpha), 3)}` : "";
   }
 
   /** Show the values asked for; where the surface shown has others, mark them. */

@@ -102,39 +102,43 @@ void main() {
   result = vec4(r > 0.72 ? vec3(1.0) : tint, 1.0);
 }`;
 
-function compiled(gl, kind, source) {
-  const shader = gl.createShader(kind);
-  gl.shaderSource(shader, source);
-  gl.compileShader(shader);
-  if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) {
-    throw new Error(gl.getShaderInfoLog(shader));
-  }
-  return shader;
-}
+const settersOf = (gl) => ({
+  [gl.FLOAT]: "uniform1f", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC3]: "uniform3fv", [gl.FLOAT_VEC4]: "uniform4fv",
+  [gl.BOOL]: "uniform1i", [gl.SAMPLER_2D]: "uniform1i",
+});
 
+/** A program, its attributes numbered in the order of `names`; `use(values)` sets its uniforms by their names. */
 function program(gl, vertex, fragment, names) {
   const made = gl.createProgram();
-  gl.attachShader(made, compiled(gl, gl.VERTEX_SHADER, vertex));
-  gl.attachShader(made, compiled(gl, gl.FRAGMENT_SHADER, fragment));
+  const check = (works, log) => {
+    if (!works && !gl.isContextLost()) throw new Error(log);
+  };
+  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    check(gl.getShaderParameter(shader, gl.COMPILE_STATUS), gl.getShaderInfoLog(shader));
+    gl.attachShader(made, shader);
+  }
   names.forEach((name, place) => gl.bindAttribLocation(made, place, name));
   gl.linkProgram(made);
-  if (!gl.getProgramParameter(made, gl.LINK_STATUS) && !gl.isContextLost()) {
-    throw new Error(gl.getProgramInfoLog(made));
+  check(gl.getProgramParameter(made, gl.LINK_STATUS), gl.getProgramInfoLog(made));
+  const [set, setters] = [{}, settersOf(gl)];
+  for (let i = 0; i < (gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS) || 0); i++) {
+    const { name, type } = gl.getActiveUniform(made, i);
+    const place = gl.getUniformLocation(made, name);
+    set[name] = type === gl.FLOAT_MAT4
+      ? (value) => gl.uniformMatrix4fv(place, false, value) : (value) => gl[setters[type]](place, value);
   }
-  const uniforms = {};
-  const count = gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS) || 0;
-  for (let i = 0; i < count; i++) {
-    const { name } = gl.getActiveUniform(made, i);
-    uniforms[name] = gl.getUniformLocation(made, name);
-  }
-  return { made, uniforms };
-}
-
-/** The three programs, their attributes numbered in the order named here. */
-export function programs(gl) {
-  return {
-    surface: program(gl, surfaceVertex, surfaceFragment, ["position", "normal", "colour", "field"]),
-    line: program(gl, lineVertex, lineFragment, ["from_", "to_", "shade", "width"]),
-    dot: program(gl, dotVertex, dotFragment, ["position", "sliding"]),
+  return (values) => {
+    gl.useProgram(made);
+    for (const [name, value] of Object.entries(values)) set[name]?.(value);
   };
 }
+
+/** The three programs. */
+export const programs = (gl) => ({
+  surface: program(gl, surfaceVertex, surfaceFragment, ["position", "normal", "colour", "field"]),
+  line: program(gl, lineVertex, lineFragment, ["from_", "to_", "shade", "width"]),
+  dot: program(gl, dotVertex, dotFragment, ["position", "sliding"]),
+});

@@ -1,48 +1,46 @@
 // Targets: quantities and the values wanted for them, and the tensions that may change for these.
 
-import { button, capital, element, input, select } from "./elements.js";
-import { digits } from "./panel.js";
+import { button, capital, choice, digits, element, input, select } from "./elements.js";
 
-const WORDS = { "reaction per length": "Largest reaction", pressure: "Pressure of a room", length: "Length of a cable", force: "Force in a cable" };
+const WORDS = {
+  "reaction per length": "Largest reaction", pressure: "Pressure of a room", length: "Length of a cable",
+  force: "Force in a cable",
+};
 const LIMITS = [["value", "="], ["at_most", "at most"], ["at_least", "at least"]];
 
 export class Targets {
+  rows = [];
+
   /** `meet(aims)` is called to meet them, `stop()` to give up. */
   constructor(root, { controls, quantities, aims, units }, meet, stop) {
-    Object.assign(this, { root, units, meet, choices: quantities });
-    this.list = root.querySelector(".list");
-    this.message = root.querySelector(".message");
-    this.list.replaceChildren();
-    this.rows = [];
+    const parts = [".list", ".message", ".vary", ".add", ".meet", ".stop"].map((one) => root.querySelector(one));
+    const [list, message, vary, add, meeting, stopping] = parts;
+    Object.assign(this, { list, message, meeting, stopping, units, meet, choices: quantities });
+    list.replaceChildren();
     const given = aims.targets.length ? aims.targets : [{ quantity: "apex", of: quantities[0].of[1] }];
     given.forEach((target) => this.add(target));
-    const tensions = controls.filter((g) => g.kinds.includes("tensions") || g.kinds.includes("cables"));
+    const tensions = controls.filter(({ kinds }) => kinds.includes("tensions") || kinds.includes("cables"));
     const possible = tensions.map(({ name, patch, wall }) => ({
       label: name, usual: patch !== null && !wall, parameter: { patch: name, kind: patch === null ? "cable" : "tension" },
     }));
-    const same = (a, b) => a.kind === b.kind && String(a.patch) === String(b.patch);
     for (const { label, parameter } of aims.vary) {
-      const known = possible.find((p) => same(p.parameter, parameter));
+      const same = ({ parameter: { kind, patch } }) => kind === parameter.kind && String(patch) === String(parameter.patch);
+      const known = possible.find(same);
       if (known) Object.assign(known, { parameter, given: true });
       else possible.push({ label, parameter, given: true }); // such as a pressure, or several tied
     }
-    this.vary = possible.map((one) => this.parameter(one, aims.vary.length ? one.given : one.usual));
-    root.querySelector(".vary").replaceChildren(...this.vary.map(({ label }) => label));
-    root.querySelector(".add").onclick = () => this.add({ quantity: "apex", of: null }).focus();
-    root.querySelector(".meet").onclick = () => this.send();
-    root.querySelector(".stop").onclick = stop;
+    this.vary = possible.map(({ label: text, parameter, given: aimed, usual }) => {
+      const one = { parameter };
+      one.label = choice("checkbox", text, Boolean(aims.vary.length ? aimed : usual), (on) => on && this.release(one),
+        { "aria-label": `${text} may change` });
+      one.box = one.label.firstChild;
+      return one;
+    });
+    vary.replaceChildren(...this.vary.map(({ label }) => label));
+    add.onclick = () => this.add({ quantity: "apex", of: null }).focus();
+    meeting.onclick = () => this.send();
+    stopping.onclick = stop;
     this.say(aims.targets.length ? "Targets of the project." : "");
-  }
-
-  /** A box for a tension, or another parameter, that may change. */
-  parameter({ label: text, parameter }, checked) {
-    const label = element("label");
-    const box = input("checkbox", `${text} may change`);
-    box.checked = Boolean(checked);
-    label.append(box, text);
-    const one = { label, box, parameter };
-    box.addEventListener("change", () => box.checked && this.release(one));
-    return one;
   }
 
   /** A tension varies once, alone or tied to others: let go of those that a chosen one has a patch of. */
@@ -56,16 +54,13 @@ export class Targets {
 
   /** A row for a target; returns its first control. The height at a point is picked in the picture. */
   add(target) {
-    const row = element("div", "target-row");
     const point = target.quantity === "height";
     const quantity = point
-      ? element("span", "fixed", target.label ?? `height at (${target.of.join(", ")})`)
+      ? element("span.fixed", target.label ?? `height at (${target.of.join(", ")})`)
       : select("Quantity", this.choices.map((one) => [one.quantity, WORDS[one.quantity] ?? capital(one.quantity)]));
-    const of = select("Of", []);
-    const limit = select("Relation", LIMITS);
-    const number = input("number", "Value wanted", { step: "any", required: "" });
-    const unit = element("span", "unit");
-    const entry = { row, target, point, quantity, of, limit, number };
+    const [of, limit, unit] = [select("Of", []), select("Relation", LIMITS), element("span.unit")];
+    const number = input("number", "Value wanted", { step: "any", required: true });
+    const entry = { target, point, quantity, of, limit, number };
     const remove = button("×", () => {
       this.rows.splice(this.rows.indexOf(entry), 1);
       row.remove();
@@ -78,16 +73,13 @@ export class Targets {
       if (names.includes(before.slice(1))) of.value = before;
       unit.textContent = this.units.given ? this.units[dimension] ?? "" : "";
     };
-    if (!point) {
-      quantity.value = target.quantity;
-      quantity.addEventListener("change", choose);
-    }
+    if (!point) Object.assign(quantity, { value: target.quantity, onchange: choose });
     choose();
     if (target.of !== undefined) of.value = `=${target.of ?? ""}`;
     const [key] = LIMITS.find(([name]) => typeof target[name] === "number") ?? ["value"];
     limit.value = key;
     if (typeof target[key] === "number") number.value = digits(target[key], 10);
-    row.append(quantity, ...(point ? [] : [of]), limit, number, unit, remove);
+    const row = element("div.target-row", quantity, ...(point ? [] : [of]), limit, number, unit, remove);
     this.list.append(row);
     this.rows.push(entry);
     return point ? number : quantity;
@@ -99,20 +91,17 @@ export class Targets {
   }
 
   working(on) {
-    this.root.querySelector(".meet").disabled = on;
-    this.root.querySelector(".stop").hidden = !on;
+    this.meeting.disabled = on;
+    this.stopping.hidden = !on;
   }
 
   async send() {
     const empty = this.rows.find(({ number }) => !Number.isFinite(number.valueAsNumber));
     const vary = this.vary.filter(({ box }) => box.checked).map(({ parameter }) => parameter);
-    if (!this.rows.length || empty) {
-      this.say("Give each target a number.", "missed");
+    if (!this.rows.length || empty || !vary.length) {
+      const missing = empty || !this.rows.length;
+      this.say(missing ? "Give each target a number." : "Choose at least one tension that may change.", "missed");
       empty?.number.focus();
-      return;
-    }
-    if (!vary.length) {
-      this.say("Choose at least one tension that may change.", "missed");
       return;
     }
     const targets = this.rows.map(({ target, point, quantity, of, limit, number }) => ({

@@ -1,17 +1,19 @@
 // What the picture is asked for: measures between its points, a section, and single points that are moved.
 
-import { button, element } from "./elements.js";
-import { dot, hit } from "./geometry.js";
-import { digits } from "./panel.js";
+import { button, digits, element } from "./elements.js";
+import { dot, hit, minus, plus, scaled } from "./geometry.js";
 
 const STILL = 5; // pixels that a click may move
 const NEAR = 14; // pixels from a point that is meant
 const STEPS = 1000;
 
 export class Tools {
+  picked = [];
+  points = {};
+
   /** `addHeight(point)` adds a target for the height there; `move(name, place, final)` moves a single point. */
   constructor(viewer, root, addHeight, move) {
-    Object.assign(this, { viewer, addHeight, move, picked: [], points: {} });
+    Object.assign(this, { viewer, addHeight, move });
     const [measure, axis, place] = [".measure", "#section select", "#section input"].map((one) => root.querySelector(one));
     this.told = document.querySelector("#measured");
     measure.onclick = () => {
@@ -45,16 +47,16 @@ export class Tools {
 
   /** In the coordinates of Π: along it, and the height above it. */
   local(point) {
-    const from = point.map((x, k) => x + this.origin[k] - this.foot[k]);
+    const from = minus(plus(point, this.origin), this.foot);
     return this.axes.map((axis) => dot(axis, from));
   }
 
   /** The place on the piece itself of a point that is on one of its mirror images. */
   folded(point) {
     return this.mirrors.reduce((place, [foot, normal]) => {
-      const beyond = (at) => dot(normal, at.map((x, k) => x + this.origin[k] - foot[k]));
+      const beyond = (at) => dot(normal, minus(plus(at, this.origin), foot));
       const far = beyond(place) * beyond([0, 0, 0]) < 0 ? 2 * beyond(place) : 0;
-      return place.map((x, k) => x - far * normal[k]);
+      return minus(place, scaled(normal, far));
     }, point);
   }
 
@@ -77,39 +79,25 @@ export class Tools {
     return found && (found.corners.find((corner) => this.away(corner, place) < NEAR) ?? found.point);
   }
 
-  /** The name of the point, of [name, place], that is near a place in the picture; or undefined. */
-  near(points, place) {
-    return points.find(([, point]) => this.away(point, place) < NEAR)?.[0];
-  }
-
-  /** How a drag over the picture moves a point, parallel to the screen. */
-  shifted(point, from, to) {
-    const [right, upward] = this.viewer.camera.axes();
-    const tall = Math.tan(this.viewer.camera.angle / 2) * this.viewer.camera.seen(point)[2];
-    const [x, y] = [(to[0] - from[0]) * tall * this.viewer.camera.aspect, (to[1] - from[1]) * tall];
-    return point.map((p, k) => p + x * right[k] + y * upward[k]);
-  }
-
   /** A press on the picture: it drags a single point, or marks one where it does not move. */
   grab(event) {
-    const { viewer } = this;
+    const { viewer: { camera, canvas }, origin } = this;
     const from = this.placeOf(event);
-    const handles = Object.entries(this.points).map(([name, p]) => [name, p.map((x, k) => x - this.origin[k])]);
-    const name = this.measuring ? undefined : this.near(handles, from);
-    if (name !== undefined) {
-      const start = handles.find(([one]) => one === name)[1];
-      return (now, final) => {
-        const place = this.shifted(start, from, this.placeOf(now));
-        this.move(name, place.map((x, k) => x + this.origin[k]), final);
-      };
-    }
     if (this.measuring) {
-      viewer.canvas.addEventListener("pointerup", (now) => {
+      canvas.addEventListener("pointerup", (now) => {
         const still = Math.hypot(now.clientX - event.clientX, now.clientY - event.clientY) < STILL;
         if (still) this.mark(this.placeOf(now));
       }, { once: true });
+      return null;
     }
-    return null;
+    const [name, start] = Object.entries(this.points).map(([one, point]) => [one, minus(point, origin)])
+      .find(([, point]) => this.away(point, from) < NEAR) ?? [];
+    return start ? (now, final) => { // parallel to the screen
+      const [right, upward] = camera.axes();
+      const tall = Math.tan(camera.angle / 2) * camera.seen(start)[2];
+      const [x, y] = minus(this.placeOf(now), from).map((part) => part * tall);
+      this.move(name, plus(start, scaled(right, x * camera.aspect), scaled(upward, y), origin), final);
+    } : null;
   }
 
   mark(place) {
@@ -127,12 +115,12 @@ export class Tools {
     const [last, first] = this.picked.map((one) => this.local(one)).reverse();
     const shown = (x) => `${digits(x)}${this.unit}`;
     if (!first) {
-      this.told.append(element("span", "", `Height ${shown(last[2])} at (${digits(last[0])}, ${digits(last[1])})`),
-        button("Target here", () => this.addHeight(
-          this.local(this.folded(point)).slice(0, 2).map((x) => Number(x.toPrecision(6))))));
+      const place = () => this.local(this.folded(point)).slice(0, 2).map((x) => Number(x.toPrecision(6)));
+      this.told.append(element("span", `Height ${shown(last[2])} at (${digits(last[0])}, ${digits(last[1])})`),
+        button("Target here", () => this.addHeight(place())));
       return;
     }
-    const [x, y, z] = last.map((one, k) => one - first[k]);
+    const [x, y, z] = minus(last, first);
     this.told.textContent = `Distance ${shown(Math.hypot(x, y, z))}, in plan ${shown(Math.hypot(x, y))}, in height ${shown(z)}`;
   }
 

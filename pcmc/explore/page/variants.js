@@ -1,22 +1,18 @@
 // Variants: surfaces kept side by side, their numbers, and the differences from one of them.
 
-import { button, capital, element, tableRow } from "./elements.js";
-import { digits } from "./panel.js";
+import { button, capital, digits, element, tableRow } from "./elements.js";
 
 /** The row that begins the rows of a patch, or of all, across the table. */
-function heading(text, kind = "part") {
-  const row = tableRow(element("span", kind, text), []);
-  row.firstChild.colSpan = 5;
-  return row;
-}
+const heading = (text, kind = "part") => element("tr", element("th", { scope: "row", colSpan: 5 }, element(`span.${kind}`, text)));
 
 export class Variants {
+  pictures = new Map();
+
   /** `act(name, body)` asks the server; `picture()` is the canvas to copy small, or null. */
   constructor(root, act, picture) {
-    Object.assign(this, { root, act, picture, pictures: new Map() });
-    const form = root.querySelector("form");
-    const name = form.querySelector("input");
-    form.onsubmit = (event) => {
+    Object.assign(this, { root, act, picture });
+    const name = root.querySelector("form input");
+    root.querySelector("form").onsubmit = (event) => {
       event.preventDefault();
       const chosen = name.value.trim() || this.nextName();
       this.pictures.set(chosen, this.thumbnail());
@@ -26,7 +22,7 @@ export class Variants {
   }
 
   nextName() {
-    const taken = new Set(this.header.variants.map((v) => v.name));
+    const taken = new Set(this.header.variants.map(({ name }) => name));
     let number = 1;
     while (taken.has(`Variant ${number}`)) number += 1;
     return `Variant ${number}`;
@@ -35,9 +31,7 @@ export class Variants {
   thumbnail() {
     const canvas = this.picture();
     if (!canvas) return "";
-    const small = element("canvas");
-    small.width = 160;
-    small.height = Math.round((160 * canvas.height) / canvas.width);
+    const small = element("canvas", { width: 160, height: Math.round((160 * canvas.height) / canvas.width) });
     small.getContext("2d").drawImage(canvas, 0, 0, small.width, small.height);
     return small.toDataURL();
   }
@@ -51,23 +45,18 @@ export class Variants {
     if (compared === null) return;
     const other = variants[compared];
     table.querySelector("caption").textContent = `Differences from ${other.name}`;
-    const key = (row) => `${row.quantity} ${row.of} ${row.owner}`;
-    const before = new Map(other.figures.map((row) => [key(row), row.value]));
-    const rows = figures.filter((row) => before.has(key(row)) && row.value !== null && before.get(key(row)) !== null);
-    const changed = rows.filter((row) => digits(row.value) !== digits(before.get(key(row))));
-    const difference = (row) => {
-      const then = before.get(key(row));
-      const change = row.value - then;
-      const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 2)}`;
-      const head = element("span", "", capital(row.quantity));
-      if (units.given) head.append(element("span", "unit", ` ${units[row.dimension]}`));
-      return tableRow(head, [
-        digits(then), digits(row.value), signed(change), then ? signed((100 * change) / Math.abs(then)) : "",
-      ]);
-    };
-    const parts = ["", ...new Set(changed.map((row) => row.of).filter(Boolean))]; // all, then each
+    const key = ({ quantity, of, owner }) => `${quantity} ${of} ${owner}`;
+    const values = new Map(other.figures.map((row) => [key(row), row.value]));
+    const rows = figures.map((row) => ({ ...row, then: values.get(key(row)) }))
+      .filter(({ value, then }) => value !== null && then !== null && then !== undefined);
+    const changed = rows.filter(({ value, then }) => digits(value) !== digits(then));
+    const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 2)}`;
+    const difference = ({ quantity, dimension, value, then }) => tableRow(
+      element("span", capital(quantity), ...(units.given ? [element("span.unit", ` ${units[dimension]}`)] : [])),
+      [digits(then), digits(value), signed(value - then), then ? signed((100 * (value - then)) / Math.abs(then)) : ""]);
+    const parts = ["", ...new Set(changed.map(({ of }) => of).filter(Boolean))]; // all, then each
     const shown = parts.flatMap((part) => {
-      const own = changed.filter((row) => row.of === part);
+      const own = changed.filter(({ of }) => of === part);
       return own.length ? [heading(part || "all"), ...own.map(difference)] : [];
     });
     const alike = rows.length - changed.length;
@@ -75,26 +64,18 @@ export class Variants {
     table.querySelector("tbody").replaceChildren(...shown, ...(alike ? [heading(words, "unit")] : []));
   }
 
-  item(variant, number, compared) {
-    const item = element("li");
-    const picture = this.pictures.get(variant.name);
-    if (picture) item.append(Object.assign(element("img"), { src: picture, alt: "", width: 80 }));
-    const words = element("div", "words");
-    const all = new Map(variant.figures.filter((row) => !row.of).map((row) => [row.quantity, row.value]));
-    words.append(
-      element("b", "", variant.name),
-      element("p", "", `${variant.word}; apex ${digits(all.get("apex"))}, area ${digits(all.get("area"))}, volume ${digits(all.get("volume"))}`),
-    );
+  item({ name, word, figures }, number, compared) {
+    const src = this.pictures.get(name);
+    const all = new Map(figures.filter(({ of }) => !of).map(({ quantity, value }) => [quantity, digits(value)]));
     const on = compared === number;
     const compare = button(on ? "Comparing" : "Compare", () => this.act("compare", { number: on ? null : number }),
-      `Compare the surface shown with ${variant.name}`);
+      `Compare the surface shown with ${name}`);
     compare.setAttribute("aria-pressed", String(on));
-    const acts = element("div", "row");
-    acts.append(compare,
-      button("Show", () => this.act("recall", { number }), `Show ${variant.name} again`),
-      button("×", () => this.act("forget", { number }), `Remove ${variant.name}`));
-    words.append(acts);
-    item.append(words);
-    return item;
+    const figuresShown = ["apex", "area", "volume"].map((one) => `${one} ${all.get(one) ?? "–"}`).join(", ");
+    return element("li", ...(src ? [element("img", { src, alt: "", width: 80 })] : []), element("div.words",
+      element("b", name), element("p", `${word}; ${figuresShown}`),
+      element("div.row", compare,
+        button("Show", () => this.act("recall", { number }), `Show ${name} again`),
+        button("×", () => this.act("forget", { number }), `Remove ${name}`))));
   }
 }

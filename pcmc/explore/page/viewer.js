@@ -1,25 +1,26 @@
 // Draws a surface with WebGL 2: sheets, mesh, curves, supports, the plane's grid and arrows.
 
 import { Camera } from "./camera.js";
-import { boxOf, normals, roundBelow, sectionOf, span } from "./geometry.js";
+import { boxOf, dot, normals, plus, roundBelow, scaled, sectionOf, span } from "./geometry.js";
 import { programs } from "./shaders.js";
 
 const MESH = [0.12, 0.16, 0.2, 0.3];
 const GRID = [0.55, 0.6, 0.65, 0.35];
 const MARK = [0.85, 0.1, 0.45, 1];
 const WHOLE = [0, 0, 0, 1e30]; // a section that cuts nothing away: (normal, offset)
+// lines in the order in which they are drawn, and how far before the surface
+const LIFTS = { grid: 0, mesh: 1e-4, curves: 3e-4, arrows: 6e-4, section: 6e-4, marks: 2e-3 };
 
 export class Viewer {
+  options = { mesh: true, supports: true, walls: true, smooth: false, grid: true };
+  cut = WHOLE;
+  marks = [];
+
   /** Throws if the browser has no WebGL 2. `gridChanged` is called with the grid's spacing. */
   constructor(canvas, gridChanged) {
-    this.canvas = canvas;
-    this.gridChanged = gridChanged;
+    Object.assign(this, { canvas, gridChanged });
     this.gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
     if (!this.gl) throw new Error("no WebGL 2");
-    this.options = { mesh: true, supports: true, walls: true, smooth: false, grid: true };
-    this.waiting = false;
-    this.cut = WHOLE;
-    this.marks = [];
     this.camera = new Camera(() => this.redraw());
     this.camera.attach(canvas, (event) => this.grab?.(event));
     this.prepare();
@@ -31,13 +32,10 @@ export class Viewer {
   prepare() {
     const { gl } = this;
     this.programs = programs(gl);
-    this.surface = this.parts([3, 3, 3, 2]);
+    this.surface = this.parts([[3], [3], [3], [2]]);
     this.elements = gl.createBuffer();
-    this.dots = this.parts([3, 1]);
-    this.lines = {};
-    for (const name of ["grid", "mesh", "curves", "arrows", "section", "marks"]) {
-      this.lines[name] = this.parts([3, 3, 4, 2], true);
-    }
+    this.dots = this.parts([[3], [1]]);
+    this.lines = Object.fromEntries(Object.keys(LIFTS).map((name) => [name, this.parts([[3, 3], [4], [2]], true)]));
     this.map = gl.createTexture();
     this.setMap(new Uint8Array(256 * 4));
     gl.enable(gl.DEPTH_TEST);
@@ -54,17 +52,22 @@ export class Viewer {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
   }
 
-  /** A vertex array with a buffer for each attribute. */
-  parts(sizes, instanced = false) {
+  /** A vertex array with a buffer for each list of the sizes of attributes. */
+  parts(layout, instanced = false) {
     const { gl } = this;
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
-    const buffers = sizes.map((size, place) => {
+    let place = 0;
+    const buffers = layout.map((sizes) => {
       const buffer = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 0, 0);
-      if (instanced) gl.vertexAttribDivisor(place, 1);
+      const stride = 4 * sizes.reduce((sum, size) => sum + size);
+      sizes.forEach((size, k) => {
+        gl.enableVertexAttribArray(place);
+        gl.vertexAttribPointer(place, size, gl.FLOAT, false, stride, 4 * size * k);
+        gl.vertexAttribDivisor(place, instanced ? 1 : 0);
+        place += 1;
+      });
       return buffer;
     });
     gl.bindVertexArray(null);
@@ -80,12 +83,9 @@ export class Viewer {
   /** Everything that stays the same while the surface moves. */
   setMesh(header, arrays) {
     const again = Boolean(this.mesh);
-    this.mesh = { header, ...arrays };
+    Object.assign(this, { mesh: { header, ...arrays }, X: null, field: null, arrows: null });
     this.camera.stand(header.up);
     if (!again) this.camera.look("diagonal");
-    this.X = null;
-    this.field = null;
-    this.arrows = null;
   }
 
   /** Vertices (n,3), flat. The view is fitted to the first, and again when they outgrow it. */
@@ -106,14 +106,6 @@ export class Viewer {
     else this.fillField();
   }
 
-  /** The corners to draw: shared within a patch, or each triangle's own where its colour is flat. */
-  corners() {
-    const { sheet_faces: faces, sheet_vertex: vertex, sheet_patch: patch } = this.mesh;
-    if (!this.field?.byFace) return { faces, vertex, patch };
-    const own = (array) => Uint32Array.from(faces, (corner) => array[corner]);
-    return { faces: Uint32Array.from(faces.keys()), vertex: own(vertex), patch: own(patch) };
-  }
-
   /** Arrows as [vertex, vector, colour], or null. */
   setArrows(arrows) {
     this.arrows = arrows;
@@ -132,114 +124,84 @@ export class Viewer {
     this.fillMarks();
   }
 
-  fillMarks() {
-    if (!this.X) return;
-    const [from, to] = [[], []];
-    const arm = 0.012 * this.mesh.header.size;
-    for (const point of this.marks) {
-      for (const k of [0, 1, 2]) {
-        from.push(...point.map((x, i) => x - (i === k ? arm : 0)));
-        to.push(...point.map((x, i) => x + (i === k ? arm : 0)));
-      }
-    }
-    this.marks.slice(1).forEach((point, k) => { from.push(...this.marks[k]); to.push(...point); });
-    this.placeLines("marks", from, to, () => MARK, () => [1.2, 1.2]);
-    const line = this.cut === WHOLE ? [[], []] : sectionOf(this.X, this.triangles, this.cut);
-    this.placeLines("section", ...line, () => MARK, () => [1.4, 1.4]);
-    this.redraw();
-  }
-
   setOptions(options) {
     Object.assign(this.options, options);
-    if (this.X) this.refill();
+    this.refill();
   }
 
+  /** The corners to draw: shared within a patch, or each triangle's own where its colour is flat. */
+  corners() {
+    const { sheet_faces: faces, sheet_vertex: vertex, sheet_patch: patch } = this.mesh;
+    if (!this.field?.byFace) return { faces, vertex, patch };
+    const own = (array) => Uint32Array.from(faces, (corner) => array[corner]);
+    return { faces: Uint32Array.from(faces.keys()), vertex: own(vertex), patch: own(patch) };
+  }
+
+  /** What is drawn of the mesh: all but its places. */
   refill() {
     if (!this.X) return;
-    const { gl } = this;
-    const m = this.mesh;
+    const { gl, mesh: m, options } = this;
     this.sheet = this.corners();
     const { faces, vertex, patch } = this.sheet;
-    const wall = m.header.patches.map((p) => p.wall);
-    const chosen = [];
-    const onSheet = new Uint8Array(m.header.vertices);
-    for (let f = 0; f < faces.length; f += 3) {
-      const isWall = wall[patch[faces[f]]];
-      if (isWall && !this.options.walls) continue;
-      for (let k = 0; k < 3; k++) {
-        chosen.push(faces[f + k]);
-        onSheet[vertex[faces[f + k]]] = 1;
-      }
-    }
-    this.chosen = new Uint32Array(chosen);
+    const { patches } = m.header;
+    this.chosen = faces.filter((_, i) => options.walls || !patches[patch[faces[i - (i % 3)]]].wall);
     this.triangles = this.chosen.map((corner) => vertex[corner]);
+    this.visible = new Uint8Array(m.header.vertices);
+    for (const v of this.triangles) this.visible[v] = 1;
     gl.bindVertexArray(null);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.elements);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.chosen, gl.STATIC_DRAW);
     const colours = new Float32Array(3 * patch.length);
-    patch.forEach((p, i) => colours.set(m.header.patches[p].color, 3 * i));
+    patch.forEach((p, i) => colours.set(patches[p].color, 3 * i));
     this.fill(this.surface, 2, colours);
-    this.visible = onSheet;
-    const shown = (ends, ofWall) => this.options.walls
-      ? ends : ends.filter((_, i) => !ofWall[i >> 1]);
-    this.shownEdges = this.options.mesh ? shown(m.edges, m.edge_wall) : new Uint32Array(0);
+    const shown = (ends, ofWall) => (options.walls ? ends : ends.filter((_, i) => !ofWall[i >> 1]));
+    this.shownEdges = options.mesh ? shown(m.edges, m.edge_wall) : new Uint32Array(0);
     this.shownCurves = shown(m.curves, m.curve_wall);
-    this.held = this.options.supports
-      ? [...m.fixed, ...m.sliding].filter((v) => onSheet[v]) : [];
+    this.held = options.supports ? [...m.fixed, ...m.sliding].filter((v) => this.visible[v]) : [];
     const sliding = new Set(m.sliding);
-    this.fill(this.dots, 1, Float32Array.from(this.held, (v) => (sliding.has(v) ? 1 : 0)));
+    this.fill(this.dots, 1, Float32Array.from(this.held, (v) => Number(sliding.has(v))));
     this.fillPlaces();
     this.fillField();
   }
 
   fillPlaces() {
-    const { X, sheet: { faces, vertex } } = this;
-    const places = new Float32Array(3 * vertex.length);
-    vertex.forEach((v, i) => {
+    const { faces, vertex } = this.sheet;
+    const places = this.placesOf(vertex);
+    this.fill(this.surface, 0, places);
+    this.fill(this.surface, 1, normals(places, faces));
+    this.fill(this.dots, 0, this.placesOf(this.held));
+    this.dots.count = this.held.length;
+    this.placeLines("mesh", this.placesOf(this.shownEdges), MESH, [0.5]);
+    this.placeLines("curves", this.placesOf(this.shownCurves), this.colour("color"), [1.1]);
+    this.fillMarks();
+    this.fillGrid();
+    this.fillArrows();
+  }
+
+  /** Places of vertices, flat (k,3). */
+  placesOf(vertices) {
+    const { X } = this;
+    const places = new Float32Array(3 * vertices.length);
+    vertices.forEach((v, i) => {
       places[3 * i] = X[3 * v];
       places[3 * i + 1] = X[3 * v + 1];
       places[3 * i + 2] = X[3 * v + 2];
     });
-    this.fill(this.surface, 0, places);
-    this.fill(this.surface, 1, normals(places, faces));
-    const dots = new Float32Array(3 * this.held.length);
-    this.held.forEach((v, i) => dots.set(X.subarray(3 * v, 3 * v + 3), 3 * i));
-    this.fill(this.dots, 0, dots);
-    this.dots.count = this.held.length;
-    this.fillLines("mesh", this.shownEdges, MESH, 0.5);
-    this.fillLines("curves", this.shownCurves, this.colour("color"), 1.1);
-    this.fillMarks();
-    this.fillGrid();
-    this.fillArrows();
-    this.redraw();
+    return places;
   }
 
-  /** Lines between pairs of vertices, half as wide as they will be. */
-  fillLines(name, pairs, shade, width) {
-    const from = [];
-    const to = [];
-    for (let i = 0; i < pairs.length; i += 2) {
-      const [a, b] = [3 * pairs[i], 3 * pairs[i + 1]];
-      from.push(this.X[a], this.X[a + 1], this.X[a + 2]);
-      to.push(this.X[b], this.X[b + 1], this.X[b + 2]);
-    }
-    this.placeLines(name, from, to, (i) => shade, () => [width, width]);
-  }
-
-  placeLines(name, from, to, shade, width) {
+  /** Lines between the `ends`, two by two; a colour and half the width for all, or for each. */
+  placeLines(name, ends, shade, width) {
     const part = this.lines[name];
-    part.count = from.length / 3;
-    this.fill(part, 0, new Float32Array(from));
-    this.fill(part, 1, new Float32Array(to));
-    const shades = new Float32Array(4 * part.count);
-    const widths = new Float32Array(2 * part.count);
-    const ratio = window.devicePixelRatio || 1;
-    for (let i = 0; i < part.count; i++) {
-      shades.set(shade(i), 4 * i);
-      widths.set(width(i).map((w) => w * 2 * ratio), 2 * i);
-    }
-    this.fill(part, 2, shades);
-    this.fill(part, 3, widths);
+    part.count = ends.length / 6;
+    const spread = (values, size, factor) => {
+      const all = new Float32Array(size * part.count);
+      for (let i = 0; i < all.length; i++) all[i] = factor * values[i % values.length];
+      return all;
+    };
+    this.fill(part, 0, Float32Array.from(ends));
+    this.fill(part, 1, spread(shade, 4, 1));
+    this.fill(part, 2, spread(width, 2, 2 * (window.devicePixelRatio || 1)));
   }
 
   /** A colour of the page's theme, as the canvas has it. */
@@ -248,59 +210,54 @@ export class Viewer {
     return [...parts.slice(0, 3).map((x) => x / 255), 1];
   }
 
+  fillMarks() {
+    if (!this.X) return;
+    const arm = 0.012 * this.mesh.header.size;
+    const crosses = this.marks.flatMap((point) => [0, 1, 2].flatMap((k) => [-arm, arm].flatMap(
+      (step) => point.map((x, i) => (i === k ? x + step : x)))));
+    const between = this.marks.slice(1).flatMap((point, k) => [...this.marks[k], ...point]);
+    this.placeLines("marks", [...crosses, ...between], MARK, [1.2]);
+    this.placeLines("section", this.cut === WHOLE ? [] : sectionOf(this.X, this.triangles, this.cut), MARK, [1.4]);
+    this.redraw();
+  }
+
   fillGrid() {
-    const { up, first, second, box } = this.camera;
+    const { up, first, second } = this.camera;
     const { size, ground } = this.mesh.header;
     const spacing = roundBelow(size / 6);
-    const sides = [first, second].map((axis) => {
-      const all = this.camera.corners().map((c) => c[0] * axis[0] + c[1] * axis[1] + c[2] * axis[2]);
+    const [along, across] = [first, second].map((axis) => {
+      const all = this.camera.corners().map((corner) => dot(corner, axis));
       return [Math.floor(Math.min(...all) / spacing - 0.4), Math.ceil(Math.max(...all) / spacing + 0.4)];
     });
-    const at = (u, v) => [0, 1, 2].map(
-      (k) => spacing * (u * first[k] + v * second[k]) - ground * up[k]);
-    const from = [];
-    const to = [];
-    if (this.options.grid && box) {
-      for (let u = sides[0][0]; u <= sides[0][1]; u++) {
-        from.push(...at(u, sides[1][0]));
-        to.push(...at(u, sides[1][1]));
-      }
-      for (let v = sides[1][0]; v <= sides[1][1]; v++) {
-        from.push(...at(sides[0][0], v));
-        to.push(...at(sides[0][1], v));
-      }
-    }
-    this.placeLines("grid", from, to, () => GRID, () => [0.5, 0.5]);
+    const at = (u, v) => plus(scaled(first, spacing * u), scaled(second, spacing * v), scaled(up, -ground));
+    const ends = [];
+    for (let u = along[0]; u <= along[1]; u++) ends.push(...at(u, across[0]), ...at(u, across[1]));
+    for (let v = across[0]; v <= across[1]; v++) ends.push(...at(along[0], v), ...at(along[1], v));
+    this.placeLines("grid", this.options.grid ? ends : [], GRID, [0.5]);
     this.gridChanged(this.options.grid ? spacing : 0);
   }
 
   fillArrows() {
     if (!this.X) return;
-    const from = [];
-    const to = [];
-    const shades = [];
-    const widths = [];
-    const tints = new Map();
+    const [ends, shades, widths, tints] = [[], [], [], new Map()];
     const at = (v) => this.X.subarray(3 * v, 3 * v + 3);
+    const add = (from, to, colour, width) => {
+      ends.push(...from, ...to);
+      shades.push(...colour, 1);
+      widths.push(...width);
+    };
     for (const [v, vector, colour] of this.arrows || []) {
       if (!this.visible[v]) continue;
       tints.set(v, colour);
-      from.push(...at(v));
-      to.push(...at(v).map((x, k) => x + vector[k]));
-      shades.push([...colour, 1]);
-      widths.push([2.2, 0.3]);
+      add(at(v), at(v).map((x, k) => x + vector[k]), colour, [2.2, 0.3]);
     }
     // the boundary itself in the same colours
     const curves = this.shownCurves;
     for (let i = 0; i < curves.length; i += 2) {
       const [a, b] = [curves[i], curves[i + 1]];
-      if (!tints.has(a) || !tints.has(b)) continue;
-      from.push(...at(a));
-      to.push(...at(b));
-      shades.push([...tints.get(a), 1]);
-      widths.push([2.6, 2.6]);
+      if (tints.has(a) && tints.has(b)) add(at(a), at(b), tints.get(a), [2.6, 2.6]);
     }
-    this.placeLines("arrows", from, to, (i) => shades[i], (i) => widths[i]);
+    this.placeLines("arrows", ends, shades, widths);
     this.redraw();
   }
 
@@ -310,13 +267,11 @@ export class Viewer {
     const known = new Float32Array(2 * vertex.length);
     if (field) {
       vertex.forEach((v, i) => {
-        const wall = m.header.patches[patch[i]].wall;
-        const skip = field.linesOnly || (field.skipWalls && wall);
+        const skip = field.linesOnly || (field.skipWalls && m.header.patches[patch[i]].wall);
         const value = field.values[field.byFace ? Math.floor(i / 3) : v];
-        if (!skip && Number.isFinite(value)) {
-          known[2 * i] = value;
-          known[2 * i + 1] = 1;
-        }
+        if (skip || !Number.isFinite(value)) return;
+        known[2 * i] = value;
+        known[2 * i + 1] = 1;
       });
       this.setMap(field.map.table);
     }
@@ -333,45 +288,44 @@ export class Viewer {
 
   draw() {
     this.waiting = false;
-    const { gl, canvas, camera } = this;
+    const { gl, canvas, camera, cut, dots } = this;
     const ratio = window.devicePixelRatio || 1;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((s) => Math.round(s * ratio));
+    const screen = [canvas.clientWidth, canvas.clientHeight].map((s) => Math.round(s * ratio));
+    const [width, height] = screen;
     if (!width || !height || gl.isContextLost()) return;
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
-    }
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     gl.viewport(0, 0, width, height);
     gl.clearColor(...this.colour("backgroundColor"));
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (!this.X) return;
     camera.aspect = width / height;
     const view = camera.matrix(height);
-    this.drawLines("grid", view, width, height, 0);
-    this.drawSurface(view);
     const spacing = this.spacing() * camera.pixels / ratio;
-    if (spacing > 5) this.drawLines("mesh", view, width, height, 1e-4);
-    this.drawLines("curves", view, width, height, 3e-4);
-    this.drawLines("arrows", view, width, height, 6e-4);
-    this.drawLines("section", view, width, height, 6e-4);
-    this.drawLines("marks", view, width, height, 2e-3);
-    if (!this.arrows) this.drawDots(view, Math.min(9, 0.62 * spacing) * ratio);
+    for (const [name, lift] of Object.entries(LIFTS)) {
+      const part = this.lines[name];
+      if (part.count && (name !== "mesh" || spacing > 5)) {
+        this.programs.line({ view, screen, lift, cut: ["grid", "section", "marks"].includes(name) ? WHOLE : cut });
+        gl.enable(gl.BLEND);
+        gl.bindVertexArray(part.array);
+        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, part.count);
+        gl.disable(gl.BLEND);
+      }
+      if (name === "grid") this.drawSurface(view);
+    }
+    const size = Math.min(9, 0.62 * spacing) * ratio;
+    if (this.arrows || !dots.count || size < 2) return;
+    this.programs.dot({ view, size, lift: 4e-4, cut });
+    gl.bindVertexArray(dots.array);
+    gl.drawArrays(gl.POINTS, 0, dots.count);
   }
 
   drawSurface(view) {
-    const { gl, camera } = this;
-    const { made, uniforms } = this.programs.surface;
+    const { gl, camera, cut, field } = this;
     const [right, upward, back] = camera.axes();
-    const sun = [0, 1, 2].map((k) => 0.45 * right[k] + 0.6 * upward[k] + 0.66 * back[k]);
-    gl.useProgram(made);
-    gl.uniformMatrix4fv(uniforms.view, false, view);
-    gl.uniform3fv(uniforms.eye, camera.eye);
-    gl.uniform4fv(uniforms.cut, this.cut);
-    gl.uniform3fv(uniforms.sun, sun);
-    gl.uniform3fv(uniforms.up, camera.up);
-    gl.uniform1i(uniforms.smooth_, this.options.smooth ? 1 : 0);
-    gl.uniform1i(uniforms.coloured, this.field ? 1 : 0);
-    gl.uniform2fv(uniforms.limits, this.field ? this.field.limits : [0, 1]);
+    this.programs.surface({
+      view, cut, eye: camera.eye, up: camera.up, smooth_: this.options.smooth, coloured: Boolean(field),
+      sun: plus(scaled(right, 0.45), scaled(upward, 0.6), scaled(back, 0.66)), limits: field?.limits ?? [0, 1],
+    });
     gl.bindTexture(gl.TEXTURE_2D, this.map);
     gl.bindVertexArray(this.surface.array);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.elements);
@@ -380,46 +334,15 @@ export class Viewer {
     gl.disable(gl.POLYGON_OFFSET_FILL);
   }
 
-  drawLines(name, view, width, height, lift) {
-    const { gl } = this;
-    const { made, uniforms } = this.programs.line;
-    const part = this.lines[name];
-    if (!part.count) return;
-    gl.useProgram(made);
-    gl.uniformMatrix4fv(uniforms.view, false, view);
-    gl.uniform2f(uniforms.screen, width, height);
-    gl.uniform1f(uniforms.lift, lift);
-    gl.uniform4fv(uniforms.cut, ["grid", "section", "marks"].includes(name) ? WHOLE : this.cut);
-    gl.enable(gl.BLEND);
-    gl.bindVertexArray(part.array);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, part.count);
-    gl.disable(gl.BLEND);
-  }
-
-  drawDots(view, size) {
-    const { gl } = this;
-    const { made, uniforms } = this.programs.dot;
-    if (!this.dots.count || size < 2) return;
-    gl.useProgram(made);
-    gl.uniformMatrix4fv(uniforms.view, false, view);
-    gl.uniform1f(uniforms.size, size);
-    gl.uniform1f(uniforms.lift, 4e-4);
-    gl.uniform4fv(uniforms.cut, this.cut);
-    gl.bindVertexArray(this.dots.array);
-    gl.drawArrays(gl.POINTS, 0, this.dots.count);
-  }
-
   /** Mean length of the first edges. */
   spacing() {
-    const { X } = this;
-    const ends = this.mesh.edges.length ? this.mesh.edges : this.mesh.curves;
-    const count = Math.min(ends.length / 2, 400);
+    const { edges, curves } = this.mesh;
+    const ends = this.placesOf((edges.length ? edges : curves).subarray(0, 800));
     let total = 0;
-    for (let i = 0; i < count; i++) {
-      const [a, b] = [3 * ends[2 * i], 3 * ends[2 * i + 1]];
-      total += Math.hypot(X[a] - X[b], X[a + 1] - X[b + 1], X[a + 2] - X[b + 2]);
+    for (let i = 0; i < ends.length; i += 6) {
+      total += Math.hypot(ends[i] - ends[i + 3], ends[i + 1] - ends[i + 4], ends[i + 2] - ends[i + 5]);
     }
-    return total / Math.max(count, 1);
+    return total / Math.max(ends.length / 6, 1);
   }
 
   /** The picture as a PNG. */
