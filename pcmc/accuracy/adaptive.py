@@ -50,8 +50,10 @@ SINGULAR = 2.0  # times the wanted root of a share: above, the share falls more 
 FLOOR = 1e-12  # of the largest share: a share below counts as that much
 WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
 ACCURACY_OF = ("mesh", "limit")
-QUANTITIES = ("height", "area", "volume", "energy", "reaction", "thrust")
-QUANTITIES += ("reaction per length", "lowest eigenvalue")
+QUANTITIES = (
+    *("height", "area", "volume", "energy", "reaction", "thrust"),
+    *("reaction per length", "lowest eigenvalue"),
+)
 Accuracy = Mapping[str, float] | str
 
 
@@ -213,7 +215,7 @@ def accuracies(given: Any) -> dict[str, float]:
     pcmc.base.errors.OptionError: unknown quantity 'hight'; did you mean 'height'? Known: height, ...
     """
     expected = "a table such as {'height': 1e-3}, or a text such as 'height=1e-3'"
-    wanted: dict[Any, Any] = {}
+    wanted: dict[Any, Any] = dict(given) if isinstance(given, Mapping) else {}
     for part in given.split(",") if isinstance(given, str) else ():
         name, sign, value = part.rpartition("=")
         try:
@@ -222,7 +224,6 @@ def accuracies(given: Any) -> dict[str, float]:
             sign = ""
         if not sign or not name.strip():
             validate.refuse("accuracy", part.strip(), "QUANTITY=NUMBER, such as height=1e-3")
-    wanted = given if isinstance(given, Mapping) else wanted
     if not wanted:
         validate.refuse("accuracy", given, expected)
     found = {}

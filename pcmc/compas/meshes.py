@@ -18,7 +18,7 @@ from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
 from ..forces.curvature import mean_curvature
-from ..io.mesh_data import FIXED, SLIDING, MeshData, given_support
+from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
 from ..surface.topology import topology
@@ -37,24 +37,18 @@ def to_meshes(surface: Surface) -> list[Any]:
     The key of a vertex is its index in the surface, that of a face likewise, so ``from_meshes`` restores the
     surface to the last bit.
 
-    Returns
-    -------
-    list of Mesh : named after their patches, with
-
-        - ``mesh.attributes``: ``tension`` α (force/length), ``pressure`` p (force/area) with ``weight`` and
-          ``snow``, ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and the lines and circles that
-          vertices slide along;
-        - at vertices: ``is_support`` (fixed), ``is_sliding`` (on Π), ``guide`` (the number of the line or
-          circle in ``attributes["pcmc"]["guides"]``, or None), ``mean_curvature`` H (1/length; None on
-          junctions and boundaries), and ``rx``, ``ry``, ``rz``, the force of the support on the surface.
+    They have the names of their patches. ``mesh.attributes`` are ``tension`` α (force/length), ``pressure`` p
+    (force/area) with ``weight`` and ``snow``, ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and
+    the lines and circles that vertices slide along. Vertices have ``is_support`` (fixed), ``is_sliding`` (on
+    Π), ``guide`` (the number of the line or circle in ``attributes["pcmc"]["guides"]``, or None),
+    ``mean_curvature`` H (1/length; None on junctions and boundaries), and ``rx``, ``ry``, ``rz``, the force
+    of the support on the surface.
 
     Raises
     ------
     SurfaceError : for a surface with a property that meshes do not carry.
     MissingExtra : without COMPAS.
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
@@ -128,8 +122,6 @@ def from_meshes(
         mesh's name, or the number of the vertex or face in the surface.
     MissingExtra : without COMPAS.
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
@@ -203,7 +195,7 @@ def _plain(value: Any) -> dict[str, Any]:
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
-    support, standing = given_support(surface), standing_part(surface).surface
+    support, standing = support_of(surface, planes=True), standing_part(surface).surface
     guide = np.full(surface.n, None)
     for number, (_, along) in enumerate(surface.given_supports.on_line):
         guide[along] = number

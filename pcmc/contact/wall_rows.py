@@ -155,7 +155,9 @@ def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom
 def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
     """(g,n) the least number of edges (k,2) from each goal to each vertex, or (n,) from the nearest goal."""
     graph = coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
-    return np.asarray(dijkstra(graph, directed=False, indices=goals, unweighted=True, min_only=nearest))
+    if nearest:
+        return np.asarray(dijkstra(graph, directed=False, indices=goals, unweighted=True, min_only=True))
+    return np.asarray(dijkstra(graph, directed=False, indices=goals, unweighted=True))
 
 
 def held_walls(

@@ -33,7 +33,7 @@ from .state import BranchMesh, State
 
 ITERATIONS = 12  # most Newton steps of a correction
 SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
-COLLAPSED = 0.02  # triangle quality below which no point is accepted
+LEAST_QUALITY = 0.02  # triangle quality below which no point is accepted
 CONSTRAINT_TOLERANCE = 1e-9  # |g| that counts as zero
 
 
@@ -158,7 +158,7 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
     for iteration in range(1, ITERATIONS + 2):
         if not mesh.line.allows(at.parameter):
             raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
-        if iteration > 1 and at.quality < COLLAPSED:
+        if iteration > 1 and at.quality < LEAST_QUALITY:
             raise MeshCollapsed("triangles collapse")
         if iteration > 1 and mesh.reaches_plane(at.X).any():
             raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method

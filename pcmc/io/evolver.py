@@ -31,7 +31,7 @@ from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from .evolver_reading import ROUNDING, read
 from .formats import Content
-from .mesh_data import FREE, SLIDING, given_support
+from .mesh_data import FREE, SLIDING, support_of
 from .text import escaped, format_rows
 
 __all__ = ["read", "write"]
@@ -135,7 +135,7 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
 
     A boundary edge with held ends is held itself, for vertices that refinement puts there.
     """
-    topo, support = surface.topology, given_support(surface)
+    topo, support = surface.topology, support_of(surface, planes=True)
     of_edge = support[topo.edges].min(axis=1)
     off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
     of_edge[(of_edge == SLIDING) & off_plane[topo.edges].any(axis=1)] = FREE

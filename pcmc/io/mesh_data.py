@@ -103,15 +103,10 @@ def within(numbers: Any, name: str, size: int) -> Ints:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def support_of(surface: Surface) -> Ints:
-    """(n,) int8 FREE, SLIDING or FIXED; FIXED also on planes other than Π, for formats without them."""
-    fixed = surface.held & ~surface.on_plane
-    return np.where(fixed, FIXED, np.where(surface.on_plane, SLIDING, FREE)).astype(np.int8)
-
-
-def given_support(surface: Surface) -> Ints:
-    """(n,) the same for formats that have all planes: the supports as given, without these planes."""
-    fixed, sliding = surface.given_supports.fixed_and_sliding()
+def support_of(surface: Surface, planes: bool = False) -> Ints:
+    """(n,) int8 FREE, SLIDING, FIXED; FIXED also on planes besides Π, unless a format has ``planes``."""
+    given = surface.given_supports.fixed_and_sliding()
+    fixed, sliding = given if planes else (surface.held & ~surface.on_plane, surface.on_plane)
     return np.where(fixed, FIXED, np.where(sliding, SLIDING, FREE)).astype(np.int8)
 
 

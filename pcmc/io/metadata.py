@@ -21,7 +21,7 @@ from ..base.units import NO_UNITS, Units
 from ..base.validate import names_from_file
 from ..surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 from ..surface.geometry import bounding_size
-from .mesh_data import FREE, ROUNDING, SLIDING, MeshData, coincident, given_support, support_of, within
+from .mesh_data import FREE, ROUNDING, SLIDING, MeshData, coincident, support_of, within
 
 DAMAGED = (ValueError, KeyError, TypeError, IndexError, AttributeError)
 CHANGED = "the surface has changed since it was written"
@@ -50,7 +50,7 @@ def metadata_text(
         vertices = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return (vertices if joined else surface.vertices[vertices]).tolist()
 
-    given, plain = given_support(surface), support_of(surface)
+    given, plain = support_of(surface, planes=True), support_of(surface)
     guides, planes = surface.given_supports.on_line, surface.on_planes
     values: dict[str, object] = {
         "patches": [row_of(patch) for patch in surface.patches],

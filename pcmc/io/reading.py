@@ -54,11 +54,10 @@ def read(
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
-    tensions, pressures : by patch name, or one number for all, in place of the file's. Formats that
-        carry neither give 1 for both.
+    tensions, pressures : by patch name, or one number for all, in place of the file's, or of 1.
     fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` fixes all boundary
         vertices, and is the default for formats without supports.
-    plane : Π in place of the file's, or the plane z = 0 if it has none.
+    plane : Π in place of the file's, or of z = 0.
     units : the unit of length of the Surface. A file in another unit is converted: coordinates, and the
         tensions and pressures that it has. The numbers of a file without a unit stay. A Surface itself has no
         unit: give the same to ``write``.
@@ -66,16 +65,14 @@ def read(
     Warns
     -----
     FileWarning : once, with all that was changed (another unit, polygons cut into triangles, unused
-        vertices left out, ...) and all probable mistakes in a mesh from another program (an open seam,
-        patches turned against each other, an axis up that is not z).
+        vertices left out, ...) and all probable mistakes in a mesh from another program.
 
     Raises
     ------
     FileError : for a file that is missing, cut off or not of its suffix's format. ``what`` is the
         file, ``where`` the line or element.
     SurfaceError : for a mesh that is not a surface.
-    MissingExtra : when the format needs a library that is not installed.
-    OptionError : for an unknown unit.
+    MissingExtra, OptionError : for a library that is not installed, and an unknown unit.
     """
     choice("units", units, tuple(MICROMETRES))
     return _surface(path, converted(load(path), units), (tensions, pressures, fixed, on_plane, plane))

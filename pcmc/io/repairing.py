@@ -82,8 +82,6 @@ def repair(
     SurfaceError : where the repaired mesh is still no surface, such as a Möbius strip.
     MissingExtra : without pymeshlab.
 
-    Examples
-    --------
     >>> import tempfile
     >>> mesh = Path(tempfile.mkdtemp()) / "twice.obj"
     >>> _ = mesh.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\nf 2 3 1\\n")

@@ -53,14 +53,13 @@ def write(
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
-    surface : a Surface, or the result of a solver; formats that hold a certificate then get the result's.
-        Or the result of ``repair``; the file then says which patches have no tension of their own.
+    surface : a Surface, or the result of a solver, whose certificate is then written, too; or that of
+        ``repair``: the file then says which patches have no tension of their own.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
     certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
-    colour : the name in ``scalars`` of an (n,) array that colours the vertices, for formats that hold
-        colours (.glb, .gltf, .usda). Without it each patch has a colour.
+    colour : the (n,) scalar that colours the vertices (.glb, .gltf, .usda); else each patch has a colour.
     units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units`` with that of forces.
-        The file says them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
+        The file names them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
         (scalars are not). Without a unit the numbers stay, and .3dm, .ifc and .usda files are in metres.
 
     Warns
@@ -73,7 +72,7 @@ def write(
     form, solved = format_of(path, FORMATS), surface
     surface = solved if isinstance(solved, Surface) else getattr(solved, "surface", solved)
     expect_surface(surface)
-    assert isinstance(surface, Surface)  # for mypy
+    assert isinstance(surface, Surface)
     if surface is not solved and form.certificate and certificate is None:
         certificate = getattr(solved, "certificate", None)
     if not isinstance(scalars, Mapping | None):

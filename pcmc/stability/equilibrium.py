@@ -47,7 +47,16 @@ class Equilibrium:
 
     @classmethod
     def of(cls, surface: Surface, backend: str | None = None) -> Equilibrium:
-        """That of the part of a surface that stands, where it is."""
+        """That of the part of a surface that stands, where it is.
+
+        >>> from pcmc import Patch
+        >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+        >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+        ...                [Patch("roof", 1.0)], fixed=range(4))
+        >>> at = Equilibrium.of(roof)
+        >>> at.residual < 1e-15, at.factorised().negative  # the Morse index
+        (True, 0)
+        """
         part = standing_part(surface)
         return cls(part, part.surface.vertices, backend)
 
@@ -352,19 +361,3 @@ def negatives_without(factor: Factor, columns: Floats) -> int:
     if not np.abs(values).min() > CLOSE:
         raise SingularMatrix("the second variation is singular among the motions that keep the volumes")
     return factor.negative + int((values > 0.0).sum()) - k
-
-
-def morse_index(surface: Surface) -> int:
-    """Number of independent motions that lower the energy of a surface at rest to second order.
-
-    Counted in the motion space, by inertia; rigid motions that no support resists are left out. Where rooms
-    prescribe volumes, only motions that keep them count. SingularMatrix if the inertia cannot be counted.
-
-    >>> from pcmc import Patch
-    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
-    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
-    ...                [Patch("roof", 1.0)], fixed=range(4))
-    >>> morse_index(roof)
-    0
-    """
-    return Equilibrium.of(surface).factorised().negative
