@@ -43,14 +43,10 @@ class MeshCheck:
     verdict, detail : the verdict, and its reason.
     place : (x, y, z) of the place that the reason names; None where it names none.
     advice : what to type to get a surface that does not depend on its mesh; empty where nothing is known.
-    table : a row per quantity, with the columns
-
-        - ``quantity``, ``of``: its name; the patch or boundary it belongs to, empty for the whole;
-        - ``value``: on this mesh; ``error``: its bar, how far the limit may be from it;
-        - ``limit``: the value as edges go to zero; ``limit_error``: its bar;
-          both bars are 0 where the value is given: the volume, where rooms prescribe it;
-        - ``order``: observed p of error ∝ h^p, h the edge length.
-
+    table : a row per quantity: ``quantity``, ``of``, its name and the patch or boundary it belongs to, empty
+        for the whole; ``value`` on this mesh and ``error``, its bar, how far the limit may be from it;
+        ``limit``, the value as edges go to zero, and ``limit_error``, its bar; ``order``, the observed p of
+        error ∝ h^p, h the edge length. Both bars are 0 where the value is given, as volumes of rooms may be.
         Without a limit in sight ``limit`` is NaN and the bars are infinite. ``order`` is NaN for what is
         the same on all meshes, to rounding, and for what swings.
     surfaces : on each mesh at rest, the one given first; a solve that failed is left out.

@@ -14,7 +14,6 @@ from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
-from ..forces.cables import directions
 from ..surface.geometry import area_vectors
 from .model import StructuralModel
 from .tables import Block, read
@@ -124,19 +123,17 @@ def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepRe
     else:
         values = stress.means(model.faces + 1)
     stresses[model.faces] = values[:, TENSOR]
-    tensions, first = {}, model.first_cable
-    for cable, area in zip(surface.cables, model.cable_areas, strict=True) if "cables" in blocks else ():
-        mine = blocks["cables"].means(first + np.arange(len(cable.edges)))[:, TENSOR]
-        along = directions(surface.vertices, cable.edges)[0]
+    tensions = {}
+    for cable, area, numbers, along in model.cable_edges() if "cables" in blocks else ():
+        mine = blocks["cables"].means(numbers)[:, TENSOR]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
-        first += len(cable.edges)
     return StepResults(step.name, model, displacements, reactions, stresses, tensions)
 
 
 def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
     """Refuse results with other nodes, elements or steps than the model's."""
     nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
-    edges = sum(len(cable.edges) for cable in model.standing.cables)
+    cables = [number for *_, numbers, _ in model.cable_edges() for number in numbers]
     for number, blocks in enumerate(steps[: len(model.steps)], 1):
         for kind in ("displacements", "stresses", *(("forces",) if len(held) else ())):
             if kind not in blocks:
@@ -149,7 +146,7 @@ def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
         else:
             _same("elements", np.unique(stress.ids), model.faces + 1)
         if "cables" in blocks:
-            _same("cable elements", np.unique(blocks["cables"].ids), model.first_cable + np.arange(edges))
+            _same("cable elements", np.unique(blocks["cables"].ids), np.array(cables))
         if "forces" in blocks:
             _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
             _same("nodes", np.union1d(blocks["forces"].ids, nodes), nodes)
