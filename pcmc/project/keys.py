@@ -14,7 +14,7 @@ from ..accuracy.adaptive import ACCURACY_OF
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
-from ..curves.curves import CURVES
+from ..curves.curve_data import CURVES
 from ..drawings import FORMATS
 from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
