@@ -20,7 +20,7 @@ from .forces.second_variation import hessian
 from .surface import Surface, expect_surface
 from .surface.geometry import segment_lengths
 
-STEPS = 2.0 ** -np.arange(5, 10)
+STEPS: Floats = 0.5 ** np.arange(5.0, 10.0)
 ROUNDING = 1e3 * float(np.finfo(float).eps)  # of the values: a remainder below is rounding
 WITHIN = 0.15  # of the order: a slope that counts as right
 

@@ -23,7 +23,6 @@ import pandas as pd
 
 from .. import existence
 from ..base import validate
-from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
@@ -31,27 +30,24 @@ from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
-from ..meshing.sizes import limit_growth, triangles_for
 from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.geometry import face_areas
-from .estimator import Goal, error_shares, evenness
+from .estimator import GROWTH, Goal, error_shares, evenness, size_field
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, row_name, vertex_numbers, with_bar
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
 PATIENCE = 3  # rounds in turn without a limit in sight
-GROWTH = 1.5  # of neighbouring edges
-FINER, COARSER = 0.1, 3.0  # times the edge length, in one round
 LEAST, MOST = 1.5, 3.0  # times as many triangles from round to round
 SPARE = 1.3  # times the triangles foreseen, so that fewer rounds are needed
-SINGULAR = 2.0  # times the wanted root of a share: above, the share falls more slowly than h⁴
-FLOOR = 1e-12  # of the largest share: a share below counts as that much
 WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
 ACCURACY_OF = ("mesh", "limit")
-QUANTITIES = ("height", "area", "volume", "energy", "reaction", "thrust")
-QUANTITIES += ("reaction per length", "lowest eigenvalue")
+QUANTITIES = (
+    *("height", "area", "volume", "energy", "reaction", "thrust"),
+    *("reaction per length", "lowest eigenvalue"),
+)
 Accuracy = Mapping[str, float] | str
 
 
@@ -80,8 +76,7 @@ class AccurateResult:
     status : how the search ended.
     result : of the solve that gave ``surface``.
     check : the mesh check of ``surface``; None if no equilibrium was found.
-    values : a row per quantity wanted: ``quantity``, ``of``, ``value``, ``error``, ``limit``,
-        ``limit_error`` and ``order`` as in a mesh check, and the ``accuracy`` wanted.
+    values : the rows of the mesh check for the quantities wanted, with the ``accuracy`` wanted.
     history : a row per round and quantity: the columns of ``values``, ``round``, ``triangles``, ``verdict``.
     surfaces : at rest, of each round.
     detail : why the accuracy is not reached; empty if it is.
@@ -159,10 +154,8 @@ def solve_to_accuracy(
 
     Raises
     ------
-    OptionError
-        For an unknown quantity, with the nearest known one, or an accuracy that is not positive.
-    MissingExtra
-        Without the library mmgpy.
+    OptionError : for an unknown quantity, with the nearest known one, or an accuracy that is not positive.
+    MissingExtra : without the library mmgpy.
 
     Examples
     --------
@@ -192,19 +185,8 @@ def solve_to_accuracy(
 
 
 def accuracies(given: Any) -> dict[str, float]:
-    """The accuracy (> 0) by the name of a quantity, such as ``"height"`` or ``"height of north"``.
+    """The accuracy (> 0) by the name of a quantity, from a mapping or a text; OptionError for another.
 
-    Parameters
-    ----------
-    given : a mapping, or text such as ``"height=1e-3, area of north=0.01"``.
-
-    Raises
-    ------
-    OptionError
-        For a quantity that does not exist, an accuracy that is not positive, or none at all.
-
-    Examples
-    --------
     >>> accuracies("height=1e-3, area of north=0.01")
     {'height': 0.001, 'area of north': 0.01}
     >>> accuracies({"hight": 1e-3})  # doctest: +ELLIPSIS
@@ -213,7 +195,7 @@ def accuracies(given: Any) -> dict[str, float]:
     pcmc.base.errors.OptionError: unknown quantity 'hight'; did you mean 'height'? Known: height, ...
     """
     expected = "a table such as {'height': 1e-3}, or a text such as 'height=1e-3'"
-    wanted: dict[Any, Any] = {}
+    wanted: dict[Any, Any] = dict(given) if isinstance(given, Mapping) else {}
     for part in given.split(",") if isinstance(given, str) else ():
         name, sign, value = part.rpartition("=")
         try:
@@ -222,7 +204,6 @@ def accuracies(given: Any) -> dict[str, float]:
             sign = ""
         if not sign or not name.strip():
             validate.refuse("accuracy", part.strip(), "QUANTITY=NUMBER, such as height=1e-3")
-    wanted = given if isinstance(given, Mapping) else wanted
     if not wanted:
         validate.refuse("accuracy", given, expected)
     found = {}
@@ -259,35 +240,6 @@ def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, flo
             raise OptionError(message, what="accuracy", found=name)
         goals |= dict.fromkeys(((quantity, of) for of in rows), accuracy)
     return goals
-
-
-def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
-    """(n,) edge lengths for a mesh of so many triangles whose shares in the error are all equal.
-
-    Parameters
-    ----------
-    shares : (m,) ≥ 0, of the triangles in the error.
-    triangles : how many the new mesh has, about.
-
-    Examples
-    --------
-    >>> from pcmc import Patch
-    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
-    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
-    >>> size_field(square, np.array([1.0, 1.0]), 20).round(3).tolist()
-    [0.34, 0.34, 0.34, 0.34]
-    """
-    F, areas = surface.faces, face_areas(surface.vertices[surface.faces])
-    root = np.sqrt(np.maximum(shares, FLOOR * shares.max(initial=0.0)))
-    excess = root * triangles / root.sum() if root.any() else np.ones(surface.m)
-    factor = excess**-0.5 * np.maximum(1.0, excess / SINGULAR) ** -0.5
-    length = np.sqrt(areas * 4.0 / math.sqrt(3.0)) * np.clip(factor, FINER, COARSER)
-    count = np.maximum(np.bincount(F.ravel(), minlength=surface.n), 1)
-    wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
-    for _ in range(6):  # limits to growth make edges shorter and triangles more
-        size = limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
-        wanted *= math.sqrt(triangles_for(areas, size[F].mean(axis=1)).sum() / triangles)
-    return limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
 
 
 @dataclass(frozen=True, eq=False)

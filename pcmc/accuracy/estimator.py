@@ -1,4 +1,4 @@
-"""Where the error of a quantity comes from: a share for each triangle, from two nested meshes.
+"""Where the error of a quantity comes from, triangle by triangle, and the sizes that make all shares equal.
 
 A surface at rest on a mesh is compared with the surface at rest on the mesh's 1→4 refinement. The
 interpolation error along edge e = (a, b) is what the finer mesh adds to it,
@@ -31,11 +31,17 @@ from ..certificate.tables import names_of
 from ..design.quantities import largest_pull
 from ..design.targets import Target, measure
 from ..forces.functional import energy_and_gradient
+from ..meshing.sizes import limit_growth, triangles_for
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from ..surface import Surface
+from ..surface.geometry import face_areas
 
+GROWTH = 1.5  # of neighbouring edges
+FINER, COARSER = 0.1, 3.0  # times the edge length, in one round
+SINGULAR = 2.0  # times the wanted root of a share: above, the share falls more slowly than h⁴
+FLOOR = 1e-12  # of the largest share: a share below counts as that much
 STEP = 1e-5  # of the size: length of the steps that differences of ∇E are taken over
 
 Goal = tuple[str, str]
@@ -80,6 +86,28 @@ def evenness(shares: Floats) -> float:
     """
     total = float(shares.sum())
     return float(np.sqrt(shares).sum() ** 2 / (len(shares) * total)) if total > 0.0 else 1.0
+
+
+def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
+    """(n,) edge lengths for a mesh of about so many triangles whose shares (m,) ≥ 0 in the error are equal.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> size_field(square, np.array([1.0, 1.0]), 20).round(3).tolist()
+    [0.34, 0.34, 0.34, 0.34]
+    """
+    F, areas = surface.faces, face_areas(surface.vertices[surface.faces])
+    root = np.sqrt(np.maximum(shares, FLOOR * shares.max(initial=0.0)))
+    excess = root * triangles / root.sum() if root.any() else np.ones(surface.m)
+    factor = excess**-0.5 * np.maximum(1.0, excess / SINGULAR) ** -0.5
+    length = np.sqrt(areas * 4.0 / sqrt(3.0)) * np.clip(factor, FINER, COARSER)
+    count = np.maximum(np.bincount(F.ravel(), minlength=surface.n), 1)
+    wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
+    for _ in range(6):  # limits to growth make edges shorter and triangles more
+        size = limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
+        wanted *= sqrt(triangles_for(areas, size[F].mean(axis=1)).sum() / triangles)
+    return limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ values give the observed order and the limit (Richardson, Aitken):
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,24 +22,13 @@ FAST = 2.5  # an order above is a coincidence: on triangles no error shrinks so 
 LEAST = 0.05  # of the last correction: least uncertainty of the limit, as equal orders may be a coincidence
 
 
-@dataclass(frozen=True, eq=False)
-class Extrapolation:
-    """Values (q,) on the first mesh and their limits.
+class Extrapolation(NamedTuple):
+    """Limits (q,) of quantities, and their bars."""
 
-    Attributes
-    ----------
-    value : on the first mesh.
-    limit : the extrapolated value; NaN where the values come to no limit.
-    error : bar of ``value``: how far the limit may be from it; infinite where there is no limit.
-    limit_error : bar of ``limit``.
-    order : observed p; NaN where the values are equal to rounding, or swing.
-    """
-
-    value: Floats
-    limit: Floats
-    error: Floats
-    limit_error: Floats
-    order: Floats
+    limit: Floats  # the extrapolated value; NaN where the values come to no limit
+    error: Floats  # how far the limit may be from the value on the first mesh; infinite without a limit
+    limit_error: Floats  # bar of ``limit``
+    order: Floats  # observed p; NaN where the values are equal to rounding, or swing
 
 
 def extrapolate(
@@ -52,33 +41,29 @@ def extrapolate(
 ) -> Extrapolation:
     """Limits and error bars of quantities from their values on nested meshes.
 
-    ====================================  ==================================  =============================
-    the last two differences d_1, d_2     limit                               its bar
-    ====================================  ==================================  =============================
-    both at most ``rounding``             q_2                                 ``rounding``
-    1.19 ≤ d_1 / d_2 ≤ 16                 q_2 + d_2 / (d_1/d_2 - 1)           2 × its distance from what
-                                                                              order 2, and the shape's
-                                                                              order, would give; at least
-                                                                              0.05 |d_2|, and |d_1| / 12
-                                                                              for d_1 / d_2 > 5.7
-    d_1 / d_2 > 16, or a small d_2 of     q_2 + d_2 / 3                       the larger of 2 |d_2| and
-    the other sign: they swing                                                |d_1| / 12, what order 2
-                                                                              leaves of d_1
-    else: no limit in sight               NaN                                 infinite
-    only one difference: two meshes       q_1 + d_1 / 3                       |d_1|
-    only one mesh                         NaN                                 infinite
-    ====================================  ==================================  =============================
+    ======================================  =========================  ======================================
+    the last two differences d_1, d_2       limit                      its bar
+    ======================================  =========================  ======================================
+    both at most ``rounding``               q_2                        ``rounding``
+    1.19 ≤ d_1 / d_2 ≤ 16                   q_2 + d_2 / (d_1/d_2 - 1)  2 × its distance from what order 2, and
+                                                                       the shape's order, would give; at least
+                                                                       0.05 |d_2|, and |d_1| / 12 for
+                                                                       d_1 / d_2 > 5.7
+    d_1 / d_2 > 16, or a small d_2 of the   q_2 + d_2 / 3              the larger of 2 |d_2| and |d_1| / 12,
+    other sign: they swing                                             what order 2 leaves of d_1
+    else: no limit in sight                 NaN                        infinite
+    only one difference: two meshes         q_1 + d_1 / 3              |d_1|
+    only one mesh                           NaN                        infinite
+    ======================================  =========================  ======================================
 
     The bar of the value is its distance from the limit plus the limit's bar. Bars are estimates, not bounds:
-    three values cannot show what shrinks more slowly than all that is seen. The last two parameters bring
-    what one quantity alone does not show.
+    three values cannot show what shrinks more slowly than all that is seen.
 
     Parameters
     ----------
     estimates : (meshes,q).
     rounding : (q,) differences up to which two values count as equal.
-    value : (q,) the values whose bars are wanted; by default those on the first mesh. They may be read
-        in another way than the estimates, if both have the same limit.
+    value : (q,) the values whose bars are wanted, by default the first estimates; of the same limit.
     shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh: what
         corners, ends of junctions, contact or uneven triangles let it have. A quantity may owe a better one
         to errors that cancel. With S = 2^s the last difference would leave d_2 / (S - 1). Below 1.5 the
@@ -109,14 +94,12 @@ def extrapolate(
     if shape_order <= 0.0:
         bar = np.full_like(none, np.inf)
     elif shape_order < UNSETTLED and len(steps) > 1:
-        factor = 2.0**shape_order
-        left = np.abs(steps[-2]) / (factor * (factor - 1.0))
+        left = np.abs(steps[-2]) / (2.0**shape_order * (2.0**shape_order - 1.0))
         bar = np.maximum(bar, np.abs(left - np.abs(limit - q[-1])))
     limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar) + doubt
     limit, bar = np.where(np.isinf(bar), np.nan, limit), np.where(np.isnan(limit), np.inf, bar)
-    order = np.where(equal, np.nan, order)
     error = np.where(np.isnan(limit), np.inf, np.abs(limit - value) + bar)
-    return Extrapolation(value, limit, error, bar, order)
+    return Extrapolation(limit, error, bar, np.where(equal, np.nan, order))
 
 
 def _three(
@@ -137,8 +120,5 @@ def _three(
     distance = np.maximum(SAFETY * apart, LEAST * np.abs(last))
     fast = np.abs(before) / 12.0  # what order 2 leaves of d_1: d_1 / 4 + d_1 / 16 + … = d_1 / 3 less d_1 / 4
     distance = np.where(order > FAST, np.maximum(distance, fast), distance)
-    bar = (
-        np.where(settled, distance, np.where(swings, np.maximum(SAFETY * np.abs(last), fast), np.inf))
-        + rounding
-    )
-    return np.where(same_sign, order, np.nan), limit, bar
+    swinging = np.where(swings, np.maximum(SAFETY * np.abs(last), fast), np.inf)
+    return np.where(same_sign, order, np.nan), limit, np.where(settled, distance, swinging) + rounding

@@ -43,14 +43,10 @@ class MeshCheck:
     verdict, detail : the verdict, and its reason.
     place : (x, y, z) of the place that the reason names; None where it names none.
     advice : what to type to get a surface that does not depend on its mesh; empty where nothing is known.
-    table : a row per quantity, with the columns
-
-        - ``quantity``, ``of``: its name; the patch or boundary it belongs to, empty for the whole;
-        - ``value``: on this mesh; ``error``: its bar, how far the limit may be from it;
-        - ``limit``: the value as edges go to zero; ``limit_error``: its bar;
-          both bars are 0 where the value is given: the volume, where rooms prescribe it;
-        - ``order``: observed p of error ∝ h^p, h the edge length.
-
+    table : a row per quantity: ``quantity``, ``of``, its name and the patch or boundary it belongs to, empty
+        for the whole; ``value`` on this mesh and ``error``, its bar, how far the limit may be from it;
+        ``limit``, the value as edges go to zero, and ``limit_error``, its bar; ``order``, the observed p of
+        error ∝ h^p, h the edge length. Both bars are 0 where the value is given, as volumes of rooms may be.
         Without a limit in sight ``limit`` is NaN and the bars are infinite. ``order`` is NaN for what is
         the same on all meshes, to rounding, and for what swings.
     surfaces : on each mesh at rest, the one given first; a solve that failed is left out.
@@ -130,9 +126,8 @@ def check_mesh(
     Parameters
     ----------
     surface : at rest, or the result of a solver that converged.
-    meshes : how many in all, this one included, ≥ 2. With 2 there is no observed order, and order 2 is
-        taken with a wide bar; more than 3 make the limit sharper. The finest has 4^(meshes - 1) times as
-        many triangles.
+    meshes : how many in all, ≥ 2; the finest has 4^(meshes - 1) times as many triangles. With 2 there is no
+        observed order, and order 2 is taken with a wide bar; more than 3 make the limit sharper.
     boundary : where new vertices of a held boundary or held line go: ``"smooth"``, on smooth curves
         through the old ones, which turn by up to 40° at a vertex (straight lines stay straight);
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
@@ -144,11 +139,8 @@ def check_mesh(
 
     Raises
     ------
-    OptionError
-        For ``meshes`` below 2, another ``boundary``, ``corners`` that are no vertices, or more than
-        ``most_triangles``.
-    SurfaceError
-        If the surface is not at rest.
+    OptionError : for a value that is not allowed, or more than ``most_triangles``.
+    SurfaceError : if the surface is not at rest.
 
     Examples
     --------

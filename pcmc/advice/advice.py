@@ -130,14 +130,10 @@ def apexes_below_supports(
 
 
 def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: Trial) -> list[str]:
-    """What to type so that a project, or a surface, comes to rest and meets its targets: a heading, and a
-    line for each change.
+    """What to type so that a project comes to rest and meets its targets: a heading, and a line a change.
 
-    Parameters
-    ----------
-    given, start : the start shape of the project, and the one that was solved, with the command's tensions.
-    ended : how that ended.
-    try_plan : solves another plan from a surface, with targets.
+    ``given`` is the start shape of the project, ``start`` the one that was solved, with the command's
+    tensions, and ``ended`` how that ended; ``try_plan`` solves another plan from a surface, with targets.
     """
     plan, certified = task.plan, ended.certificate.certified
     if certified and (plan is None or ended.design is None or ended.design.met):

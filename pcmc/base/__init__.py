@@ -1,4 +1,4 @@
-"""Used by every room: errors, array types, checks, units, atomic file writing, interrupts, compiled loops.
+"""For all subpackages: errors, array types, checks, units, atomic file writing, interrupts, compiled loops.
 
 Imports nothing of pcmc from outside this folder.
 """

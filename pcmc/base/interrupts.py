@@ -42,9 +42,8 @@ def termination_as_interrupt() -> Iterator[None]:
 def stop_requested(error: BaseException) -> None:
     """Accept a StopIteration that a ``raise`` statement asked for, and Ctrl-C; refuse others.
 
-    ``next()`` of an empty iterator raises StopIteration, too, and so does the ``__next__`` of an iterator. In
-    a callback that is a mistake, not a request: RuntimeError, as Python has it in generators (PEP 479).
-    The innermost frame of the traceback tells them apart, by the instruction that it has stopped at.
+    That of ``next()`` of an empty iterator, or of a ``__next__``, is a mistake in a callback: RuntimeError as
+    in generators (PEP 479). The instruction at which the innermost frame has stopped tells them apart.
 
     >>> def stop():
     ...     raise StopIteration
@@ -65,10 +64,8 @@ def stop_requested(error: BaseException) -> None:
     code = trace.tb_frame.f_code
     raised = code.co_code[trace.tb_lasti] == dis.opmap["RAISE_VARARGS"] and code.co_name != "__next__"
     if not raised:
-        message = (
-            f"StopIteration out of next(), in {code.co_name}, where nothing asked to stop; raise it to stop"
-        )
-        raise RuntimeError(message) from error
+        what = f"StopIteration out of next(), in {code.co_name}"
+        raise RuntimeError(f"{what}, where nothing asked to stop; raise it to stop") from error
 
 
 @contextmanager

@@ -44,8 +44,8 @@ class Certificate:
     ----------
     verdict, detail : the verdict, and its reason (which mode, patch or place).
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, with the pull on pinched
-        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst. The
-        relative differences of prescribed volumes are added to it (as squares).
+        vertices beyond what their wall can take, and the relative differences of prescribed volumes (as
+        squares). Of several loose parts, that of the worst.
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume between the roof and Π (``volumes_below``, length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
@@ -54,23 +54,18 @@ class Certificate:
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
     quality : smallest triangle quality outside walls that can pinch; ``walls_quality`` in these.
-    patches : one row per patch: tension, pressure (and, where there is snow, snow and net pressure), target,
-        area, errors by both definitions, quality.
-    junctions : one row per junction curve: length, its middle (the centre of a closed one), forces
-        left and Σ α n, force/length.
+    patches : a row per patch: tension, pressure (where there is snow, snow and net pressure), target
+        curvature, area, errors by both definitions, quality.
+    junctions : a row per curve: length, middle, forces left and Σ α n, force/length.
     load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
         what the mesh leaves along the sheets.
     acting : the forces of the supports by how they act; ``reactions`` are these (n,3) for each vertex.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
-    load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
-        the function ``load_ratio``.
-    proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
-        ``Unheld`` or ``WeakCable``.
+    load_ratio : pressure and weight along Π's normal over the most that the supports could carry.
+    proofs : why there is no equilibrium, if that is the verdict.
     tried : what a search for an equilibrium has tried, if that led to none.
-    cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
-        sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
-    cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
-    rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
+    cables, cable_ends : see ``pcmc.certificate.cables.cable_table`` and ``cable_end_table``.
+    rooms : a row per room of prescribed volume: the volume it has, the one prescribed, the difference
         over the latter, and the room's pressure.
     symmetric_in : the mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
         symmetric in these; ``certify(surface, whole=True)`` is about all.
@@ -215,11 +210,10 @@ def certify(
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
     tolerance : relative residual, > 0, up to which it counts as at rest.
-    evidence, tried : what happened to it while it was solved, and what a search has tried without success.
-        ``Result.certify`` passes them on.
-    whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
-        index then, and not only those symmetric in these planes. True, or the planes to unfold at.
-    clear : what the solver factorised at this shape, so that it is not factorised again.
+    evidence, tried : what happened while it was solved, and what a search has tried: ``Result.certify``
+        passes them on.
+    whole : of a surface between mirror planes, examine ``mirrored`` of it, so that all motions count, not
+        only those symmetric in these planes. True, or the planes to unfold at.
 
     Examples
     --------

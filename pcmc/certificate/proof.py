@@ -15,8 +15,7 @@ from dataclasses import dataclass
 class Overload:
     """Vertical balance of the whole: the load exceeds what tension at the boundary can carry.
 
-    Load and capacity are those of every smooth surface with these supports: see
-    ``pcmc.certificate.balance.load_is_given``.
+    Both are those of every smooth surface with these supports: see ``balance.load_is_given``.
 
     >>> print(Overload(1.2))
     the pressure is 1.20 times what the boundary's tension could carry on any smooth surface
@@ -135,9 +134,9 @@ class Attempt:
     ----------
     way : ``"given start"``, ``"low start"``, ``"stationary point"``; or what grows along a branch of
         equilibria: ``"pressure"``, ``"net pressure"``, ``"weight"``, ``"load"`` (pressure and weight), of all
-        patches in proportion; ``"distance"``, that of the held curves from each other; ``"tensions"``, the
-        share of the way from equal tensions of the patches under pressure.
-    end : a key of ``ENDINGS``: a branch folds, is lost, or has no start; the solver's status where it failed.
+        patches in proportion; ``"distance"`` of the held curves; ``"tensions"``, the share of the way from
+        equal tensions of the patches under pressure.
+    end : a key of ``ENDINGS``; the solver's status where it failed.
     value : what grows, at the end of the branch; 1 is what the surface asks for. None without a branch.
     start : where the branch begins.
     tensions : names and tensions at the end, where these vary.

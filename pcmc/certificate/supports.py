@@ -42,13 +42,12 @@ def support_table(acting: SupportForces) -> pd.DataFrame:
 
     Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
     for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
-    ``kind``: "line", a boundary or line inside the surface that is held; "ground", what slides or rests on
-    Π; "upright plane", across which a wall or boundary is held that slides in it ("plane" if it is not
-    upright); "mirror", the pull of the image across a mirror plane; "point", a single fixed point with the
-    cables that end there; "cable end", the force of cables that end on a line, which has no part in it.
-    ``length``, 0 for points; ``x``, ``y``, ``z``, the middle; ``force_x``, …, of the support on the surface;
-    ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest of the
-    ``pulls`` along its edges, NaN for points.
+    ``kind``: "line", a boundary or line inside that is held; "ground", what slides or rests on Π; "upright
+    plane" ("plane" if it leans), across which what slides in it is held; "mirror", the pull of the image;
+    "point", a single fixed point with the cables that end there; "cable end", the force of cables that end
+    on a line, which has no part in it. ``length``, 0 for points; ``x``, …, the middle; ``force_x``, …, of
+    the support on the surface; ``moment_x``, …, that of these forces about the middle; ``per_length_max``,
+    the largest of the ``pulls`` along its edges, NaN for points.
     """
     rows, surface = [], acting.surface
     for label, part in _labelled(acting):

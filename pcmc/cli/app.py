@@ -36,13 +36,11 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+SHOW = typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+
+
 @app.callback()
-def _options(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
-    ] = False,
-) -> None:
+def _options(version: Annotated[bool, SHOW] = False) -> None:
     pass
 
 

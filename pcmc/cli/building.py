@@ -21,7 +21,6 @@ from ..panelling import fewer_families
 from ..panelling.schedule import MIRROR_IMAGES
 from ..report.document import check_suffix as check_report
 from ..structure import write_structure
-from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -249,8 +248,10 @@ def structure(
         project = arguments.load(file)
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
+        thick = arguments.by_name(patches, thickness, "--thickness")
+        even = set(thick) == set(patches) and len(set(thick.values())) == 1  # one number, not one by patch
         given = {
-            "thickness": _thickness(start, thickness),
+            "thickness": thick[patches[0]] if even else thick or None,
             "young": young,
             "poisson": poisson,
             "density": density,
@@ -272,13 +273,3 @@ def structure(
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
     return OK if roof.good else NOT_CERTIFIED
-
-
-def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, float] | None:
-    """One number, or one by patch where a patch is named."""
-    if not given:
-        return None
-    names = [patch.name for patch in surface.patches]
-    values = arguments.by_name(names, given, "--thickness")
-    same = len(set(values.values())) == 1 and set(values) == set(names)
-    return next(iter(values.values())) if same else values

@@ -29,7 +29,11 @@ def run(arguments: list[str]) -> int:
         for kind in SHOWN:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
-        _replace_missing_letters()
+        # letters that an encoding lacks as one types them (m^2), others as \xf6: printing never fails
+        codecs.register_error("pcmc.plain", _plain)
+        for stream in (sys.stdout, sys.stderr):
+            if getattr(stream, "errors", None) in FAILING and hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="pcmc.plain")
         with termination_as_interrupt():
             return _run(arguments)
 
@@ -85,14 +89,6 @@ def _command() -> Callable[..., Any]:
         gc.freeze()
         gc.enable()
     return typer.main.get_command(app)
-
-
-def _replace_missing_letters() -> None:
-    r"""Write letters that an encoding lacks as one types them (m^2), others as \\xf6: never fail."""
-    codecs.register_error("pcmc.plain", _plain)
-    for stream in (sys.stdout, sys.stderr):
-        if getattr(stream, "errors", None) in FAILING and hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="pcmc.plain")
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

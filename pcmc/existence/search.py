@@ -78,8 +78,10 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result | tuple[lis
             return replace(result, status=Status.SADDLE, note=describe_growing(growing))
         tried.append(Attempt("stationary point", _name(result)))
     elif not proofs:
-        for way in filter(None, _further_ways(start, pinchable)):
-            outcome: HomotopyOutcome = attempt(way, solves) if isinstance(way, Homotopy) else way
+        for way in _further_ways(start, pinchable):
+            if way is None:
+                continue
+            outcome = attempt(way, solves) if isinstance(way, Homotopy) else way
             if outcome.surface is not None:
                 result = solves.solve(outcome.surface)
                 if result.converged:

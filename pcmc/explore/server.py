@@ -19,21 +19,9 @@ from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS, write
 from ..project import load, vertex_fields
 from ..surface import Surface
-from . import saving
+from . import page_data, saving
 from .following import ProjectFallback, Stop
 from .listening import LOOPBACK, Handler, listen
-from .page_data import (
-    aims_data,
-    centre,
-    drawn,
-    families_drawn,
-    fields,
-    mesh_findings,
-    outline,
-    state_data,
-    target_choices,
-    unit_texts,
-)
 from .protocol import ACTS, OTHERS, RequestError, checked, pack
 from .roof import Roof, Watch, signature
 from .session import Session, State, solved_start
@@ -57,7 +45,7 @@ class Explorer:
         self._server = listen(host, port, Handler)
         self._server.explorer = self
         self.local = host in LOOPBACK
-        self.roof, self.origin = roof, centre(roof.surface)
+        self.roof, self.origin = roof, page_data.centre(roof.surface)
         self.start = solved_start(roof.surface)
         self.version = 0
         self.sessions: OrderedDict[str, Session] = OrderedDict()
@@ -79,7 +67,7 @@ class Explorer:
         if start.failure is not None:
             raise SurfaceError(f"{start.failure.verdict.value}; {start.failure.detail}", what="surface")
         with self._lock:
-            self.roof, self.origin, self.start = roof, centre(roof.surface), start
+            self.roof, self.origin, self.start = roof, page_data.centre(roof.surface), start
             sessions = list(self.sessions.values())
         for session in sessions:
             session.renew(start, roof.outcome.units, self._fallback())
@@ -117,19 +105,20 @@ class Explorer:
         given = checked(ACTS[act] if act in ACTS else OTHERS[act], asked)
         if act == "check":
             check = session.check_mesh(gone)
-            return pack({"superseded": True} if check is None else {"check": mesh_findings(check, units)})
+            if check is None:
+                return pack({"superseded": True})
+            return pack({"check": page_data.mesh_findings(check, units)})
         if act == "margin":
             margin = session.margin(**given, gone=gone)
             if margin is None:
                 return pack({"superseded": True})
-            return pack(
-                {"margin": margin.text(units)}, {"vertices": drawn(margin.surface).vertices - self.origin}
-            )
+            there = page_data.drawn(margin.surface).vertices - self.origin
+            return pack({"margin": margin.text(units)}, {"vertices": there})
         if act == "verify":
             theorem = session.verify()
             return pack({"badge": theorem.brief(units), "text": theorem.text(units)})
         if act == "families":
-            return pack({}, {"family": families_drawn(session.state())})
+            return pack({}, {"family": page_data.families_drawn(session.state())})
         if act == "news":
             watch = self.watch
             news = {"working": bool(watch and watch.working), "problem": watch.problem if watch else ""}
@@ -142,30 +131,32 @@ class Explorer:
             state = getattr(session, act)(**given, **({"gone": gone} if act == "meet" else {}))
         if state.superseded:
             return pack({"superseded": True})
-        about = state_data(state, self.origin, moving=act == "follow")
-        return pack({"superseded": False, **about}, fields(state, self.origin))
+        about = page_data.state_data(state, self.origin, moving=act == "follow")
+        return pack({"superseded": False, **about}, page_data.fields(state, self.origin))
 
     def _opening(self, name: str, session: Session, state: State) -> bytes:
         """A state with what the page learns once: the mesh, the file and what may be asked."""
         roof, origin = self.roof, self.origin
-        about, arrays = outline(state.surface, origin)
+        about, arrays = page_data.outline(state.surface, origin)
         once = {
             "session": name,
             "formats": list(FORMATS),
             "title": roof.title,
             "name": roof.name,
-            "units": unit_texts(roof.outcome.units),
+            "units": page_data.unit_texts(roof.outcome.units),
             "note": roof.note,
             "note_met": roof.outcome.result is not None and roof.outcome.good,
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",
-            "quantities": target_choices(state.surface),
-            "aims": aims_data(*(state.aims or roof.aims)),
+            "quantities": page_data.target_choices(state.surface),
+            "aims": page_data.aims_data(*(state.aims or roof.aims)),
             "watching": self.watch is not None,
             "version": self.version,
             "superseded": False,
         }
-        return pack(about | once | state_data(state, origin), arrays | fields(state, origin))
+        return pack(
+            about | once | page_data.state_data(state, origin), arrays | page_data.fields(state, origin)
+        )
 
     def save(self, session: Session, name: str, replace: bool = False) -> dict[str, Any]:
         """Save the surface of a session as a project beside the file that was opened."""

@@ -9,16 +9,25 @@ An edge without length has no direction and contributes none of these.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import inlined
 from ..base.errors import SurfaceError
 from ..surface import Surface
-from ..surface.geometry import norm, point, scaled, sub
 from ..surface.parts import CableEdges
 from ..surface.topology import Topology
-from .triangles import Block
+
+
+class EdgeBlocks(NamedTuple):
+    """Blocks of edges i → j: s t tᵀ + k 1 of an end with itself, -s t tᵀ - k 1 + [q]× of both."""
+
+    ends: Ints  # (e,2) i and j
+    t: Floats  # (e,3)
+    s: Floats  # (e,)
+    k: Floats  # (e,)
+    q: Floats  # (e,3)
 
 
 def add_cables(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
@@ -52,14 +61,12 @@ def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
     return side / np.where(length > 0.0, length, 1.0)[:, None], length
 
 
-@inlined
-def cable_block(cables: CableEdges, X: Floats, e: int, hessian: float, stiffness: float) -> Block:
-    """Of an end with itself; that of both ends with each other is the negative. The stiffness is τ/ℓ 1."""
-    side = sub(point(X, cables.ends[e, 1]), point(X, cables.ends[e, 0]))
-    length = norm(side)
-    scale = 1.0 / length if length > 0.0 else 0.0
-    pull = cables.tension[e] * scale
-    return Block(-hessian * pull, scaled(scale, side), (hessian + stiffness) * pull)
+def cable_blocks(surface: Surface, X: Floats, hessian: float = 1.0, stiffness: float = 0.0) -> EdgeBlocks:
+    """The blocks of all cables, of hessian · ∂²E + stiffness · L; L is τ/ℓ 1."""
+    ends, tension = surface.cable_edges
+    t, length = directions(X, ends)
+    pull = tension / np.where(length > 0.0, length, np.inf)
+    return EdgeBlocks(np.asarray(ends), t, -hessian * pull, (hessian + stiffness) * pull, 0.0 * t)
 
 
 def squared_cable_forces(surface: Surface) -> Floats:

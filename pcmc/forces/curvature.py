@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.supports import symmetric_part
@@ -60,29 +60,28 @@ def target_curvature(surface: Surface) -> Floats:
     """H̄ (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is.
 
     H̄ = p / (2 α), p net of snow, and with a weight H̄ = (p - w ⟨ν, n⟩) / (2 (α + w z)) at the vertex's
-    height z over Π and its normal ν; see ``weight``. A mesh at rest has the latter up to the square of its
-    edge length.
+    height z over Π and its normal ν. A mesh at rest has the latter up to the square of its edge length.
     """
     expect_surface(surface)
+    return _target_and_scale(surface)[0]
+
+
+def _target_and_scale(surface: Surface) -> tuple[Floats, Floats]:
+    """H̄ (n,), and what errors of H are relative to: H̄ itself, or (|p| + |w|) / (2 |α + w z|)."""
     patch = np.zeros(surface.n, dtype=np.int64)
     patch[surface.faces] = surface.patch_of_face[:, None]
     target = np.array([p.target_curvature for p in surface.patches])[patch]
-    if surface.weights.any():
-        heavy = surface.weights[patch] != 0.0
-        push, pull = _push_and_pull(surface, patch)
-        target[heavy] = ((surface.net_pressures[patch] - push) / (2.0 * pull))[heavy]
+    scale, weight, press = target, surface.weights[patch], surface.net_pressures[patch]
+    if (heavy := weight != 0.0).any():
+        vector = vertex_area_vectors(surface.vertices, surface.faces)[0]
+        length = np.linalg.norm(vector, axis=1)
+        upright = (vector @ np.array(surface.plane.normal)) / np.where(length > 0.0, length, 1.0)
+        pull = surface.tensions[patch] + weight * surface.plane.height(surface.vertices)
+        twice = 2.0 * np.where(pull == 0.0, np.nan, pull)
+        target = np.where(heavy, (press - weight * upright) / twice, target)
+        scale = np.where(heavy, (np.abs(press) + np.abs(weight)) / np.abs(twice), target)
     target[~_within_one_sheet(surface)] = np.nan
-    return target
-
-
-def _push_and_pull(surface: Surface, patch: Ints) -> tuple[Floats, Floats]:
-    """(n,) w ⟨ν, n⟩ and α + w z at the vertices of these patches (n,); NaN where the latter is 0."""
-    vector = vertex_area_vectors(surface.vertices, surface.faces)[0]
-    length = np.linalg.norm(vector, axis=1)
-    upright = (vector @ np.array(surface.plane.normal)) / np.where(length > 0.0, length, 1.0)
-    weight = surface.weights[patch]
-    pull = surface.tensions[patch] + weight * surface.plane.height(surface.vertices)
-    return weight * upright, np.where(pull == 0.0, np.nan, pull)
+    return target, scale
 
 
 def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
@@ -92,14 +91,7 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
     relative error; ``mean_curvature`` itself is their error. With a weight the error is relative to
     (|p| + |w|) / (2 |α + w z|), as H̄ itself may vanish somewhere.
     """
-    H, target = mean_curvature(surface, method), target_curvature(surface)
-    scale = target
-    if surface.weights.any():
-        patch = np.zeros(surface.n, dtype=np.int64)
-        patch[surface.faces] = surface.patch_of_face[:, None]
-        pull = np.abs(_push_and_pull(surface, patch)[1])
-        loads = np.abs(surface.net_pressures[patch]) + np.abs(surface.weights[patch])
-        scale = np.where(surface.weights[patch] != 0.0, loads / (2.0 * pull), target)
+    H, (target, scale) = mean_curvature(surface, method), _target_and_scale(surface)
     return np.divide(H - target, scale, out=np.full(surface.n, np.nan), where=scale != 0.0)
 
 

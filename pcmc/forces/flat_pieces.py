@@ -25,6 +25,7 @@ from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..surface import Plane, Surface
 from ..surface.checks import lying
 from ..surface.supports import common_point
+from .cables import EdgeBlocks
 
 MEETS = 1e-9  # sine of an angle up to which two planes count as parallel
 
@@ -75,12 +76,13 @@ def add_plane_forces(surface: Surface, pressures: Floats, X: Floats, gradient: F
     return gradient
 
 
-def plane_blocks(surface: Surface, pressures: Floats) -> tuple[Ints, Floats]:
-    """The sides a → b (h,2) of flat pieces under pressure, and q (h,3) of their Hessian blocks [q]×."""
+def plane_blocks(surface: Surface, pressures: Floats, hessian: float = 1.0) -> EdgeBlocks:
+    """The blocks of the sides a → b of flat pieces under pressure: q = -p c / 6."""
     pieces = flat_pieces(surface)
     p = pressures[surface.patch_of_face[pieces.face]]
-    ends = np.stack(pieces.sides(surface), axis=1)[p != 0.0]
-    return ends, -p[p != 0.0, None] / 6.0 * pieces.apex[p != 0.0]
+    ends, nothing = np.stack(pieces.sides(surface), axis=1)[p != 0.0], np.zeros(np.count_nonzero(p))
+    q = hessian * (-p[p != 0.0, None] / 6.0 * pieces.apex[p != 0.0])
+    return EdgeBlocks(ends, 0.0 * q, nothing, nothing, q)
 
 
 def ground(surface: Surface) -> Bools:

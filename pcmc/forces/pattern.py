@@ -14,18 +14,12 @@ from .motion_space import MotionSpace, VertexClasses
 
 
 class Pattern(NamedTuple):
-    """Upper triangle (CSR) of a symmetric matrix over motion-space unknowns, and the way into it.
+    """Upper triangle (CSR) of a symmetric matrix over motion-space unknowns, and the way into it."""
 
-    Attributes
-    ----------
-    indptr, indices : CSR structure of the upper triangle, diagonal first in each row.
-    offset : (m,3) int: for corner pairs (0,1), (1,2), (2,0) of each active face, where the columns
-        of the later vertex begin in the rows of the earlier one, counted after its diagonal block.
-    edge_offset : (e,) int: the same for each edge.
-    """
-
-    indptr: Ints
+    indptr: Ints  # CSR structure of the upper triangle, diagonal first in each row
     indices: Ints
+    # (m,3) for corner pairs (0,1), (1,2), (2,0) of each active face, where the columns of the later vertex
+    # begin in the rows of the earlier one, counted after its diagonal block; (e,) the same for each edge
     offset: Ints
     edge_offset: Ints = np.empty(0, dtype=np.int32)
 

@@ -33,12 +33,8 @@ ON_PLANE = 1e-9  # of the size: a vertex as high as this over Π is on it
 def room_volumes(surface: Surface) -> Floats:
     """(r,) the volume enclosed by each room of prescribed volume, length³.
 
-    Raises
-    ------
-    SurfaceError : the patches of a room leave an edge open that nothing holds.
+    SurfaceError if the patches of a room leave an edge open that nothing holds.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], [[0, 1, 2], [1, 3, 2], [3, 0, 2]],
     ...                [0, 0, 0], [Patch("tent", 2.0)], fixed=[0, 1, 3],
@@ -133,12 +129,10 @@ def refuse_varied_pressure(surface: Surface, patches: Iterable[int]) -> None:
 
 
 def check_rooms(surface: Surface) -> None:
-    """Refuse rooms whose volume no solver can reach.
+    """Refuse rooms whose volume no solver can reach (SurfaceError).
 
-    Raises
-    ------
-    SurfaceError : a room does not close, no motion changes its volume, a patch around it does not pull, or it
-        is closed on all sides and its volume is negative, or its normals point into it.
+    That is, if one does not close, no motion changes its volume, a patch around it does not pull, or it is
+    closed on all sides and its volume is negative, or its normals point into it.
     """
     if not surface.rooms:
         return
@@ -149,18 +143,18 @@ def check_rooms(surface: Surface) -> None:
             message = f"room {room.name!r}: no motion changes its volume, as supports hold all its vertices"
             raise SurfaceError(f"{message}; free some, or remove the room", what="rooms", where=room.name)
     for room, row, volume in zip(surface.rooms, surface.room_signs, room_volumes(surface), strict=True):
-        for k in np.flatnonzero(row):
-            patch = surface.patches[k]
-            if patch.tension == 0.0:
-                message = f"room {room.name!r}: patch {patch.name!r} has no tension and takes no pressure"
-                raise SurfaceError(f"{message}; give it one", what="rooms", where=patch.name, found=0.0)
+        slack = [
+            patch for patch, sign in zip(surface.patches, row, strict=True) if sign and not patch.tension
+        ]
+        for patch in slack:
+            message = f"room {room.name!r}: patch {patch.name!r} has no tension and takes no pressure"
+            raise SurfaceError(f"{message}; give it one", what="rooms", where=patch.name, found=0.0)
         if _left_over(surface, row).any():
             continue  # the room lies on either side of Π or of its fixed boundary
         if room.volume < 0.0:
             message = f"room {room.name!r} is closed on all sides: its volume cannot be {room.volume:g}"
-            raise SurfaceError(
-                f"{message}; give a positive one", what="volume", where=room.name, found=room.volume
-            )
+            message += "; give a positive one"
+            raise SurfaceError(message, what="volume", where=room.name, found=room.volume)
         if volume <= 0.0:
             message = f"room {room.name!r} has the volume {volume:g} at the start: the normals of its patches"
             message += " point into it; give them -1 in place of 1, and 1 in place of -1"
@@ -190,7 +184,19 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size)
     edges = surface.topology.edges
     lying = np.asarray(grounded[edges].all(axis=1))
-    _refuse_open(surface, room, np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying)))
+    open_edges = np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying))
+    if len(open_edges):
+        ends = edges[open_edges[0]]
+        place = surface.vertices[ends].mean(axis=0).round(4).tolist()
+        raise SurfaceError(
+            f"room {room.name!r} does not close: its patches end along {len(open_edges)} edges that are"
+            f" neither held on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]} near"
+            f" {place}; name the patches that are missing, with 1 where the normal points out of the room and"
+            " -1 where it points in, or hold that edge",
+            what="rooms",
+            where=room.name,
+            found=ends.tolist(),
+        )
     for _, mask in surface.on_planes:
         lying |= mask[edges].all(axis=1)
     off = np.flatnonzero((left != 0.0) & ~lying)
@@ -233,24 +239,6 @@ def _closed_by_support(surface: Surface, edges: Ints, lying: Bools) -> Bools:
             on_it = along | (fixed & (line.distance(surface.vertices) <= ON_PLANE * surface.size))
             closed |= on_it[edges].all(axis=1)
     return np.asarray(closed)
-
-
-def _refuse_open(surface: Surface, room: Room, edges: Iterable[int]) -> None:
-    """Refuse open edges by name, the first with its place."""
-    numbers = list(edges)
-    if not numbers:
-        return
-    ends = surface.topology.edges[numbers[0]]
-    place = surface.vertices[ends].mean(axis=0).round(4).tolist()
-    raise SurfaceError(
-        f"room {room.name!r} does not close: its patches end along {len(numbers)} edges that are neither held"
-        f" on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]} near {place}; name"
-        " the patches that are missing, with 1 where the normal points out of the room and -1 where it points"
-        " in, or hold that edge",
-        what="rooms",
-        where=room.name,
-        found=ends.tolist(),
-    )
 
 
 def _cones(a: Floats, b: Floats, c: Floats) -> Floats:

@@ -12,6 +12,7 @@ a motion.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,10 +20,9 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..surface import Surface, expect_surface
-from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scaled, sub, vector
-from ..surface.parts import CableEdges
+from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scaled, vector
 from ..surface.topology import Topology
-from .cables import cable_block
+from .cables import EdgeBlocks, cable_blocks
 from .flat_pieces import flat_pieces, plane_blocks
 from .functional import energy_and_gradient
 from .motion_space import MotionSpace, VertexClasses
@@ -96,12 +96,23 @@ def circle_curvatures(surface: Surface, space: MotionSpace, X: Floats) -> tuple[
 def add_products(surface: Surface, mesh: Mesh, X: Floats, d: Floats, change: Floats) -> Floats:
     """(∂²E) d added to ``change`` (n,3), in place, for a motion d (n,3); ``mesh`` has the triangles."""
     _add_triangle_products(mesh, X, d, change)
-    _add_cable_products(surface.cable_edges, X, d, change)
-    if flat_pieces(surface):
-        ends, q = plane_blocks(surface, mesh.pressure)
-        np.add.at(change, ends[:, 0], np.cross(q, d[ends[:, 1]]))
-        np.subtract.at(change, ends[:, 1], np.cross(q, d[ends[:, 0]]))
+    for edges in _edge_blocks(surface, mesh, X, 1.0, 0.0):
+        i, j = edges.ends.T
+        apart = d[j] - d[i]
+        along = edges.s * np.einsum("ij,ij->i", edges.t, apart)
+        pull = along[:, None] * edges.t + edges.k[:, None] * apart
+        np.add.at(change, j, pull - np.cross(edges.q, d[i]))
+        np.add.at(change, i, np.cross(edges.q, d[j]) - pull)
     return change
+
+
+def _edge_blocks(
+    surface: Surface, mesh: Mesh, X: Floats, hessian: float, stiffness: float
+) -> Iterator[EdgeBlocks]:
+    if surface.cables:
+        yield cable_blocks(surface, X, hessian, stiffness)
+    if hessian and flat_pieces(surface):
+        yield plane_blocks(surface, mesh.pressure, hessian)
 
 
 def _assembled(
@@ -116,14 +127,9 @@ def _assembled(
 ) -> Floats:
     data = np.zeros(len(pattern.indices))
     _assemble_triangles(mesh, X, space, pattern, hessian, stiffness, data)
-    cables = surface.cable_edges
-    if len(cables.ends):
-        offset = pattern.edge_offset[topo.edge_numbers(cables.ends)]
-        _assemble_cables(cables, offset, X, space, pattern, hessian, stiffness, data)
-    if hessian and flat_pieces(surface):
-        ends, q = plane_blocks(surface, mesh.pressure)
-        offset = pattern.edge_offset[topo.edge_numbers(ends)]
-        _assemble_sides(ends, offset, hessian * q, space, pattern, data)
+    for edges in _edge_blocks(surface, mesh, X, hessian, stiffness):
+        offset = pattern.edge_offset[topo.edge_numbers(edges.ends)]
+        _assemble_edges(edges, offset, space, pattern, data)
     return data
 
 
@@ -196,33 +202,15 @@ def _assemble_triangles(
 
 
 @compiled
-def _assemble_cables(
-    cables: CableEdges,
-    offset: Ints,
-    X: Floats,
-    space: MotionSpace,
-    pattern: Pattern,
-    hessian: float,
-    stiffness: float,
-    data: Floats,
+def _assemble_edges(
+    edges: EdgeBlocks, offset: Ints, space: MotionSpace, pattern: Pattern, data: Floats
 ) -> None:
-    for e in range(len(cables.ends)):
-        v, w = cables.ends[e, 0], cables.ends[e, 1]
-        block = cable_block(cables, X, e, hessian, stiffness)
-        _add_diagonal(space, pattern, v, block, None, data)
-        _add_diagonal(space, pattern, w, block, None, data)
-        across = Block(-block.s, block.t, -block.k)
-        _add_pair(space, pattern, v, w, offset[e], across, None, None, data)
-
-
-@compiled
-def _assemble_sides(
-    ends: Ints, offset: Ints, q: Floats, space: MotionSpace, pattern: Pattern, data: Floats
-) -> None:
-    nothing = (0.0, 0.0, 0.0)
-    for e in range(len(ends)):
-        block = Block(0.0, nothing, 0.0)
-        _add_pair(space, pattern, ends[e, 0], ends[e, 1], offset[e], block, vector(q[e]), None, data)
+    for e in range(len(edges.ends)):
+        v, w, t = edges.ends[e, 0], edges.ends[e, 1], vector(edges.t[e])
+        alone, pair = Block(edges.s[e], t, edges.k[e]), Block(-edges.s[e], t, -edges.k[e])
+        _add_diagonal(space, pattern, v, alone, None, data)
+        _add_diagonal(space, pattern, w, alone, None, data)
+        _add_pair(space, pattern, v, w, offset[e], pair, vector(edges.q[e]), None, data)
 
 
 @compiled
@@ -244,12 +232,3 @@ def _add_triangle_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> 
                 at_w = _times(pair, back, triangle_tilt(t, n, j, i), d)
             accumulate(change, v, at_v)
             accumulate(change, w, at_w)
-
-
-@compiled
-def _add_cable_products(cables: CableEdges, X: Floats, D: Floats, change: Floats) -> None:
-    for e in range(len(cables.ends)):
-        v, w = cables.ends[e, 0], cables.ends[e, 1]
-        pull = _times(cable_block(cables, X, e, 1.0, 0.0), None, None, sub(point(D, w), point(D, v)))
-        accumulate(change, w, pull)
-        accumulate(change, v, scaled(-1.0, pull))

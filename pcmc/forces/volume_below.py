@@ -6,12 +6,10 @@ With z the height over Π, n its normal, and ν the normal of a triangle T = (a,
     ∂V_T/∂a = ⅓ A_T ⟨ν_T, n⟩ n + ½ z̄_T n × (c - b)
 
 It counts the prisms between the triangles and Π: positive where the patch looks away from Π, negative where
-it overhangs. It does not depend on the point of Π.
-
-The sum over all patches under pressure is the volume enclosed where the boundary lies on Π or on vertical
-planes. Proof: with x seen from a point of Π, z n - x/3 = ⅓ curl(z n × x), so V is the cones of the energy and
-⅓ ∮ z ⟨n × x, dl⟩ along the edges of the patches. Patches that share a curve run along it in opposite
-directions, on Π z = 0, and a flat piece that closes the volume on a vertical plane has no part along n.
+it overhangs. The sum over all patches under pressure is the volume enclosed where the boundary lies on Π or
+on vertical planes. Proof: with x seen from a point of Π, z n - x/3 = ⅓ curl(z n × x), so V is the cones of
+the energy and ⅓ ∮ z ⟨n × x, dl⟩ along the edges of the patches. Patches that share a curve run along it in
+opposite directions, on Π z = 0, and a flat piece on a vertical plane has no part along n.
 """
 
 from __future__ import annotations

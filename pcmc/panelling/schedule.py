@@ -34,29 +34,20 @@ class Panels:
     tolerance : corresponding edges of every two panels of a family differ in length by at most this.
     mirror_images : "alike", one family holds a panel and its mirror image; or "apart".
     certificate : of the surface.
-    families : a row per family, with the columns
-
-        - ``family``, ``count``: its number, and the number of its panels;
-        - ``mirrored``: how many of them are mirror images of the others, turned over;
-        - ``a``, ``b``, ``c``: the middle of the range of each edge's length, ascending;
-        - ``spread``: the largest difference of corresponding edges, at most ``tolerance``;
-        - ``area``: of its panels together, length².
-    panels : a row per panel, with the columns
-
-        - ``panel``, ``face``: its number, and its row in ``surface.faces``;
-        - ``patch``, ``family``; ``mirrored``: whether it is a mirror image of most others of its family;
-        - ``a``, ``b``, ``c``: its edges' lengths in the order of its family;
-        - ``edge_a``, ``edge_b``, ``edge_c``: their rows in ``surface.topology.edges``;
-        - ``area``, length².
-    edges : a row per pair of neighbours, and per edge of a single panel, with the columns
-
-        - ``edge``: its row in ``surface.topology.edges``;
-        - ``kind``: "inside" a patch, "junction" (also a seam between patches) or "boundary";
-        - ``length``;
-        - ``panel``, ``neighbour``: numbers of panels, 0 for none;
-        - ``dihedral``: the angle between both on the inner side of the first: 180 where they are flat, less
-          at a ridge, more at a valley; NaN with one panel. Where more than two panels meet, the edge has a
-          row for each pair, in turn around it.
+    families : a row per family: its number ``family``; ``count``, the number of its panels; ``mirrored``, how
+        many are mirror images of the others, turned over; ``a``, ``b``, ``c``, the middle of the range of
+        each edge's length, ascending; ``spread``, the largest difference of corresponding edges; ``area`` of
+        its panels together, length².
+    panels : a row per panel: ``panel``, its number; ``face``, its row in ``surface.faces``; ``patch``;
+        ``family``; ``mirrored``, whether it is a mirror image of most others of its family; ``a``, ``b``,
+        ``c``, its edges' lengths in the order of its family; ``edge_a``, ``edge_b``, ``edge_c``, their rows
+        in ``surface.topology.edges``; ``area``, length².
+    edges : a row per pair of neighbours, and per edge of a single panel: ``edge``, its row in
+        ``surface.topology.edges``; ``kind``, "inside" a patch, "junction" (also a seam between patches) or
+        "boundary"; ``length``; ``panel``, ``neighbour``, their numbers, 0 for none; ``dihedral``, the angle
+        between both on the inner side of the first: 180 where they are flat, less at a ridge, more at a
+        valley; NaN with one panel. Where more than two panels meet, the edge has a row for each pair, in turn
+        around it.
     flat : (k,3,2) the panels laid flat, outside up, corners as in ``surface.faces``: the longest edge lies on
         the x axis and starts at the origin.
     at_least : no partition of these panels within the tolerance has fewer families.

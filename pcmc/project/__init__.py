@@ -53,51 +53,10 @@ from .solving import solve_project
 from .start import Start, build, start_of, surface_of
 from .varied import check_varied, digest, varied
 
-__all__ = [
-    "AccuracyWanted",
-    "MOST_CHECKED",
-    "OnStep",
-    "Outcome",
-    "Output",
-    "Project",
-    "Remeshing",
-    "Start",
-    "Structure",
-    "build",
-    "cache_folder",
-    "cached_files",
-    "check_model",
-    "check_names",
-    "check_outputs",
-    "check_picture",
-    "check_varied",
-    "clear_cache",
-    "designed",
-    "digest",
-    "drawing_reference",
-    "files_of",
-    "is_drawing",
-    "is_project",
-    "json_schema",
-    "load",
-    "opened",
-    "paint",
-    "project_of",
-    "project_text",
-    "proposal_text",
-    "read_data",
-    "reference",
-    "run",
-    "run_project",
-    "schedule_jobs",
-    "schedule_paths",
-    "sections",
-    "solve_project",
-    "start_of",
-    "surface_files",
-    "surface_of",
-    "varied",
-    "vertex_fields",
-    "with_rise",
-    "write_all",
-]
+__all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing", "Start"]
+__all__ += ["Structure", "build", "cache_folder", "cached_files", "check_model", "check_names"]
+__all__ += ["check_outputs", "check_picture", "check_varied", "clear_cache", "designed", "digest"]
+__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "opened"]
+__all__ += ["paint", "project_of", "project_text", "proposal_text", "read_data", "reference", "run"]
+__all__ += ["run_project", "schedule_jobs", "schedule_paths", "sections", "solve_project", "start_of"]
+__all__ += ["surface_files", "surface_of", "varied", "vertex_fields", "with_rise", "write_all"]

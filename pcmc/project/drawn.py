@@ -39,10 +39,9 @@ def is_drawing(path: Path) -> bool:
 
 
 def files_of(path: PathLike) -> list[Path]:
-    """The files that a project depends on: itself, and the drawing or the mesh that it refers to.
+    """The files that a project depends on: itself, and the drawing or mesh that it refers to.
 
-    A project that cannot be read depends on itself alone, so that a page which follows these files sees it
-    mended.
+    One that cannot be read depends on itself alone, so that a page which follows these files sees it mended.
 
     >>> files_of("notebooks/roof.toml")
     [PosixPath('notebooks/roof.toml')]
@@ -61,15 +60,12 @@ def files_of(path: PathLike) -> list[Path]:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What neither a project nor its drawing says: tensions of patches, walls and cables, edge length.
-
-    The cable without a name is that of the outline.
-    """
+    """What neither a project nor its drawing says: tensions of patches, walls and cables, edge length."""
 
     tensions: Mapping[str, float] = field(default_factory=dict)
     walls: Mapping[str, float] = field(default_factory=dict)
     edge_length: float | None = None
-    cables: Mapping[str, float] = field(default_factory=dict)
+    cables: Mapping[str, float] = field(default_factory=dict)  # that of the outline has no name
 
     @classmethod
     def of(cls, given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing) -> Chosen:
@@ -125,16 +121,11 @@ class Chosen:
 
 
 def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
-    """The data of a project with its drawing's lines in them, the drawing, if its plan refers to one, and
-    what was chosen.
+    """The data of a project with its drawing's lines in them; the drawing, if there is one; what was chosen.
 
     What neither the project nor the drawing says, such as tensions, is proposed. Points of the layer "height"
-    become targets where the project has none. A project without units takes those of the drawing.
-
-    Raises
-    ------
-    FileError : for a drawing outside the project's folder, and one that cannot be read.
-    PlanError, OptionError : for a drawing that is no plan, and for values that do not fit it.
+    become targets where the project has none. A project without units takes those of the drawing. Errors as
+    in ``load``.
     """
     plan = dict(data["plan"])
     name, gap = plan.pop("drawing", None), plan.pop("gap", None)
@@ -180,14 +171,7 @@ def leads_outside(name: str) -> bool:
 
 
 def check_beside(name: str, kind: str) -> None:
-    """Refuse a drawing or mesh outside the folder of the project that refers to it.
-
-    >>> check_beside("../hall.dxf", "drawing")
-    Traceback (most recent call last):
-    ...
-    pcmc.base.errors.FileError: the drawing '../hall.dxf' is outside the project's folder; put it beside
-    the project
-    """
+    """Refuse a drawing or mesh outside the folder of the project that refers to it."""
     if leads_outside(name):
         text = f"the {kind} {name!r} is outside the project's folder; put it beside the project"
         raise FileError(text, what=f"plan.{kind}" if kind == "drawing" else kind, found=name)

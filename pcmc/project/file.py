@@ -94,17 +94,14 @@ def load(path: PathLike, *, units: str = "") -> Project:
 
     Raises
     ------
-    FileError
-        If the file cannot be read or is not TOML; for an unknown key (the message names its line and
+    FileError : if the file cannot be read or is not TOML; for an unknown key (the message names its line and
         the nearest known key), a missing key or a bad value. ``what`` is the key.
-    PlanError
-        For a drawing that is no plan; ``what`` is its layer.
+    PlanError : for a drawing that is no plan; ``what`` is its layer.
 
     Warns
     -----
-    FileWarning
-        For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
-        and for a roof held at single points inside.
+    FileWarning : for what was changed and left out of a drawing, for a plan whose size is unlikely in its
+        unit, and for a roof held at single points inside.
     """
     path = as_path(path)
     if not is_project(path):
@@ -133,10 +130,7 @@ def is_project(path: PathLike) -> bool:
 
 
 def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
-    """The text of a project file and its data, all keys checked; a drawing's data refer to it.
-
-    Errors as in ``load``.
-    """
+    """The text of a project file and its data, all keys checked; a drawing's data refer to it."""
     check_regular(path)
     if is_drawing(path):
         return "", {"plan": {"drawing": path.name}} | ({"units": units} if units else {})
@@ -191,15 +185,7 @@ def project_of(
         data, drawing, chosen = with_drawing(path, data)
     stages = data.get("remesh", [])
     with in_file(path, FileError):
-        options = dict(data.get("solve", {}))
-        about = {
-            name: options.pop(name)
-            for name in ("method", "mesh_check", "margin", "verify")
-            if name in options
-        }
-        accuracy = {name: options.pop(name) for name in vars(AccuracyWanted()) if name in options}
-        wanted = section_of(AccuracyWanted, "solve", accuracy)
-        find_method(about.get("method", "newton")).options(**options)  # refuses bad values before meshing
+        solving = _solving(data.get("solve", {}))
         output = _output(data.get("output", {}))
         units = Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
@@ -220,9 +206,7 @@ def project_of(
             text=text,
             data=given,
             units=units,
-            options=options,
-            wanted=wanted,
-            **about,
+            **solving,
             remeshing=[
                 section_of(Remeshing, "remesh", stage)
                 for stage in (stages if isinstance(stages, list) else [stages])
@@ -236,6 +220,16 @@ def project_of(
             rises=rises,
             chosen=chosen,
         )
+
+
+def _solving(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What [solve] says, as values of a Project; bad ones are refused before the plan is meshed."""
+    given = {name: table[name] for name in ("method", "mesh_check", "margin", "verify") if name in table}
+    accuracy = {name: table[name] for name in vars(AccuracyWanted()) if name in table}
+    given["wanted"] = section_of(AccuracyWanted, "solve", accuracy)
+    given["options"] = {name: v for name, v in table.items() if name not in given and name not in accuracy}
+    find_method(given.get("method", "newton")).options(**given["options"])
+    return given
 
 
 def _output(table: Mapping[str, Any]) -> Output:
@@ -252,8 +246,7 @@ def _output(table: Mapping[str, Any]) -> Output:
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], list[Parameter]]:
     """The targets of a project, and the parameters that may vary."""
-    from ..design import Parameter
-    from ..margins.targets import Target
+    from ..design import Parameter, Target
 
     if "tolerance" in table:
         validate.positive("targets.tolerance", table["tolerance"])

@@ -21,13 +21,13 @@ from .start import surface_of
 if TYPE_CHECKING:
     from ..plan.drawing import Drawing
 
+SHARPER = " # tension of the wall; more gives a sharper valley"
+
 
 def drawing_reference(drawing: Path, project: Path) -> str:
     """The name by which a project refers to its drawing, which lies in the project's folder or below it.
 
-    Raises
-    ------
-    FileError : for a drawing elsewhere; the message has the line to type.
+    FileError for a drawing elsewhere; the message has the line to type.
     """
     try:
         name = Path(os.path.relpath(drawing, project.parent))
@@ -49,21 +49,12 @@ def project_text(
     gap: float | None = None,
     refer: bool = False,
 ) -> tuple[str, Drawing]:
-    """The text of the project for a drawing, and the drawing.
+    """The text of the project for a drawing, .dxf or .3dm, and the drawing.
 
-    Parameters
-    ----------
-    path : of the drawing, .dxf or .3dm.
-    folder : of the project, which refers to the drawing from there; by default the drawing's.
-    units : the unit of length of the project; "" for the drawing's.
-    gap : gaps between lines up to this length are closed, in that unit.
-    refer : refer to the drawing by name, so that the project follows it, instead of holding its lines.
-
-    Raises
-    ------
-    FileError, PlanError : for a drawing that cannot be read, is no plan, or is outside the folder of a
-        project that refers to it.
-    MissingExtra : without the library that reads the drawing.
+    The project is in ``units``, by default those of the drawing; gaps between lines up to the length ``gap``
+    are closed. With ``refer`` it refers to the drawing by name, so that it follows it, instead of holding its
+    lines; ``folder`` is that of the project, by default the drawing's. FileError or PlanError for a drawing
+    that cannot be read, is no plan, or is outside that folder; MissingExtra without the library for it.
     """
     from ..plan.proposal import proposed
 
@@ -75,16 +66,20 @@ def project_text(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no project is written that cannot be meshed
         surface_of(Project(path, plan_from(values), drawing=drawing))
-    stem = drawing.path.stem
+    return _text(drawing, values, name, gap), drawing
+
+
+def _text(drawing: Drawing, values: Mapping[str, Any], name: str, gap: float | None) -> str:
+    """The project of these values; with the ``name`` of a drawing it refers to that for its lines."""
     lines = [f"# The roof of {drawing.path.name}, written by pcmc plan", *(f"# {n}" for n in drawing.notes)]
     unit = f'units = "{drawing.units}" # of all lengths here'
     missing = f'# units = "{FALLBACK}"  # the drawing has no unit of length'
     lines += [unit if drawing.units in LENGTHS else missing, "", "[plan]"]
-    if refer:
+    if name:
         lines.append(f"drawing = {_toml(name)} # its layers are the lines; save it, and the roof follows")
         lines += [] if gap is None else [f"gap = {_toml(gap)}"]
     lines.append(f"edge_length = {_toml(values['edge_length'])} # of the triangles")
-    if not refer:
+    if not name:
         lines += [f"plane = {_toml(values['plane'])}"] if "plane" in values else []
         lines.append(f"outline = {_curve(values['outline'], closed=True)}")
         for key in ("supports", "mirrors"):
@@ -95,27 +90,26 @@ def project_text(
             lines += [f"edge = {_toml(values['edge'])}", f"cable = {_toml(values['cable'])} # {comment}"]
     lines += ["", "[plan.patches] # a larger tension gives a flatter roof"]
     for patch, area in values["patches"].items():
-        lines.append(f"{_key(patch)} = {_toml({k: v for k, v in area.items() if not (refer and k == 'at')})}")
+        lines.append(f"{_key(patch)} = {_toml({k: v for k, v in area.items() if not (name and k == 'at')})}")
     for kind in ("holes", "dividers", "cables"):
         for entry in values.get(kind, ()):
             lines += ["", f"[[plan.{kind}]]", f"name = {_toml(entry['name'])}"]
             for key, value in entry.items():
-                if key == "name" or (key == "curve" and refer) or (key, value) == ("bottom", "held"):
+                if key == "name" or (key == "curve" and name) or (key, value) == ("bottom", "held"):
                     continue
-                comment = (
-                    " # tension of the wall; more gives a sharper valley" if key == "wall" and value else ""
-                )
+                comment = SHARPER if key == "wall" and value else ""
                 lines.append(f"{key} = {_curve(value) if key == 'curve' else _toml(value)}{comment}")
-    if len(drawing.heights) and not refer:
+    if len(drawing.heights) and not name:
         lines += ["", "[targets]", f"meet = {_list(height_targets(drawing))}"]
         lines.append(f"vary = {_toml(list(values['patches']))} # the tensions that may change for it")
+    stem = drawing.path.stem
     lines += [
         "",
         "[output]",
-        f"files = [{_toml(f'{stem}-roof.3dm')}]",
+        f"files = {_toml([f'{stem}-roof.3dm'])}",
         f"picture = {_toml(f'{stem}-roof.png')}",
     ]
-    return "\n".join([*lines, ""]), drawing
+    return "\n".join([*lines, ""])
 
 
 def proposal_text(project: Project) -> str:

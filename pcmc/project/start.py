@@ -132,8 +132,7 @@ def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
 def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Target], list[Parameter]]:
     """The mesh with first tensions for its rises, the targets, and what is to be found.
 
-    They are those of a cap; see ``rises.first_tension``. The least tension is p times area over length of the
-    boundary's projection.
+    The least tension of these caps is p times area over length of the boundary's projection.
     """
     from ..design import Parameter, Target
 

@@ -57,9 +57,7 @@ def single_points(surface: Surface) -> Ints:
 def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -> dict[Name, float]:
     """The values of ``asked`` that ``surface`` has not, those in ``left`` apart.
 
-    Raises
-    ------
-    OptionError : for surfaces whose patches, cables or rooms are not the same.
+    OptionError for surfaces whose patches, cables or rooms are not the same.
     """
     ours, theirs = _by_name(surface), _by_name(asked)
     if ours.keys() != theirs.keys():
@@ -92,22 +90,11 @@ def _by_name(surface: Surface) -> dict[Name, float]:
 def with_values(
     path: Path, given: Mapping[str, Any], asked: Surface, left: Collection[Name] = ()
 ) -> tuple[dict[str, Any], Project, Surface]:
-    """The data of a project whose start shape has the values of a surface.
+    """The data of a project with the values of the surface ``asked``, the project, and its start shape.
 
-    Parameters
-    ----------
-    path, given : of the project, and its data.
-    asked : has the values wanted; its shape does not count.
-    left : (kind, name) of the values that the project keeps as it finds them.
-
-    Returns
-    -------
-    data : with other numbers where ``asked`` has others, each in the form that the project has it in.
-    project, start : of these data.
-
-    Raises
-    ------
-    OptionError : for values that a project cannot hold, such as two tensions of one divider.
+    The data have other numbers where ``asked`` has others, each in the form that the project has it in. The
+    values in ``left`` stay as the project finds them. OptionError for values that a project cannot hold, such
+    as two tensions of one divider.
 
     >>> path = Path("notebooks/roof.toml")
     >>> from .file import read_data

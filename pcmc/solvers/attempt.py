@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
+from ..certificate.verdict import COLLAPSED, NOISE
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
@@ -22,8 +23,6 @@ TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
-NOISE = 10.0  # times what rounding of the coordinates leaves, which counts as zero in the same way
-COLLAPSED = 1e-3  # triangle quality below which the attempt ends
 POOR = 0.15  # triangle quality that explains why no step helps
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
 SLOW_DESCENT_STEPS = (3, 30)  # that hardly lower E: when a saddle that slips is accepted, when any

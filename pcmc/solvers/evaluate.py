@@ -15,7 +15,8 @@ from ..forces.functional import add_cables_and_weights, total
 from ..forces.motion_space import tension_forces
 from ..surface import Surface
 from ..surface.checks import reachable
-from ..surface.geometry import accumulate, dot, point, scaled, vector
+from ..surface.geometry import accumulate, bounding_size, dot, point, scaled, vector
+from .result import Status
 
 ROUNDING = 1e-14  # of the triangles' forces: what is left of them to rounding where they cancel
 
@@ -55,6 +56,9 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
 class Evaluator:
     """E and ∇E of ``surface`` with its vertices at other positions; ``count`` is the number of calls.
 
+    A run has converged at ``tolerance`` (see ``converged_below``), and diverged where the bounding box is
+    more than ``inflation`` times that of the surface.
+
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
@@ -65,8 +69,9 @@ class Evaluator:
     (4.323521, 2.235305, 1)
     """
 
-    def __init__(self, surface: Surface) -> None:
-        self.count = 0
+    def __init__(self, surface: Surface, tolerance: float | None = None, inflation: float = np.inf) -> None:
+        self.count, self._tolerance = 0, converged_below(surface, tolerance)
+        self._largest = inflation * surface.size
         self._mesh = triangles.energy_mesh(surface)
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
@@ -74,6 +79,14 @@ class Evaluator:
         self._pieces = bool(flat_pieces(surface))
         self._pulled = bool(surface.cables) or bool(surface.weights.any())
         self._single = len(blocks(surface.m, threads())) == 1
+
+    def ending(self, point: Point) -> Status | None:
+        """Why to stop at a point, or None."""
+        if not point.finite:
+            return Status.NON_FINITE
+        if point.squared <= self._tolerance:
+            return Status.CONVERGED
+        return Status.DIVERGED if bounding_size(point.X) > self._largest else None
 
     def __call__(self, X: Floats) -> Point:
         """E, ∇E and ‖∇E‖² with the vertices at X (n,3); not finite rather than an error."""

@@ -14,8 +14,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from ..surface.geometry import bounding_size
-from .evaluate import Evaluator, Point, converged_below
+from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
 
 COLUMNS = ("evaluation", "energy", "gradient_squared")
@@ -102,8 +101,7 @@ class Objective:
     def __init__(self, surface: Surface, options: LbfgsOptions, callback: Callback | None) -> None:
         self.surface, self.options, self.callback = surface, options, callback
         self.coordinates = Coordinates(surface)
-        self.evaluate = Evaluator(surface)
-        self.tolerance = converged_below(surface, options.tolerance)
+        self.evaluate = Evaluator(surface, options.tolerance, options.inflation)
         self.rows: list[tuple[Any, ...]] = []  # of ``COLUMNS``
         self.best: Point | None = None  # of least energy; the converged one if there is one
         self.status: Status | None = None  # why the last point ends the run
@@ -127,19 +125,13 @@ class Objective:
     def visit(self, X: Floats) -> Point:
         """Measure and record one point, and set the status if it is the last."""
         point = self.evaluate(X)
-        converged = point.squared <= self.tolerance
+        self.status = self.evaluate.ending(point)
         if point.finite or not self.rows:
             self.rows.append((self.evaluate.count, point.energy, point.squared))
-            if self.best is None or converged or _better(point, self.best):
+            if self.best is None or self.status is Status.CONVERGED or _better(point, self.best):
                 self.best = point
-        if not point.finite:
-            self.status = Status.NON_FINITE
-        elif converged:
-            self.status = Status.CONVERGED
-        elif bounding_size(X) > self.options.inflation * self.surface.size:
-            self.status = Status.DIVERGED
-        elif self.evaluate.count >= self.options.evaluations:  # NLopt's own limit waits for a step
-            self.status = Status.ITERATION_LIMIT
+        if self.status is None and self.evaluate.count >= self.options.evaluations:
+            self.status = Status.ITERATION_LIMIT  # NLopt's own limit waits for a step
         if self.callback is not None and point.finite:
             named = dict(zip(COLUMNS, self.rows[-1], strict=True))
             self.callback(Progress(len(self.rows), lambda: self.surface.moved(X), named))
@@ -154,8 +146,6 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     more. The result is the surface of least energy seen, measured once more where the last trial was not
     the best. Status STALLED when NLopt's line search finds no step, an error with an empty message there.
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

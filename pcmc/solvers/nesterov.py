@@ -11,8 +11,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from ..surface.geometry import bounding_size
-from .evaluate import Evaluator, Point, converged_below
+from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
 
 
@@ -91,8 +90,6 @@ def nesterov(
     and ∇E together, so far), ``energy``, ``gradient_squared``, ``t`` (NaN in row 0) and ``armijo_held``
     (False where the floor was taken although it failed).
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
@@ -101,68 +98,44 @@ def nesterov(
     >>> result.converged, result.surface.vertices[4].round(6).tolist()  # 4 h / √(1 + h²) = 4 / 3
     (True, [0.0, 0.0, 0.353553])
     """
-    flow = _Flow(surface, options or NesterovOptions(), callback)
-    status = until_stopped(flow.run)
-    move = flow.move
+    options = options or NesterovOptions()
+    evaluate = Evaluator(surface, options.tolerance, options.inflation)
+    start = evaluate(surface.vertices)
+    move = Move(0, start, np.zeros_like(start.X), np.nan, True)
+    rows: list[dict[str, Any]] = []
+
+    def add_row(of: Move) -> None:
+        names = "iteration", "evaluation", "energy", "gradient_squared", "t", "armijo_held"
+        point = of.point
+        values = of.iteration, evaluate.count, point.energy, point.squared, of.t, of.passed
+        rows.append(dict(zip(names, values, strict=True)))
+
+    def run() -> Status:
+        nonlocal move
+        while (status := evaluate.ending(move.point)) is None:
+            if move.iteration >= options.iterations:
+                return Status.ITERATION_LIMIT
+            new = _iterate(move, evaluate, options)
+            if not new.point.finite:
+                return Status.NON_FINITE
+            add_row(new)
+            move = new
+            if callback is not None:
+                callback(Progress(new.iteration, partial(surface.moved, new.point.X), rows[-1]))
+        return status
+
+    add_row(move)
+    status = until_stopped(run)
     return Result(
         surface=surface.moved(move.point.X),
-        status=flow.ending() or status,
+        status=evaluate.ending(move.point) or status,
         method="nesterov",
         energy=move.point.energy,
         iterations=move.iteration,
-        evaluations=flow.evaluate.count,
+        evaluations=evaluate.count,
         # Ctrl-C may come between a row and its move; the history ends with the surface returned
-        rows=flow.rows[: move.iteration + 1],
+        rows=rows[: move.iteration + 1],
     )
-
-
-class _Flow:
-    """The flow from one surface: the last move, and the history up to it."""
-
-    def __init__(self, surface: Surface, options: NesterovOptions, callback: Callback | None) -> None:
-        self.surface, self.options, self.callback = surface, options, callback
-        self.evaluate = Evaluator(surface)
-        self.tolerance = converged_below(surface, self.options.tolerance)
-        start = self.evaluate(surface.vertices)
-        self.move = Move(0, start, np.zeros_like(start.X), np.nan, True)
-        self.rows = [self.row(self.move)]
-
-    def run(self) -> Status:
-        """Move until the flow ends."""
-        while (status := self.ending()) is None:
-            if self.move.iteration >= self.options.iterations:
-                return Status.ITERATION_LIMIT
-            new = _iterate(self.move, self.evaluate, self.options)
-            if not new.point.finite:
-                return Status.NON_FINITE
-            self.rows.append(self.row(new))
-            self.move = new
-            if self.callback is not None:
-                surface = partial(self.surface.moved, new.point.X)
-                self.callback(Progress(new.iteration, surface, self.rows[-1]))
-        return status
-
-    def ending(self) -> Status | None:
-        """Why to stop at the point reached, or None."""
-        point = self.move.point
-        if not point.finite:
-            return Status.NON_FINITE
-        if point.squared <= self.tolerance:
-            return Status.CONVERGED
-        if bounding_size(point.X) > self.options.inflation * self.surface.size:
-            return Status.DIVERGED
-        return None
-
-    def row(self, move: Move) -> dict[str, Any]:
-        """The row of the history for a move."""
-        return {
-            "iteration": move.iteration,
-            "evaluation": self.evaluate.count,
-            "energy": move.point.energy,
-            "gradient_squared": move.point.squared,
-            "t": move.t,
-            "armijo_held": move.passed,
-        }
 
 
 def _iterate(move: Move, evaluate: Evaluator, options: NesterovOptions) -> Move:

@@ -1,13 +1,12 @@
 """The geometric solver: Bᵀ∇E = 0 in the motion space, to rounding, on any refinement.
 
-Each iteration tries a Newton step on the residual r = Bᵀ∇E, whose frames B turn with the surface. GMRES
-inverts its derivative (``linearise``), preconditioned by a factorisation of Bᵀ(∂²E)B that is used as long
-as it contracts. Where a minimum is sought and the matrix is indefinite, it is shifted; near a saddle the
-solver follows the lowest mode. Where a Newton step overshoots or spoils triangles, smooth descent steps come
-first. Between steps vertices are redistributed along the shape while triangles are poor, and junctions that
-come down to Π are set to rest there. A run may pass a shallow minimum, or go a step too far, until triangles
-collapse. Then the solver starts once more: towards any stationary point, which it returns if it is a minimum
-or none was asked for; or, if that is what has failed, with smooth steps first.
+Each iteration tries a Newton step on r = Bᵀ∇E, whose frames B turn with the surface. GMRES inverts its
+derivative (``linearise``), preconditioned by a factorisation of Bᵀ(∂²E)B, used as long as it contracts.
+Where a minimum is sought and the matrix is indefinite, it is shifted; near a saddle the solver follows the
+lowest mode. Where a step overshoots or spoils triangles, smooth descent steps come first. Between steps
+vertices are redistributed while triangles are poor, and junctions that come down to Π are set to rest there.
+Where triangles collapse, the solver starts once more: towards any stationary point, which it returns if it is
+a minimum or none was asked for; or, if that is what has failed, with smooth steps first.
 """
 
 from __future__ import annotations

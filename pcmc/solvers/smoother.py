@@ -155,13 +155,10 @@ class HarmonicExtension:
         self._coupling = csr_array(L[inside][:, ~inside])
         upper = csr_array(triu(L[inside][:, inside]))
         upper.sort_indices()
-        # scaled to a diagonal of ones, so that no weak pivot looks like zero
-        diagonal = upper.diagonal()
-        self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        data = upper.data * np.repeat(self._scale, np.diff(upper.indptr)) * self._scale[upper.indices]
-        self._factor = factoriser(
-            Pattern(upper.indptr, upper.indices, np.empty((0, 3), dtype=np.int32)), backend
-        ).factor(data)
+        diagonal = upper.diagonal()  # in units of it no weak pivot looks like zero
+        units = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        pattern = Pattern(upper.indptr, upper.indices, np.empty((0, 3), dtype=np.int32))
+        self._factor = factoriser(pattern, backend, units).factor(upper.data)
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices following the curves."""
@@ -173,6 +170,5 @@ class HarmonicExtension:
     def harmonic(self, motion: Floats) -> Floats:
         """w (n,3), as ``motion`` where it is prescribed."""
         w = np.where(self._prescribed[:, None], motion, 0.0)
-        scale, right = self._scale[:, None], self._coupling @ w[self._given]
-        w[self._inside] = -scale * self._factor.solve(scale * right)
+        w[self._inside] = -self._factor.solve(self._coupling @ w[self._given])
         return w

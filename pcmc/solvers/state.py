@@ -46,28 +46,21 @@ RELEASES = 30  # the most times that resting junctions are lifted or walls are u
 class State:
     """One mesh with the positions reached, and how it may move.
 
-    Attributes
-    ----------
-    full : the whole surface when its walls were last pinched or lifted.
-    at : its standing part at the positions reached.
-    held : whether walls with held bottoms can pinch, too.
-    size : of the mesh at the start.
-    pressures : (r,) δ, the changes of the rooms' pressures since the start.
-    rounding : what rounding of the coordinates alone leaves of the residual, about.
-    version : changes whenever the faces or the number of unknowns do.
-    evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
+    ``full`` is the whole surface when its walls were last pinched or lifted, ``at`` its standing part at the
+    positions reached, ``size`` that of the start. ``version`` changes whenever the faces or the number of
+    unknowns do. ``evaluations`` counts passes over the triangles: E, ∇E or its derivative along a motion.
     """
 
     def __init__(
         self, surface: Surface, min_quality: float, held: bool = False, backend: str | None = None
     ) -> None:
         self.full, self.min_quality, self.size, self.backend = surface, min_quality, surface.size, backend
-        self.pressures = np.zeros(len(surface.rooms))
+        self.pressures = np.zeros(len(surface.rooms))  # (r,) δ, their changes since the start
         part = standing_part(surface)
         if held:
             walls = find_walls(surface, held)
             part = StandingPart.of(surface, walls, resting_vertices(surface, walls))
-        self.held = bool(part.walls.held.any())
+        self.held = bool(part.walls.held.any())  # whether walls with held bottoms can pinch, too
         self.spacing = top_spacing(surface, part.walls)
         self.evaluations = self.version = 0
         self._redistributions_left, self._releases_left = REDISTRIBUTIONS, RELEASES
@@ -79,7 +72,7 @@ class State:
         """Go on with this standing part of ``full``."""
         self.at = Equilibrium(part, part.surface.vertices, self.backend)
         self.quality_faces = part.quality_faces
-        self.rounding = rounding_left(part.surface, part.classes, self.at.X)
+        self.rounding = rounding_left(part.surface, part.classes, self.at.X)  # of the residual, about
         self.version += 1
         self.evaluations += 1
 

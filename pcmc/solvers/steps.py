@@ -27,18 +27,11 @@ ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
 class Stepper:
-    """Takes steps on a State, and reuses factorisations while they contract.
-
-    Attributes
-    ----------
-    kind : the last step: ``"newton"``, ``"shifted"``, ``"contact"``, ``"descent"`` or ``"saddle"``.
-    second : the second variation last factorised, perhaps at other positions; None if there is none.
-    factorisations : matrices factorised so far.
-    """
+    """Takes steps on a State, and reuses factorisations while they contract."""
 
     def __init__(self, state: State, minimum: bool) -> None:
         self.state, self.minimum = state, minimum
-        self.kind = "start"
+        self.kind = "start"  # or the last step: newton, shifted, contact, descent, saddle, release
         self.factorisations = 0
         self._shifted_steps = 0  # in a row
         self._residual_raised = False  # by the last step, which was allowed to
@@ -47,7 +40,7 @@ class Stepper:
     def free(self) -> None:
         """Drop all factors: they are most of a large surface's memory."""
         self._version = self.state.version  # of what follows: it belongs to these faces and unknowns
-        self.second: SecondVariation | None = None
+        self.second: SecondVariation | None = None  # last factorised, perhaps at other positions
         self._smoother: Smoother | None = None
         self._extension: HarmonicExtension | None = None
         self._smoother_age = REFRESH

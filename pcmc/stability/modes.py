@@ -101,9 +101,7 @@ def _factorised(at: Equilibrium, shift: Floats | float) -> SecondVariation | Non
 def descent_mode(surface: Surface) -> tuple[int, Floats]:
     """The Morse index of a surface at rest and its lowest mode (n,3); empty if there is no way down.
 
-    Raises
-    ------
-    SingularMatrix : the second variation has no inertia that can be counted.
+    SingularMatrix if the second variation has no inertia that can be counted.
     """
     system = Equilibrium.of(surface).factorised()
     if system.negative == 0:
@@ -111,8 +109,8 @@ def descent_mode(surface: Surface) -> tuple[int, Floats]:
     return system.negative, lowest(system, 1)[1][0]
 
 
-def all_modes(system: SecondVariation) -> tuple[Floats, Floats]:
-    """All eigenvalues (k,), ascending, and their modes (N,k) of unit mass; for a few unknowns."""
+def _dense(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
+    """The k lowest eigenvalues, ascending, and their modes (N,k) of unit mass; for a few unknowns."""
     across = np.eye(len(system.of.mass))
     if system.of.excluded.shape[1]:
         across = null_space(system.of.excluded.T)
@@ -120,7 +118,7 @@ def all_modes(system: SecondVariation) -> tuple[Floats, Floats]:
         return np.empty(0), across
     H, M = system.matrix.toarray(), np.diag(system.of.mass)
     values, vectors = eigh(across.T @ H @ across, across.T @ M @ across)
-    return values, across @ vectors
+    return values[:k], across @ vectors[:, :k]
 
 
 def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) -> Floats:
@@ -164,11 +162,6 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
     vectors = _settled(values, root[:, None] * vectors, system.of.space, root)
     fields = [system.of.space.to_vectors(vector / root) for vector in vectors.T[:count]]
     return values[:count], np.array(fields).reshape(len(fields), len(system.of.space.dimension), 3)
-
-
-def _dense(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
-    values, vectors = all_modes(system)
-    return values[:k], vectors[:, :k]
 
 
 def _nearest(system: SecondVariation, k: int) -> tuple[Floats, Floats]:

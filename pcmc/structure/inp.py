@@ -16,7 +16,6 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
-from ..forces.cables import directions
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from .loads import Step
@@ -39,14 +38,8 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     (elements), ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_B1``, ``SUPPORT_S1`` and so on,
     by the numbers in ``Certificate.supports``.
 
-    Parameters
-    ----------
-    path : the file, with the suffix .inp; it appears whole or not at all.
-    model : the structural model.
-
-    Raises
-    ------
-    FileError : for another suffix, and where the file cannot be written.
+    ``path`` has the suffix .inp; the file appears whole or not at all. FileError for another suffix, and
+    where it cannot be written.
     """
     path = Path(path)
     check_name(path)
@@ -98,10 +91,7 @@ def _elements(model: StructuralModel) -> Iterator[str]:
 
 def _cable_elements(model: StructuralModel) -> Iterator[str]:
     """Elements, sections and material of the cables, and the set CABLES of all."""
-    first = model.first_cable
-    for k, (cable, area) in enumerate(zip(model.standing.cables, model.cable_areas, strict=True), 1):
-        numbers = first + np.arange(len(cable.edges))
-        first += len(cable.edges)
+    for k, (cable, area, numbers, _) in enumerate(model.cable_edges(), 1):
         yield f"*ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}\n"
         yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))
         yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE\n{short(area)}\n"
@@ -140,12 +130,9 @@ def _prestress(model: StructuralModel) -> Iterator[str]:
     stress = np.eye(3) - normals[:, :, None] * normals[:, None, :]
     stress *= model.prestress[:, None, None]
     yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, stress, POINTS)
-    number = model.first_cable
-    for cable, area in zip(surface.cables, model.cable_areas, strict=True):
-        along = directions(surface.vertices, cable.edges)[0]
+    for cable, area, numbers, along in model.cable_edges():
         stress = cable.tension / area * along[:, :, None] * along[:, None, :]
-        yield _stresses(number + np.arange(len(along)), stress, CABLE_POINTS)
-        number += len(along)
+        yield _stresses(numbers, stress, CABLE_POINTS)
 
 
 def _stresses(elements: Ints, stress: Floats, points: int) -> str:

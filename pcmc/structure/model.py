@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -16,11 +16,13 @@ from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
+from ..forces.cables import directions
 from ..forces.triangles import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.parts import Cable
 from ..surface.supports import apply_supports
 from .loads import GRAVITY, Load, SelfWeight, Snow, Step, Wind, acting_together, check_loads, load_steps
 
@@ -165,13 +167,16 @@ class StructuralModel:
 
     @cached_property
     def cable_areas(self) -> tuple[float, ...]:
-        """The area of each cable's section, length²."""
+        """The area of each cable's section, length²; its elements come after the faces' numbers."""
         return checked_areas(self.cable_area, self.surface)
 
-    @property
-    def first_cable(self) -> int:
-        """The number of the first cable element."""
-        return self.surface.m + 1
+    def cable_edges(self) -> Iterator[tuple[Cable, float, Ints, Floats]]:
+        """Each cable, the area of its section, and the numbers (k,) and directions (k,3) of its elements."""
+        first = self.surface.m + 1
+        for cable, area in zip(self.standing.cables, self.cable_areas, strict=True):
+            along = directions(self.standing.vertices, cable.edges)[0]
+            yield cable, area, first + np.arange(len(along)), along
+            first += len(along)
 
     @cached_property
     def standing(self) -> Surface:
@@ -251,7 +256,7 @@ class StructuralModel:
         per_face += step.gravity * mass[:, None] * down
         forces = step.forces + vertex_sums(per_face[self.active] / 3.0, s.faces[self.active], s.n)
         density = (self.cable_material or self.material).density
-        for cable, area in zip(s.cables, self.cable_areas, strict=True):
+        for cable, area, *_ in self.cable_edges():
             half = 0.5 * density * area * step.gravity * segment_lengths(s.vertices, cable.edges)
             forces += np.bincount(cable.edges.ravel(), np.repeat(half, 2), s.n)[:, None] * down
         return forces

@@ -14,7 +14,6 @@ from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
-from ..forces.cables import directions
 from ..surface.geometry import area_vectors
 from .model import StructuralModel
 from .tables import Block, read
@@ -27,24 +26,16 @@ FAR = 1e-4  # of the size: a node farther from its vertex belongs to another sur
 class StepResults:
     """The end of one step of the analysis. Vertices and faces that are not in the model have NaN.
 
-    Attributes
-    ----------
-    name : of the step.
-    model : the structural model.
-    displacements : (n,3) length.
-    reactions : (n,3) forces of the supports on the structure; zero at vertices that nothing holds.
-    stresses : (m,3,3) stress tensors in the axes of space, force/area, the mean over the thickness. From an
-        .frd file they are the mean of a triangle's corners, where all elements around have been averaged,
-        those of other patches too.
-    cable_tensions : the tension (k,) of the edges of each cable, force, by its name; from a .dat file alone.
+    Stresses from an .frd file are the mean of a triangle's corners, where all elements around have been
+    averaged, those of other patches too.
     """
 
-    name: str
+    name: str  # of the step
     model: StructuralModel
-    displacements: Floats
-    reactions: Floats
-    stresses: Floats
-    cable_tensions: Mapping[str, Floats]
+    displacements: Floats  # (n,3) length
+    reactions: Floats  # (n,3) forces of the supports on the structure; zero at vertices that nothing holds
+    stresses: Floats  # (m,3,3) tensors in the axes of space, force/area, the mean over the thickness
+    cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force; from a .dat alone
 
     @cached_array
     def deflections(self) -> Floats:
@@ -79,14 +70,8 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     (a third of its triangles' pressures, its weight and snow) is added here, so that the reactions are those
     of ``pcmc.certify``.
 
-    Parameters
-    ----------
-    path : the file that ``ccx`` wrote for the model's input file; .dat has the stresses by element.
-    model : the structural model that was written.
-
-    Raises
-    ------
-    FileError : for a file that is missing, damaged, incomplete, or of another model.
+    ``path`` is what ``ccx`` wrote for the input file of the model; .dat has the stresses by element.
+    FileError for a file that is missing, damaged, incomplete, or of another model.
     """
     path = Path(path)
     if not isinstance(model, StructuralModel):
@@ -124,19 +109,17 @@ def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepRe
     else:
         values = stress.means(model.faces + 1)
     stresses[model.faces] = values[:, TENSOR]
-    tensions, first = {}, model.first_cable
-    for cable, area in zip(surface.cables, model.cable_areas, strict=True) if "cables" in blocks else ():
-        mine = blocks["cables"].means(first + np.arange(len(cable.edges)))[:, TENSOR]
-        along = directions(surface.vertices, cable.edges)[0]
+    tensions = {}
+    for cable, area, numbers, along in model.cable_edges() if "cables" in blocks else ():
+        mine = blocks["cables"].means(numbers)[:, TENSOR]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
-        first += len(cable.edges)
     return StepResults(step.name, model, displacements, reactions, stresses, tensions)
 
 
 def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
     """Refuse results with other nodes, elements or steps than the model's."""
     nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
-    edges = sum(len(cable.edges) for cable in model.standing.cables)
+    cables = [number for *_, numbers, _ in model.cable_edges() for number in numbers]
     for number, blocks in enumerate(steps[: len(model.steps)], 1):
         for kind in ("displacements", "stresses", *(("forces",) if len(held) else ())):
             if kind not in blocks:
@@ -149,7 +132,7 @@ def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
         else:
             _same("elements", np.unique(stress.ids), model.faces + 1)
         if "cables" in blocks:
-            _same("cable elements", np.unique(blocks["cables"].ids), model.first_cable + np.arange(edges))
+            _same("cable elements", np.unique(blocks["cables"].ids), np.array(cables))
         if "forces" in blocks:
             _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
             _same("nodes", np.union1d(blocks["forces"].ids, nodes), nodes)

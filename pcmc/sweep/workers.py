@@ -30,7 +30,8 @@ def open_workers(
         with _cluster(team, scheduler) as cluster:
             yield lambda parameters: cluster.submit(run_case, team, case, parameters, time_limit)
         return
-    pool = executor or ThreadPoolExecutor(workers or _processors())
+    mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    pool = executor or ThreadPoolExecutor(workers or mine)  # the processors this process may use
     try:
         yield lambda parameters: pool.submit(run_case, team, case, parameters, time_limit)
     finally:
@@ -71,8 +72,3 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
             if client.status == "running":
                 with suppress(Exception):  # a worker that has gone has taken its processes along
                     client.run(retire, team, on_error="ignore")
-
-
-def _processors() -> int:
-    """The processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -272,7 +272,7 @@ def test_solve_prints_the_check_unless_told_not_to(hall, capsys):
 
 
 def test_large_surfaces_are_checked_on_request_only(hall, capsys, monkeypatch):
-    for room in ("project.outcome", "cli.checking"):
+    for room in ("project.outcome", "cli.reports"):
         monkeypatch.setattr(f"pcmc.{room}.MOST_CHECKED", 10)
     assert cli.main(["solve", "hall.toml"]) == 0
     assert "mesh check left out above 10 triangles" in capsys.readouterr().out

@@ -12,8 +12,8 @@ import generators
 import pcmc
 from pcmc import Patch, Surface, Target, cli, solve, solve_to_accuracy
 from pcmc.accuracy import adaptive, check_mesh
-from pcmc.accuracy.adaptive import AccuracyStatus, goals_in, size_field
-from pcmc.accuracy.estimator import _FineMesh, _held_vertices, _slope, error_shares
+from pcmc.accuracy.adaptive import AccuracyStatus, goals_in
+from pcmc.accuracy.estimator import _FineMesh, _held_vertices, _slope, error_shares, size_field
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.certificate.reactions import reactions
 from pcmc.design.targets import measure
