@@ -44,8 +44,6 @@ def solve(
 
     Arguments, result and errors are those of ``pcmc.solve``, which tries further starts if this one fails.
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

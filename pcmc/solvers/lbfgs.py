@@ -146,8 +146,6 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     more. The result is the surface of least energy seen, measured once more where the last trial was not
     the best. Status STALLED when NLopt's line search finds no step, an error with an empty message there.
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

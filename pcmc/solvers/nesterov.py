@@ -90,8 +90,6 @@ def nesterov(
     and ∇E together, so far), ``energy``, ``gradient_squared``, ``t`` (NaN in row 0) and ``armijo_held``
     (False where the floor was taken although it failed).
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

@@ -74,10 +74,11 @@ class Equilibrium:
         return new
 
     def same_as(self, other: Equilibrium) -> bool:
-        """Whether both are of the same faces and patches, at the same positions."""
+        """Whether both have the same faces, patches, supports, cables, rooms and positions."""
         here, there = self.surface, other.surface
-        alike = np.array_equal(self.X, other.X) and np.array_equal(here.faces, there.faces)
-        return alike and here.patches == there.patches and here.rooms == there.rooms
+        arrays = [(at.X, at.surface.faces, *at.space, *at.surface.cable_edges) for at in (self, other)]
+        values = [(surface.patches, surface.rooms, surface.plane) for surface in (here, there)]
+        return values[0] == values[1] and all(map(np.array_equal, *arrays))
 
     def release(self) -> None:
         """Give back the memory of the factoriser; another is made when it is asked for."""
@@ -271,11 +272,7 @@ class Equilibrium:
 
         Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part that
         rests on Π. Then, with ``soften``, a little more stiffness is added: such motions do not lower the
-        energy.
-
-        Raises
-        ------
-        SingularMatrix : it is singular, also with a little stiffness added.
+        energy. SingularMatrix if that does not help.
         """
         pattern, solver = self.unknowns
         for added in (0.0, SOFT) if soften else (0.0,):
@@ -344,11 +341,7 @@ def negatives_without(factor: Factor, columns: Floats) -> int:
     """Negative eigenvalues on the complement of the columns (N,k).
 
     Haynsworth: the bordered matrix [[A, Q], [Qᵀ, 0]] has the inertia of A restricted to the
-    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q.
-
-    Raises
-    ------
-    SingularMatrix : the inertia of A, or that of QᵀA⁻¹Q, is hidden by rounding.
+    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q. SingularMatrix if rounding hides one of these.
     """
     k = columns.shape[1]
     if not k:

@@ -86,14 +86,8 @@ def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | Non
 
     ``units`` (N,) are positive numbers u: U A U is factorised in place of A, with U = diag(u), so that weak
     parts are not taken for zero beside strong ones. Neither the solution nor the inertia depends on them.
+    OptionError if there is no such backend, MissingExtra if it is not installed.
 
-    Raises
-    ------
-    OptionError : there is no such backend.
-    MissingExtra : it is not installed.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> from scipy.sparse import csr_array
     >>> pattern = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))

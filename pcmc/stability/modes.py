@@ -101,9 +101,7 @@ def _factorised(at: Equilibrium, shift: Floats | float) -> SecondVariation | Non
 def descent_mode(surface: Surface) -> tuple[int, Floats]:
     """The Morse index of a surface at rest and its lowest mode (n,3); empty if there is no way down.
 
-    Raises
-    ------
-    SingularMatrix : the second variation has no inertia that can be counted.
+    SingularMatrix if the second variation has no inertia that can be counted.
     """
     system = Equilibrium.of(surface).factorised()
     if system.negative == 0:

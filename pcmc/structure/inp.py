@@ -38,14 +38,8 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     (elements), ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_B1``, ``SUPPORT_S1`` and so on,
     by the numbers in ``Certificate.supports``.
 
-    Parameters
-    ----------
-    path : the file, with the suffix .inp; it appears whole or not at all.
-    model : the structural model.
-
-    Raises
-    ------
-    FileError : for another suffix, and where the file cannot be written.
+    ``path`` has the suffix .inp; the file appears whole or not at all. FileError for another suffix, and
+    where it cannot be written.
     """
     path = Path(path)
     check_name(path)

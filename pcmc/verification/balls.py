@@ -28,27 +28,23 @@ SAFE = 1.0 + 5e-10
 
 @inlined
 def exact(a: float) -> Ball:
-    """A float as it is."""
     return a, 0.0
 
 
 @inlined
 def plus(a: Ball, b: Ball) -> Ball:
-    """a + b."""
     value = a[0] + b[0]
     return value, a[1] + b[1] + U * abs(value)
 
 
 @inlined
 def minus(a: Ball, b: Ball) -> Ball:
-    """a - b."""
     value = a[0] - b[0]
     return value, a[1] + b[1] + U * abs(value)
 
 
 @inlined
 def times(a: Ball, b: Ball) -> Ball:
-    """a b."""
     value = a[0] * b[0]
     return value, abs(a[0]) * b[1] + a[1] * (abs(b[0]) + b[1]) + U * abs(value) + TINY
 
@@ -79,37 +75,31 @@ def row(X: Floats, i: int) -> Balls:
 
 @inlined
 def of(a: Vector) -> Balls:
-    """A vector of floats."""
     return exact(a[0]), exact(a[1]), exact(a[2])
 
 
 @inlined
 def add(a: Balls, b: Balls) -> Balls:
-    """a + b of vectors."""
     return plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2])
 
 
 @inlined
 def sub(a: Balls, b: Balls) -> Balls:
-    """a - b of vectors."""
     return minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2])
 
 
 @inlined
 def scaled(s: Ball, a: Balls) -> Balls:
-    """s a of a vector."""
     return times(s, a[0]), times(s, a[1]), times(s, a[2])
 
 
 @inlined
 def dot(a: Balls, b: Balls) -> Ball:
-    """⟨a, b⟩."""
     return plus(plus(times(a[0], b[0]), times(a[1], b[1])), times(a[2], b[2]))
 
 
 @inlined
 def cross(a: Balls, b: Balls) -> Balls:
-    """a × b."""
     return (
         minus(times(a[1], b[2]), times(a[2], b[1])),
         minus(times(a[2], b[0]), times(a[0], b[2])),

@@ -121,8 +121,6 @@ def verify(surface: Surface) -> Theorem:
     The proof is one about real numbers, made in floating point with every rounding bounded. It is about the
     mesh, its energy, and motions in the frozen frames B₀; not about the limit of finer meshes.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
