@@ -1,6 +1,6 @@
 """Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium.
 
-The rooms of the package, from the ground up; a room imports only from those above it in this list.
+The subpackages, from the ground up; each imports only from those above it in this list.
 
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
@@ -15,7 +15,8 @@ design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
 margins                    how far a roof is from the edge of its stability
-compas panelling structure COMPAS; families of panels; structural models
+panelling                  families of panels
+compas structure           COMPAS; structural models
 drawings plot report       sheets, pictures, and pages for those who build
 advice                     first tensions for a rise, and what to type where a roof fails
 project                    a whole design in one file
