@@ -1,6 +1,6 @@
 """Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium.
 
-The rooms of the package, from the ground up; a room imports only from those above it in this list.
+The subpackages, from the ground up; each imports only from those above it in this list.
 
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
@@ -15,7 +15,8 @@ design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
 margins                    how far a roof is from the edge of its stability
-compas panelling structure COMPAS; families of panels; structural models
+panelling                  families of panels
+compas structure           COMPAS; structural models
 drawings plot report       sheets, pictures, and pages for those who build
 advice                     first tensions for a rise, and what to type where a roof fails
 project                    a whole design in one file
@@ -111,7 +112,7 @@ _NAMES = {
     "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
     "continuation": ("BoundaryMotion", "Direction", "follow"),
-    "design": ("Design", "Parameter"),
+    "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "forces.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
@@ -129,7 +130,6 @@ _NAMES = {
         "write_structure",
     ),
     "margins": ("Margin", "margin"),
-    "margins.targets": ("Target", "meet", "sensitivities"),
     "panelling": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
     "verification": ("Theorem", "verify"),

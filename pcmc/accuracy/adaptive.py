@@ -154,10 +154,8 @@ def solve_to_accuracy(
 
     Raises
     ------
-    OptionError
-        For an unknown quantity, with the nearest known one, or an accuracy that is not positive.
-    MissingExtra
-        Without the library mmgpy.
+    OptionError : for an unknown quantity, with the nearest known one, or an accuracy that is not positive.
+    MissingExtra : without the library mmgpy.
 
     Examples
     --------

@@ -126,9 +126,8 @@ def check_mesh(
     Parameters
     ----------
     surface : at rest, or the result of a solver that converged.
-    meshes : how many in all, this one included, ≥ 2. With 2 there is no observed order, and order 2 is
-        taken with a wide bar; more than 3 make the limit sharper. The finest has 4^(meshes - 1) times as
-        many triangles.
+    meshes : how many in all, ≥ 2; the finest has 4^(meshes - 1) times as many triangles. With 2 there is no
+        observed order, and order 2 is taken with a wide bar; more than 3 make the limit sharper.
     boundary : where new vertices of a held boundary or held line go: ``"smooth"``, on smooth curves
         through the old ones, which turn by up to 40° at a vertex (straight lines stay straight);
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
@@ -140,11 +139,8 @@ def check_mesh(
 
     Raises
     ------
-    OptionError
-        For ``meshes`` below 2, another ``boundary``, ``corners`` that are no vertices, or more than
-        ``most_triangles``.
-    SurfaceError
-        If the surface is not at rest.
+    OptionError : for a value that is not allowed, or more than ``most_triangles``.
+    SurfaceError : if the surface is not at rest.
 
     Examples
     --------

@@ -264,10 +264,10 @@ def _step(plan: Plan, result: Result) -> Plan:
 
 def _stiffer(plan: Plan, result: Result) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
-    from ..plan.proposal import ROOM, least_tension, plan_area  # needs shapely
+    from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area  # needs shapely
 
     pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
-    least = ROOM * least_tension(plan_area(plan), max(pressures))
+    least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
     folds = [1.0 / attempt.value for attempt in result.certificate.tried if attempt.folds and attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 

@@ -59,14 +59,10 @@ CHANGED = {"cable": "force"}  # kinds of parameters with the name of what they b
 
 
 def dimension_of(name: str) -> str:
-    """The unit of a quantity or of a kind of parameter, as a name of ``Units``.
+    """The unit of a quantity or of a kind of parameter, as a name of ``Units``; OptionError for another.
 
     >>> dimension_of("apex"), dimension_of("reaction per length"), dimension_of("cable")
     ('length', 'tension', 'force')
-
-    Raises
-    ------
-    OptionError : for another name.
     """
     if name in CHANGED:
         return CHANGED[name]

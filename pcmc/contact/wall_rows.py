@@ -6,6 +6,7 @@ And walls whose bottom is held on Π: which can pinch, and the vertices that the
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -38,9 +39,7 @@ class WallRows:
     top_ends: Ints  # (w,2) the ends i, j of the top edge above each
     fraction: Floats  # (w,) λ, how far P is from i to j
     relative_height: Floats  # (w,) ρ, 0 at the bottom and 1 at the top
-    offset: (
-        Floats  # (w,3) o, how far a leaning or bulging wall is off the line below P, over the height there
-    )
+    offset: Floats  # (w,3) o, how far a leaning or bulging wall is off the line below P, over its height
     feet: Ints  # (w,2) the held bottom vertices below i and j; -1 where the bottom slides
 
     def top_places(self, X: Floats) -> Floats:
@@ -155,9 +154,8 @@ def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom
 def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
     """(g,n) the least number of edges (k,2) from each goal to each vertex, or (n,) from the nearest goal."""
     graph = coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
-    if nearest:
-        return np.asarray(dijkstra(graph, directed=False, indices=goals, unweighted=True, min_only=True))
-    return np.asarray(dijkstra(graph, directed=False, indices=goals, unweighted=True))
+    options: dict[str, Any] = {"directed": False, "unweighted": True, "min_only": nearest}
+    return np.asarray(dijkstra(graph, indices=goals, **options))
 
 
 def held_walls(

@@ -16,10 +16,10 @@ from ..design import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
 from .boundary_motion import BoundaryMotion
+from .branch_point import ALONG, leaving
 from .direction import Direction, ParameterLine
 from .options import Ending, FollowOptions
 from .state import QUANTITIES, BranchMesh
-from .switching import ALONG, leaving
 from .tracing import Tracer
 
 
@@ -29,16 +29,14 @@ class Branch:
 
     Attributes
     ----------
-    points : one row per point: arclength s (a number), parameter λ, the tensions and pressures that
-        vary (``tension NAME``, ``pressure NAME``), energy (force·length), volume (length³, that
-        of certificates), height over Π (length), index, lowest_eigenvalue (force/length³), residual
-        (relative), quality of the worst triangle, slope dλ/ds, iterations of Newton's method.
+    points : one row per point: arclength s (a number), parameter λ, the values that vary (``tension NAME``,
+        ``pressure NAME``), energy (force·length), volume (length³, that of certificates), height over Π
+        (length), index, lowest_eigenvalue (force/length³), residual (relative), quality of the worst
+        triangle, slope dλ/ds, iterations of Newton's method.
     events : one row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
-        arclength, the index before and after it, and, of a change of index, along_branch: the cosine
-        between the mode that turns and the branch. It is 1 at a fold; 0 where the branch goes on as it was
-        and others leave it.
-    surfaces : by row of ``points``.
-    event_surfaces : by row of ``events``.
+        arclength, the index before and after it, and, of a change of index, along_branch: the cosine between
+        the mode that turns and the branch: 1 at a fold; 0 where the branch goes on and others leave it.
+    surfaces, event_surfaces : by row of ``points``, and of ``events``.
     ending, detail : why the branch ends, and the last difficulty.
     """
 
@@ -94,9 +92,8 @@ class Branch:
         -------
         (Branch, Branch)
             Along the mode and against it; in the first the surface rises over Π, if the mode lifts it at
-            all. Of a symmetric bifurcation (a pitchfork) they are images of each other, and λ turns at
-            their start; of others λ passes it. The first row of ``points`` is the first point off the
-            bifurcation.
+            all. Of a symmetric bifurcation (a pitchfork) they are images of each other, and λ turns at their
+            start; of others λ passes it. ``points`` begins off the bifurcation.
 
         Raises
         ------
@@ -127,22 +124,17 @@ class Branch:
         >>> tops[0] == tops[1][::-1], tops[0][0] != tops[0][1]
         (True, True)
         """
-        row = self._bifurcation(event)
-        goals = _goals(stop, until)
+        row, goals = self._bifurcation(event), _goals(stop, until)
         chosen = validate.build(FollowOptions, "switch", vars(self._options) | options)
-        line = replace(self._require_line(), value=float(self.events.parameter[row]))
-        surface = self.event_surfaces[row]
-        starts = leaving(BranchMesh(surface, line, chosen.backend), line.value, chosen, row)
-        one, other = (
-            _traced(self.parameter, Tracer(surface, line, goals, chosen, callback, start)) for start in starts
-        )
-        return one, other
-
-    def _require_line(self) -> ParameterLine:
         if self._line is None:
             message = "switch: this branch was put together from tables; only one that follow gave can switch"
             raise OptionError(message, what="branch")
-        return self._line
+        line, surface = replace(self._line, value=float(self.events.parameter[row])), self.event_surfaces[row]
+        one, other = (
+            _traced(self.parameter, Tracer(surface, line, goals, chosen, callback, start))
+            for start in leaving(BranchMesh(surface, line, chosen.backend), line.value, chosen, row)
+        )
+        return one, other
 
     def _bifurcation(self, event: int | None) -> int:
         """The row of the event, which must be a bifurcation along one mode."""
@@ -253,7 +245,14 @@ def follow(
     chosen = validate.build(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
-    direction, goals = _direction(parameter), _goals(stop, until)
+    goals = _goals(stop, until)
+    direction: object = Direction({parameter: 1.0}) if isinstance(parameter, str) else parameter
+    if isinstance(parameter, Parameter):
+        by_kind: dict[str, Any] = {parameter.key: dict.fromkeys(parameter.names, 1.0)}
+        direction = Direction(**by_kind)
+    if not isinstance(direction, Direction | BoundaryMotion):
+        expected = "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
+        validate.refuse("parameter", parameter, expected)
     if chosen.remesh is not None and isinstance(direction, BoundaryMotion):
         message = "remesh: a new mesh has other boundary vertices than BoundaryMotion moves; leave remesh out"
         raise OptionError(message, what="remesh", found=chosen.remesh)
@@ -261,19 +260,6 @@ def follow(
     if stop is not None and stop != line.value:
         chosen = replace(chosen, step=math.copysign(chosen.step, stop - line.value))
     return _traced(direction, Tracer(surface, line, goals, chosen, callback))
-
-
-def _direction(parameter: object) -> Direction | BoundaryMotion:
-    if isinstance(parameter, Direction | BoundaryMotion):
-        return parameter
-    if isinstance(parameter, str):
-        return Direction({parameter: 1.0})
-    if isinstance(parameter, Parameter):
-        by_kind: dict[str, Any] = {f"{parameter.kind}s": dict.fromkeys(parameter.names, 1.0)}
-        return Direction(**by_kind)
-    validate.refuse(
-        "parameter", parameter, "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
-    )
 
 
 def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, float]:

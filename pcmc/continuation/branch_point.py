@@ -1,4 +1,13 @@
-"""A point of a branch with its tangent, its index and its lowest eigenvalues."""
+"""A point of a branch with its tangent, its index and its lowest eigenvalues; and where other branches leave.
+
+At a bifurcation an eigenvalue of J passes 0 with a mode φ, and the branch does not turn. There equilibria
+that leave along ±φ are searched for on the planes across φ,
+
+    r(X, λ) = 0,    ⟨φ, X - X*⟩ = ±ε,
+
+with λ free: they have the distance ε along φ, so Newton's method cannot fall back on the known branch,
+which passes through X* across φ or at an angle (Keller 1977; Seydel 2010, ch. 5).
+"""
 
 from __future__ import annotations
 
@@ -10,31 +19,33 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
-from ..stability.equilibrium import SecondVariation
+from ..base.errors import OptionError
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
-from .correction import BorderedMatrix, NotOnBranch
+from .correction import BorderedMatrix, NotOnBranch, correct, fixed_arclength
+from .options import FollowOptions
 from .state import BranchMesh, State
 
 TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
+NULL = 0.05  # of the next eigenvalue: how far from 0 that of the mode may be
+DRIFT = 1e-6  # of the size: mean displacement of a mode of size 1 below which it has no direction
+ALONG = 0.5  # cosine between mode and branch from which the branch itself turns: a fold
 
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """dX/ds and dλ/ds along a branch, in the metric  ds² = Σ weights |dX|² + (dλ/scale)².
+    """dX/ds and dλ/ds along a branch, in the metric  ds² = Σ weights |dX|² + (dλ/scale)²."""
 
-    Attributes
-    ----------
-    direction, slope : dX/ds (n,3), and dλ/ds.
-    weights : (n,) 1/length²; with them the first part of ds² is the mean square displacement over the
-        surface in units of its size.
-    scale : size of λ.
-    """
+    direction: Floats  # (n,3) dX/ds
+    slope: float  # dλ/ds
+    weights: Floats  # (n,) 1/length²: the first part of ds² is the mean square displacement over size²
+    scale: float  # size of λ
 
-    direction: Floats
-    slope: float
-    weights: Floats
-    scale: float
+    @classmethod
+    def along(cls, d: Floats, change: float, weights: Floats, scale: float) -> tuple[Tangent, float]:
+        """That of a displacement d (n,3) and a change of λ together; and their length in the metric."""
+        length = cls(d, change, weights, scale).length(d, change)
+        return cls(d / length, change / length, weights, scale), length
 
     @property
     def row(self) -> Floats:
@@ -51,26 +62,21 @@ class Tangent:
         square = self.weights @ np.einsum("ij,ij->i", d, d)
         return float(np.sqrt(square + (change / self.scale) ** 2))
 
-    def on(self, old: State, mesh: BranchMesh) -> Tangent:
+    def on(self, old: State, new: State) -> Tangent:
         """The tangent on another mesh: each vertex takes it from the nearest one of the old mesh."""
-        new = State(mesh, mesh.surface.vertices, old.parameter)
         nearest = cKDTree(old.X).query(new.X)[1]
         return Tangent(self.direction[nearest], self.slope, new.area_weights, self.scale)
 
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
-    """A point of the branch; ``index`` is the number of its negative eigenvalues.
-
-    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³; ``room_rates`` (r,)
-    the derivatives of the rooms' pressures by arclength.
-    """
+    """A point of the branch."""
 
     state: State
     tangent: Tangent
-    eigenvalues: Floats
-    index: int
-    room_rates: Floats
+    eigenvalues: Floats  # all negative ones and at least one more, ascending, force/length³
+    index: int  # the number of negative ones
+    room_rates: Floats  # (r,) the derivatives of the rooms' pressures by arclength
 
 
 def branch_point(at: State, before: Tangent | float) -> BranchPoint:
@@ -83,14 +89,14 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
         matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
     else:
         matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
-    s, slope = matrix.solve(np.zeros(len(at.left)), sense, TANGENT_ACCURACY)
-    size = at.space.size
-    direction, weights = at.motion(s[:size], slope), at.area_weights
-    length = Tangent(direction, slope, weights, scale).length(direction, slope)
-    tangent = Tangent(direction / length, slope / length, weights, scale)
-    rates = at.volume_units * s[size:] / length
+    s, slope = matrix.solve(np.zeros(len(at.defects)), sense, TANGENT_ACCURACY)
+    size = at.rest.space.size
+    tangent, length = Tangent.along(at.motion(s[:size], slope), slope, at.area_weights, scale)
+    rates = at.rest.volume_units * s[size:] / length
     with _counted():
-        return BranchPoint(at, tangent, _eigenvalues(matrix.second), matrix.second.negative, rates)
+        values = lowest(matrix.second, matrix.second.negative + 2)[0]
+        values = values if len(values) else np.array([np.inf])  # nothing moves at these volumes
+        return BranchPoint(at, tangent, values, matrix.second.negative, rates)
 
 
 @contextmanager
@@ -105,10 +111,10 @@ def _counted() -> Iterator[None]:
 def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, nearest first, and their motions (k,n,3)."""
     with _counted():
-        second = at.mesh.second_variation(at.surface, at.X)
+        second = at.rest.factorised(soften=False)
         every, fields = lowest(second, second.negative + count + 1)
     nearest = np.argsort(np.abs(every))[:count]
-    return every[nearest], np.array([at.motion(at.space.to_coordinates(fields[i])) for i in nearest])
+    return every[nearest], np.array([at.motion(at.rest.space.to_coordinates(fields[i])) for i in nearest])
 
 
 def along_branch(at: BranchPoint, count: int) -> float:
@@ -119,7 +125,45 @@ def along_branch(at: BranchPoint, count: int) -> float:
     return float(np.linalg.norm(np.einsum("vi,kvi->k", tangent.row, modes) / np.sqrt(squares)))
 
 
-def _eigenvalues(second: SecondVariation) -> Floats:
-    """All negative eigenvalues and at least one more, ascending."""
-    values = lowest(second, second.negative + 2)[0]
-    return values if len(values) else np.array([np.inf])  # nothing moves at these volumes
+def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int) -> list[BranchPoint]:
+    """The first point of the branch along φ and of that along -φ, from the bifurcation on a mesh.
+
+    φ has the sign with which the surface rises over Π in the mean; where it does not, the one with which
+    it moves along Π's first axis, or its second.
+
+    Raises
+    ------
+    OptionError
+        If no mode has the eigenvalue 0 there, or no other branch is found; ``where`` is ``row``.
+    """
+    at = State(mesh, mesh.surface.vertices, parameter)
+    try:
+        values, modes = soft_modes(at, 2)
+    except NotOnBranch as reason:
+        raise OptionError(f"event {row}: {reason}", what="event", where=row) from None
+    if len(values) > 1 and not abs(values[0]) <= NULL * abs(values[1]):
+        message = (
+            f"no mode turns at event {row}: the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"
+        )
+        raise OptionError(message, what="event", where=row, found=float(values[0]), expected=0.0)
+    weights, scale = at.area_weights, mesh.line.scale
+    mode = modes[0] / np.sqrt(np.einsum("v,vi,vi->", weights, modes[0], modes[0]))
+    drift = mesh.surface.plane.axes[[2, 0, 1]] @ (weights @ mode)  # over Π, then along it
+    clear = np.abs(drift) > DRIFT * weights.sum()
+    mode *= np.sign(drift[clear.argmax()]) if clear.any() else 1.0
+    return [_off(at, Tangent(sign * mode, 0.0, weights, scale), options, row) for sign in (1.0, -1.0)]
+
+
+def _off(at: State, mode: Tangent, options: FollowOptions, row: int) -> BranchPoint:
+    """The point of the branch at the distance of a step along the mode, or nearer."""
+    length, difficulty = min(abs(options.step), options.largest), ""
+    while length >= options.smallest:
+        ahead = at.step(length * mode.direction, at.parameter)
+        try:
+            there = correct(ahead, fixed_arclength(ahead, mode.row, 0.0), options.tolerance)
+            d, change = there.X - at.X, there.parameter - at.parameter
+            return branch_point(there, Tangent.along(d, change, mode.weights, mode.scale)[0])
+        except NotOnBranch as reason:
+            length, difficulty = 0.5 * length, str(reason)
+    message = f"no branch was found along the mode that turns at event {row} ({difficulty})"
+    raise OptionError(message, what="event", where=row, found=row)

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from ..stability.factorisation import BorderedFactor, Factor, SingularMatrix
+from ..stability.factorisation import SingularMatrix
 from .state import BranchMesh, State
 
 ITERATIONS = 12  # most Newton steps of a correction
@@ -107,32 +107,28 @@ class BorderedMatrix:
         self.at, self.row = at, row
         self.rate = rate if at.carried is None else rate + float((row * at.carried).sum())
         try:
-            self.second = at.mesh.second_variation(at.surface, at.X)
+            self.second = at.rest.factorised(soften=False)
         except SingularMatrix as error:
             raise NotOnBranch(f"the Hessian has no factorisation ({error})") from None
-        self.inverse: Factor | BorderedFactor = self.second.factor
-        if at.mesh.surface.rooms:
-            self.inverse = BorderedFactor(self.second.factor, at.room_columns)
-        f = at.parameter_derivative
-        size = float(np.linalg.norm(f)) or 1.0
+        size = float(np.linalg.norm(at.parameter_derivative)) or 1.0
         self.unit = size / float(np.linalg.norm(row) + abs(rate))
 
     def solve(self, right: Floats, last: float, accuracy: float) -> tuple[Floats, float]:
         """(s, δλ) with  J s + f δλ = right (N+r,),  ⟨row, motion⟩ + rate δλ = last."""
-        size = len(right) + 1
-        behind = self.inverse.solve(self.at.parameter_derivative)
-        c = np.append(self.at.space.to_coordinates(self.row), np.zeros(len(right) - self.at.space.size))
+        size, inverse, space = len(right) + 1, self.second.bordered, self.at.rest.space
+        behind = inverse.solve(self.at.parameter_derivative)
+        c = np.append(space.to_coordinates(self.row), np.zeros(len(right) - space.size))
         pivot = self.rate - float(c @ behind)
         if not np.isfinite(pivot) or pivot == 0.0:
             raise NotOnBranch("the bordered matrix is singular: branches meet here")
 
         def eliminate(z: Floats) -> Floats:
-            s = self.inverse.solve(z[:-1])
+            s = inverse.solve(z[:-1])
             change = (z[-1] / self.unit - float(c @ s)) / pivot
             return np.append(s - behind * change, change)
 
         z, _ = gmres(
-            LinearOperator((size, size), self.times, dtype=float),
+            LinearOperator((size, size), self._times, dtype=float),
             np.append(right, last * self.unit),
             M=LinearOperator((size, size), eliminate, dtype=float),
             rtol=accuracy,
@@ -141,48 +137,45 @@ class BorderedMatrix:
         )
         return z[:-1], float(z[-1])
 
-    def times(self, z: Floats) -> Floats:
-        """The matrix times a vector (N+1,)."""
-        at, size = self.at, self.at.space.size
+    def _times(self, z: Floats) -> Floats:
+        """The matrix times a vector (N+r+1,)."""
+        at, size = self.at, self.at.rest.space.size
         d = at.moved(at.motion(z[:size])) - at.aligned
         along = float((self.row * d).sum())
-        change = at.jacobian.times(d)
+        change = at.rest.jacobian.times(d)
         if at.mesh.surface.rooms:
-            growth = np.einsum("rnd,nd->r", at.room_gradients, d)
-            change = np.append(change - at.room_columns @ z[size:-1], growth)
+            pressed = at.rest.volume_columns @ (at.rest.volume_units * z[size:-1])
+            change = np.append(change - pressed, np.einsum("rnd,nd->r", at.room_gradients, d))
         return np.append(change + at.parameter_derivative * z[-1], self.unit * (along + self.rate * z[-1]))
 
 
 def correct(start: State, constraint: Constraint, tolerance: float) -> State:
     """The point of the branch near a state that meets the constraint too; NotOnBranch where there is none."""
-    mesh, at = start.mesh, start.at_value(constraint.parameter)
+    mesh, at, asked = start.mesh, start, constraint.parameter
+    if asked is not None and asked != start.parameter:
+        at = start.step(np.zeros_like(start.X), asked, start.iterations)
     last, slow = np.inf, 0
-    _check_tensions(at)
-    for iteration in range(ITERATIONS + 1):
+    for iteration in range(1, ITERATIONS + 2):
+        if not mesh.line.allows(at.parameter):
+            raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
+        if iteration > 1 and at.quality < LEAST_QUALITY:
+            raise MeshCollapsed("triangles collapse")
+        if iteration > 1 and mesh.reaches_plane(at.X).any():
+            raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method
         g = constraint.value(at)
         if at.residual <= tolerance and abs(g) <= CONSTRAINT_TOLERANCE:
             return at
-        size = at.residual + abs(g)
-        slow = 0 if size < SLOW * last else slow + 1
+        error = at.residual + abs(g)
+        slow = 0 if error < SLOW * last else slow + 1
         if slow >= 3 or not np.isfinite(at.residual + g):
             break
-        last = size
+        last = error
         matrix = BorderedMatrix(at, constraint.gradient(at), constraint.rate)
-        s, change = matrix.solve(-at.left, -g, 1e-3)
-        size = at.space.size
+        s, change = matrix.solve(-at.defects, -g, 1e-3)
+        size = at.rest.space.size
         step = at.motion(s[:size], change)
         if not np.abs(step).max() < mesh.full.size:
             break
-        value = at.parameter + change if constraint.parameter is None else constraint.parameter
-        at = at.step(step, value, iteration + 1, at.with_rooms(s[size:]))
-        _check_tensions(at)
-        if at.quality < LEAST_QUALITY:
-            raise MeshCollapsed("triangles collapse")
-        if mesh.reaches_plane(at.X).any():
-            raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method
+        value = at.parameter + change if asked is None else asked
+        at = at.step(step, value, iteration, at.with_rooms(s[size:]))
     raise NotOnBranch(f"Newton's method does not converge (residual {at.residual:.1e})")
-
-
-def _check_tensions(at: State) -> None:
-    if not at.mesh.line.allows(at.parameter):
-        raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -53,10 +53,6 @@ class Segment:
             return self.end
         return branch_point(self.solve(t), self.start.tangent)
 
-    def up_to(self, t: float, end: BranchPoint) -> Segment:
-        """The part of the segment from its start to t, where ``end`` is."""
-        return replace(self, end=end, length=t)
-
     def value(self, name: str, t: float) -> float:
         """A quantity at t."""
         ends = {0.0: self.start.state, self.length: self.end.state}
@@ -72,7 +68,7 @@ class Segment:
             return float(tangent.direction[state.highest_vertex] @ normal)
         if name == "volume":
             return float((state.volume_gradient * tangent.direction).sum())
-        by_position = float((state.gradient * tangent.direction).sum())
+        by_position = float((state.rest.gradient * tangent.direction).sum())
         by_parameter = state.mesh.line.energy_derivative(state.surface, state.X, state.parameter)
         cones = state.surface.room_signs @ patch_volumes(state.surface.moved(state.X))
         return by_position + by_parameter * tangent.slope - float(cones @ at.room_rates)

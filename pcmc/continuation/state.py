@@ -9,20 +9,12 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
-from ..contact.pull import excess_pull
-from ..forces.functional import energy_and_gradient, energy_at
-from ..forces.jacobian import Linearisation, linearise
-from ..forces.motion_space import MotionSpace, force_scale, motion_space
-from ..forces.rooms import (
-    prescribed_volumes,
-    volume_gradients_at,
-    volumes_at,
-    with_room_pressures,
-)
+from ..forces.motion_space import MotionSpace
+from ..forces.rooms import with_room_pressures
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
-from ..stability.equilibrium import Equilibrium, SecondVariation
+from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.supports import apply_supports, onto_circles
@@ -36,43 +28,38 @@ QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a go
 class BranchMesh:
     """What the points of a branch share as long as neither the mesh nor the contact with Π changes.
 
-    Attributes
-    ----------
-    full, line : the surface with all its walls; its tensions, pressures and boundary as functions of λ.
-    part : the standing part of the surface, without the walls that vanish where a junction rests on Π.
-    surface, classes, quality_faces : those of ``part``.
-    walls, resting : the walls that can pinch, and (n,) which junction vertices rest on Π.
-    roof : (patches,) 1 for the patches whose volumes over Π are that of the roof, 0 for walls.
+    ``full`` is the surface with all its walls, ``line`` its values and boundary as functions of λ, ``part``
+    what stands of it, without the walls that vanish where a junction rests on Π; ``surface`` is that of it.
     """
 
     def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
-        self.classes, self.quality_faces = part.classes, part.quality_faces
-        self.roof: Floats = surface.roof.astype(float)
-        self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
+        self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
+        self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
-        self._last = Equilibrium(part, self.surface.vertices, backend)
+        least = LEAST_VOLUME * surface.size**3
+        self._last = Equilibrium(part, self.surface.vertices, backend, least)
 
-    def second_variation(self, surface: Surface, X: Floats) -> SecondVariation:
-        """Bᵀ(∂²E)B, factorised; valid until the next call."""
+    def equilibrium(self, surface: Surface, X: Floats) -> Equilibrium:
+        """That of a surface of this mesh with its vertices at X; factors are valid until the next one's."""
         self._last = self._last.at(X, surface)
-        return self._last.factorised(soften=False)
+        return self._last
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
         if self._extension is None and self._curves_move:
-            self._extension = HarmonicExtension(self.surface, self.classes, X, self._backend)
+            self._extension = HarmonicExtension(self.surface, self.part.classes, X, self._backend)
         d = space.to_vectors(s)
         return d if self._extension is None else self._extension.extend(space, d)
 
     def carried(self, change: Floats, X: Floats) -> Floats:
         """The motion w (n,3) in which the inside follows a change (k,3) of the boundary."""
-        surface = self.surface
+        surface, classes = self.surface, self.part.classes
         if self._inside is None:
-            self._inside = HarmonicExtension(surface, self.classes, X, self._backend, surface.pinned)
+            self._inside = HarmonicExtension(surface, classes, X, self._backend, surface.pinned)
         motion = np.zeros_like(X)
         motion[surface.pinned] = change
         w = apply_supports(surface, self._inside.harmonic(motion), X)
@@ -109,73 +96,45 @@ class State:
     iterations: int = 0
     room_changes: tuple[float, ...] = ()
 
-    @cached_property
-    def surface(self) -> Surface:
-        """The mesh's surface with the tensions and pressures at λ; its positions are not X."""
-        return self.at_parameter(self.mesh.surface)
-
-    def at_parameter(self, surface: Surface) -> Surface:
+    def with_values(self, surface: Surface) -> Surface:
         """A surface of this mesh with the tensions and pressures that it has here."""
         surface = self.mesh.line.surface_at(surface, self.parameter)
         return with_room_pressures(surface, np.array(self.room_changes)) if self.room_changes else surface
 
     @cached_property
-    def space(self) -> MotionSpace:
-        """The motion space at X, whose basis is B."""
-        return motion_space(self.mesh.surface, self.mesh.classes, self.X)
+    def rest(self) -> Equilibrium:
+        """The equations and their derivatives by the positions."""
+        return self.mesh.equilibrium(self.with_values(self.mesh.surface), self.X)
+
+    @property
+    def surface(self) -> Surface:
+        """The mesh's surface with the tensions and pressures at λ; its positions are not X."""
+        return self.rest.surface
+
+    @property
+    def residual(self) -> float:
+        """‖r‖, with the defects of volumes, over the norm of the single triangles' forces."""
+        return self.rest.residual
 
     @cached_property
-    def gradient(self) -> Floats:
-        """∇E (n,3), supports applied, force."""
-        return energy_and_gradient(self.surface, self.X)[1]
-
-    @cached_property
-    def forces(self) -> Floats:
-        """r = Bᵀ∇E (N,), force."""
-        return self.space.to_coordinates(self.gradient)
-
-    @cached_property
-    def scale(self) -> float:
-        """The norm of the single triangles' forces."""
-        return force_scale(self.surface, self.mesh.classes, self.X)
-
-    @cached_property
-    def volume_units(self) -> Floats:
-        """(r,) what brings the defect of a room's volume to the size of forces, force/length³."""
-        wanted = np.abs(prescribed_volumes(self.surface))
-        return self.scale / np.maximum(wanted, LEAST_VOLUME * self.mesh.full.size**3)
-
-    @cached_property
-    def left(self) -> Floats:
+    def defects(self) -> Floats:
         """(N+r,) r, and the defects V - V̄ of the rooms' volumes in units of force."""
-        if not self.mesh.surface.rooms:
-            return self.forces
-        defects = volumes_at(self.surface, self.X) - prescribed_volumes(self.surface)
-        return np.append(self.forces, self.volume_units * defects)
+        rest = self.rest
+        return np.append(rest.forces, rest.volume_units * rest.volume_defects)
 
     @cached_property
     def room_gradients(self) -> Floats:
         """(r,n,3) the gradients of the rooms' volumes, in units of force."""
-        return self.volume_units[:, None, None] * volume_gradients_at(self.surface, self.X)
-
-    @cached_property
-    def room_columns(self) -> Floats:
-        """(N,r) the same in the motion space."""
-        columns = [self.space.to_coordinates(gradient) for gradient in self.room_gradients]
-        return np.stack(columns, axis=1) if columns else np.zeros((self.space.size, 0))
-
-    @cached_property
-    def residual(self) -> float:
-        """‖r‖, with the defects of volumes, over the norm of the single triangles' forces."""
-        return float(np.linalg.norm(self.left)) / self.scale
+        return self.rest.volume_units[:, None, None] * self.rest.volume_gradients
 
     @cached_property
     def parameter_derivative(self) -> Floats:
         """(N+r,) dr/dλ = Bᵀ ∂∇E/∂λ, and Bᵀ Df[v] where λ moves the boundary; -dV̄/dλ in units of force."""
-        change = self.space.to_coordinates(self.mesh.line.gradient(self.surface, self.X))
-        if self.mesh.surface.rooms:
-            return np.append(change, -self.volume_units * self.mesh.line.volume_rates)
-        return change if self.carried is None else change + self.jacobian.times(self.carried)
+        rest, line = self.rest, self.mesh.line
+        change = rest.space.to_coordinates(line.gradient(self.surface, self.X))
+        if self.carried is not None:
+            change = change + rest.jacobian.times(self.carried)
+        return np.append(change, -rest.volume_units * line.volume_rates)
 
     @cached_property
     def carried(self) -> Floats | None:
@@ -183,15 +142,10 @@ class State:
         velocity = self.mesh.line.velocity(self.parameter)
         return None if velocity is None else self.mesh.carried(velocity, self.X)
 
-    @cached_property
-    def jacobian(self) -> Linearisation:
-        """∂r along motions of the vertices."""
-        return linearise(self.surface, self.mesh.classes, self.space, self.X, self.gradient)
-
-    @cached_property
+    @property
     def energy(self) -> float:
         """E, force·length."""
-        return energy_at(self.surface, self.X)
+        return self.rest.energy
 
     @cached_property
     def volume(self) -> float:
@@ -208,69 +162,55 @@ class State:
     @cached_property
     def highest_vertex(self) -> int:
         """Index of the vertex farthest above Π."""
-        return int(self.surface.plane.height(self.X).argmax())
+        return int(self.mesh.surface.plane.height(self.X).argmax())
 
-    @cached_property
+    @property
     def height(self) -> float:
         """Height of the highest vertex over Π, length."""
-        return float(self.surface.plane.height(self.X)[self.highest_vertex])
+        return float(self.mesh.surface.plane.height(self.X)[self.highest_vertex])
 
     @cached_property
     def quality(self) -> float:
         """Quality of the worst triangle outside walls that can pinch."""
-        return worst_quality(self.X, self.mesh.quality_faces)
+        return worst_quality(self.X, self.mesh.part.quality_faces)
 
     @cached_property
     def area_weights(self) -> Floats:
         """(n,) the area around each vertex over all area, over size², 1/length²."""
-        area = vertex_area_vectors(self.X, self.mesh.classes.faces)[1]
+        area = vertex_area_vectors(self.X, self.mesh.part.classes.faces)[1]
         return area / (area.sum() * self.mesh.full.size**2)
-
-    @property
-    def overpulled(self) -> bool:
-        """Whether a resting junction is pulled off Π harder than its wall can hold."""
-        walls, resting = self.mesh.walls, self.mesh.resting
-        return bool(resting.any() and excess_pull(self.surface.moved(self.X), walls, resting).any())
 
     @cached_property
     def aligned(self) -> Floats:
-        """X (n,3) with the rows of walls below their crest; motions count from here."""
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X, self.space)
+        """X (n,3) with the rows of walls below their junction; motions count from here."""
+        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X, self.rest.space)
 
     def motion(self, s: Floats, change: float = 0.0) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves.
 
         With a change of λ, and so of the boundary, what follows that is added to first order.
         """
-        d = self.mesh.motion(self.space, self.X, s)
+        d = self.mesh.motion(self.rest.space, self.X, s)
         return d if self.carried is None or not change else d + change * self.carried
 
     def with_rooms(self, change: Floats) -> tuple[float, ...]:
         """The rooms' pressures after a change (r,) of them, given in units of the borders."""
-        before = np.array(self.room_changes) if self.room_changes else np.zeros(len(change))
-        return tuple((before + self.volume_units * change).tolist()) if len(change) else ()
+        before = self.room_changes or np.zeros(len(change))
+        return tuple((before + self.rest.volume_units * change).tolist())
 
     def step(
         self, d: Floats, parameter: float, iterations: int = 0, rooms: tuple[float, ...] | None = None
     ) -> State:
         """The state at X + d (n,3) and λ, its boundary where λ has it, with these ``room_changes``."""
-        rooms = self.room_changes if rooms is None else rooms
         X = self.moved(d)
         boundary = self.mesh.line.boundary(parameter)
         if boundary is not None:
             fixed = self.mesh.surface.pinned
-            left = self.mesh.carried(boundary - X[fixed], self.X)
-            X = self.moved(d + left)
+            X = self.moved(d + self.mesh.carried(boundary - X[fixed], self.X))
             X[fixed] = boundary
-        return State(self.mesh, X, parameter, iterations, rooms)
-
-    def at_value(self, parameter: float | None) -> State:
-        """This state at another λ, its inside where it was; itself where that is None or its own."""
-        if parameter is None or parameter == self.parameter:
-            return self
-        return self.step(np.zeros_like(self.X), parameter, self.iterations)
+        return State(self.mesh, X, parameter, iterations, self.room_changes if rooms is None else rooms)
 
     def moved(self, d: Floats) -> Floats:
-        """X + d (n,3), with the rows of walls below their crest."""
+        """X + d (n,3), with the rows of walls below their junction."""
         X = onto_circles(self.mesh.surface, self.X + d)
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, X, self.space)
+        return place_wall_rows(self.mesh.surface, self.mesh.walls, X, self.rest.space)

@@ -14,7 +14,6 @@ from typing import Any
 
 from ..base.errors import NoBranch, SurfaceError
 from ..base.interrupts import stop_requested
-from ..forces.rigid_motions import rigid_modes, rigid_motions
 from ..forces.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
@@ -86,7 +85,7 @@ class Tracer:
     def first_point(self, mesh: BranchMesh) -> BranchPoint:
         """The surface given, corrected to the tolerance."""
         start = State(mesh, mesh.surface.vertices, self.line.value)
-        free = rigid_modes(start.space, rigid_motions(mesh.surface), start.X).shape[1]
+        free = start.rest.rigid.shape[1]
         if free:
             message = f"follow: nothing holds the surface against {free} rigid motions"
             hint = "it would drift instead of following the parameter; hold it with fixed= or on_plane="
@@ -97,7 +96,7 @@ class Tracer:
         try:
             if not start.residual <= START_RESIDUAL:
                 raise NotOnBranch(f"relative residual {start.residual:.1e}")
-            if start.overpulled:
+            if start.rest.excess_pull.any():
                 raise NotOnBranch("a junction is pulled off the plane harder than its wall can hold")
             given = fixed_parameter(start.parameter, self.line.scale)
             corrected = correct(start, given, self.options.tolerance)
@@ -151,14 +150,14 @@ class Tracer:
         here = self.here.state
         try:
             there = self.solve_at(length)
-            if there.overpulled:
+            if there.rest.excess_pull.any():
                 raise ContactChanged(there)
         except ContactChanged as change:
             there = self.solve_contact(change.near)
         bend = self.bend(there, length)
         if there.iterations > MANY_ITERATIONS and there.mesh is here.mesh:
             raise NotOnBranch("the correction hardly converges")
-        if turns_over(here.X, there.X, here.mesh.quality_faces):
+        if turns_over(here.X, there.X, here.mesh.part.quality_faces):
             raise MeshCollapsed("triangles turn over")
         if there.quality < QUALITY_LOSS * min(here.quality, self.options.min_quality):
             raise MeshCollapsed("triangles collapse")
@@ -168,16 +167,13 @@ class Tracer:
         if goal is not None:
             if not segment.same_mesh:
                 raise NotOnBranch("the contact of a wall with the plane changes just before the goal")
-            segment = segment.up_to(goal[0], self.point_at(segment, *goal))
+            end = segment.point(goal[0])
+            asked = self.goals[goal[1]]
+            if goal[1] == "parameter" and end.state.parameter != asked:  # no search finds the last digit
+                given = fixed_parameter(asked, self.line.scale)
+                end = branch_point(correct(end.state, given, self.options.tolerance), self.here.tangent)
+            segment = replace(segment, end=end, length=goal[0])
         return Step(segment, bend, goal is not None, self.events_on(segment))
-
-    def point_at(self, segment: Segment, t: float, goal: str) -> BranchPoint:
-        """The point of a segment that meets a goal; of λ to the last digit, which no search finds."""
-        point = segment.point(t)
-        if goal != "parameter" or point.state.parameter == self.goals[goal]:
-            return point
-        asked = fixed_parameter(self.goals[goal], self.line.scale)
-        return branch_point(correct(point.state, asked, self.options.tolerance), self.here.tangent)
 
     def bend(self, there: State, length: float) -> float:
         """Distance of a state from the tangent, over the length of the step."""
@@ -213,7 +209,7 @@ class Tracer:
 
     def solve_contact(self, near: State) -> State:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        surface = near.at_parameter(near.mesh.surface_in_contact(near.X))
+        surface = near.with_values(near.mesh.surface_in_contact(near.X))
         tolerance, backend = self.options.tolerance, self.options.backend
         result = solve(surface, "newton", target="stationary", tolerance=tolerance, backend=backend)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
@@ -237,7 +233,7 @@ class Tracer:
             except SurfaceError:
                 return
             start = State(mesh, mesh.surface.vertices, here.parameter)
-            self.continue_from(start, tangent.on(here, mesh))
+            self.continue_from(start, tangent.on(here, start))
 
     def continue_from(self, start: State, tangent: Tangent) -> None:
         """Go on from the point of the branch near a state, on the plane across a tangent.
@@ -262,23 +258,19 @@ class Tracer:
     def events_on(self, segment: Segment) -> list[dict[str, Any]]:
         """The events on a segment, in their order."""
         start, end, length = segment.start, segment.end, segment.length
-        if not segment.same_mesh:
+        if not segment.same_mesh or length <= 2.0 * EVENT_ACCURACY:
             events = self.events_between(start, end, length)
             if (start.state.mesh.resting != end.state.mesh.resting).any():
                 events.insert(0, self.event("contact", end.state, length, start.index, end.index))
             return events
-        if length <= 2.0 * EVENT_ACCURACY:
-            return self.events_between(start, end, length)
         located, fold = [], segment.fold
         if fold is not None:
             at = segment.point(fold).state
             located.append((fold, self.event("fold", at, fold, start.index, end.index)))
         index, sign = start.index, 1 if end.index > start.index else -1
         for t, count in segment.index_changes():
-            after = index + sign * count
-            point = segment.point(t)
-            event = self.event("index", point.state, t, index, after)
-            event["along_branch"] = along_branch(point, count)
+            after, point = index + sign * count, segment.point(t)
+            event = self.event("index", point.state, t, index, after, along_branch(point, count))
             located.append((t, event))
             index = after
         return [event for _, event in sorted(located, key=lambda pair: pair[0])]
@@ -289,7 +281,9 @@ class Tracer:
         kinds = ["fold"] * folds + ["index"] * (before.index != after.index)
         return [self.event(kind, after.state, length, before.index, after.index) for kind in kinds]
 
-    def event(self, kind: str, at: State, t: float, before: int, after: int) -> dict[str, Any]:
+    def event(
+        self, kind: str, at: State, t: float, before: int, after: int, along: float = math.nan
+    ) -> dict[str, Any]:
         """A row of the table of events, t from here."""
         return {
             "kind": kind,
@@ -297,7 +291,7 @@ class Tracer:
             "arclength": self.arclength + t,
             "index_before": before,
             "index_after": after,
-            "along_branch": math.nan,
+            "along_branch": along,
             "surface": self.surface_at(at),
         }
 
@@ -324,18 +318,14 @@ class Tracer:
 
     def columns(self, at: State) -> dict[str, Any]:
         """The columns of both tables."""
+        rooms = zip(at.surface.rooms, room_pressures(at.surface).tolist(), strict=True)
         return {
             "parameter": at.parameter,
             **self.line.columns(at.mesh.full, at.parameter),
-            **{
-                f"pressure {room.name}": pressure
-                for room, pressure in zip(at.surface.rooms, room_pressures(at.surface).tolist(), strict=True)
-            },
-            "energy": at.energy,
-            "volume": at.volume,
-            "height": at.height,
+            **{f"pressure {room.name}": pressure for room, pressure in rooms},
+            **{name: getattr(at, name) for name in ("energy", "volume", "height")},
         }
 
     def surface_at(self, at: State) -> Surface:
         """The whole surface at a state."""
-        return at.at_parameter(at.mesh.full_surface(at.X))
+        return at.with_values(at.mesh.full_surface(at.X))

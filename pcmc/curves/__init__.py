@@ -3,6 +3,7 @@
 Gives Curve and what makes one to surfaces, plans, drawings and projects. Imports only ``base``.
 """
 
-from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
+from .curve_data import curve
+from .curves import Curve, arc, bezier, circle, ellipse, join, polyline
 
 __all__ = ["Curve", "arc", "bezier", "circle", "curve", "ellipse", "join", "polyline"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -14,7 +13,7 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import OptionError, unknown
+from ..base.errors import OptionError
 from .guides import Plane
 from .pieces import Alike, Piece
 
@@ -33,8 +32,7 @@ class Curve:
     """Pieces joined end to end. Its parameter t runs from 0 to the number of pieces.
 
     Plane points (x, y) are coordinates on Π (by default the plane z = 0); points (x, y, z) are
-    positions in space. Make curves with ``polyline``, ``bezier``, ``arc``, ``circle``,
-    ``ellipse``, ``join``.
+    positions in space.
     """
 
     pieces: tuple[Piece, ...]
@@ -54,15 +52,12 @@ class Curve:
     @cached_property
     def _groups(self) -> list[tuple[Ints, Alike]]:
         """The pieces by their kind, and (p,) the place of each piece among those, -1 for another kind."""
-        kinds: dict[tuple[bool, int, bool], list[int]] = {}
-        for number, piece in enumerate(self.pieces):
-            kind = (piece.sweep != 0.0, len(piece.points), piece.weights is not None)
-            kinds.setdefault(kind, []).append(number)
+        kinds = [(piece.sweep != 0.0, len(piece.points), piece.weights is not None) for piece in self.pieces]
         groups = []
-        for numbers in kinds.values():
-            place = np.full(len(self.pieces), -1)
-            place[numbers] = np.arange(len(numbers))
-            groups.append((place, Alike.of([self.pieces[k] for k in numbers])))
+        for kind in dict.fromkeys(kinds):
+            mine = np.array([other == kind for other in kinds])
+            place = np.where(mine, np.cumsum(mine) - 1, -1)
+            groups.append((place, Alike.of([self.pieces[k] for k in np.flatnonzero(mine)])))
         return groups
 
     @cached_property
@@ -106,8 +101,8 @@ class Curve:
         along = points[:, 1] - points[:, 0]
         starts = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
         ends, curved = starts.copy(), np.flatnonzero(~straight)
-        starts[curved] = np.reshape([self.pieces[k].direction(0) for k in curved], (-1, d))
-        ends[curved] = np.reshape([self.pieces[k].direction(1) for k in curved], (-1, d))
+        for end, tangents in enumerate((starts, ends)):
+            tangents[curved] = np.reshape([self.pieces[k].direction(end) for k in curved], (-1, d))
         return starts, ends
 
     @cached_property
@@ -147,10 +142,8 @@ class Curve:
         >>> arc([1, 0], [0, 1], [-1, 0]).between(0.0, 1.0, 0.65).round(12).tolist()  # not 5 equal edges
         [0.25, 0.5, 0.75]
         """
-        total = self.length
         low, high = self._lengths_at(np.array([start, end]))
-        extremes = self._twice[0]
-        stops = [low]
+        stops, extremes = [low], np.concatenate([self.extremes, self.extremes + float(len(self.pieces))])
         inside = slice(*np.searchsorted(extremes, [start, end]))
         for length in self._lengths_at(extremes[inside]).tolist():
             if min(length - stops[-1], high - length) >= NEAR * edge_length:
@@ -160,22 +153,21 @@ class Curve:
             bend = self._turning(first, second)
             count = max(1, round((second - first) / edge_length), math.ceil(bend / EDGE_TURN - 1e-9))
             inner.append(first + (second - first) * np.arange(count) / count)
-        lengths = np.concatenate(inner)[1:]
-        return self.parameter(np.where(lengths > total, lengths - total, lengths))
+        return self._parameter_around(np.concatenate(inner)[1:])
 
     def middle(self, start: npt.ArrayLike, end: npt.ArrayLike, share: Floats | float = 0.5) -> Floats:
         """(n,) the parameters half of the way from ones to others, or another share, as in ``between``."""
         low, high = (self._lengths_at(np.atleast_1d(np.asarray(t, dtype=float))) for t in (start, end))
         return self.parameter((low + share * (high - low)) % self.length)
 
+    def _parameter_around(self, length: Floats) -> Floats:
+        """``parameter`` of lengths (n,) that may go around a closed curve twice."""
+        return self.parameter(np.where(length > self.length, length - self.length, length))
+
     @cached_property
-    def _twice(self) -> tuple[Floats, Floats]:
-        """Of a curve run twice: the extremes, and the lengths up to the dense parameters."""
-        extremes, lengths = self.extremes, self.lengths[:-1]
-        return (
-            np.concatenate([extremes, extremes + float(len(self.pieces))]),
-            np.concatenate([lengths, lengths + self.length]),
-        )
+    def _lengths_twice(self) -> Floats:
+        """(2k - 2,) the lengths up to the dense parameters, of a curve run twice."""
+        return np.concatenate([self.lengths[:-1], self.lengths[:-1] + self.length])
 
     def _lengths_at(self, t: Floats) -> Floats:
         """(n,) the length along the curve up to parameters t, which may go around a closed curve twice."""
@@ -184,17 +176,15 @@ class Curve:
 
     def _turning(self, low: float, high: float) -> float:
         """The angle through which the smooth pieces turn between two lengths along the curve."""
-        total, inner = self.length, self._twice[1]
+        inner = self._lengths_twice
         first, last = np.searchsorted(inner, low, side="right"), np.searchsorted(inner, high)
         if last == first:
             return 0.0
         where = np.concatenate([[low], inner[first:last], [high]])
-        points = self.at(self.parameter(np.where(where > total, where - total, where)))
-        steps = np.diff(points, axis=0)
+        steps = np.diff(self.at(self._parameter_around(where)), axis=0)
         length = np.linalg.norm(steps, axis=1)
         steps = steps[length > 0] / length[length > 0, None]
-        cosine = np.clip(np.einsum("ij,ij->i", steps[:-1], steps[1:]), -1.0, 1.0)
-        turns = np.arccos(cosine)
+        turns = np.arccos(np.clip(np.einsum("ij,ij->i", steps[:-1], steps[1:]), -1.0, 1.0))
         return float(turns[turns <= CORNER].sum())
 
     def reversed(self) -> Curve:
@@ -237,17 +227,17 @@ def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     >>> polyline([[0, 0], [3, 0], [3, 4]]).length
     7.0
     """
-    P = _points(points, "polyline", 2)
+    P = checked_points(points, "polyline", 2)
     if closed and len(P) > 2 and np.array_equal(P[0], P[-1]):
         P = P[:-1]
     if closed and len(P) < 3:
-        raise _error("polyline", f"closed, it needs 3 points, found {len(P)}", found=len(P), expected=3)
+        raise curve_error("polyline", f"closed, it needs 3 points, found {len(P)}", found=len(P), expected=3)
     following = np.roll(P, -1, axis=0) if closed else P[1:]
     double = np.flatnonzero((P[: len(following)] == following).all(axis=1))
     if len(double):
         first = int(double[0])
         both = f"points {first} and {(first + 1) % len(P)}"
-        raise _error("polyline", f"{both} are both {P[first].tolist()}; remove one", where=first)
+        raise curve_error("polyline", f"{both} are both {P[first].tolist()}; remove one", where=first)
     pieces = tuple(Piece(np.stack(ends)) for ends in zip(P, following, strict=False))
     return _closed_if_ends_meet(Curve(pieces, closed))
 
@@ -263,15 +253,15 @@ def bezier(control: npt.ArrayLike, weights: npt.ArrayLike | None = None) -> Curv
     >>> round(float(np.linalg.norm(quarter.at([0.3]))), 12)
     1.0
     """
-    P = _points(control, "bezier", 2)
+    P = checked_points(control, "bezier", 2)
     if np.ptp(P, axis=0).max() == 0.0:
-        raise _error("bezier", f"all control points are {P[0].tolist()}")
+        raise curve_error("bezier", f"all control points are {P[0].tolist()}")
     if weights is None:
         return _closed_if_ends_meet(Curve((Piece(P),)))
     given = [validate.positive("bezier: weights", w) for w in np.ravel(np.array(weights, dtype=object))]
     if len(given) != len(P):
         problem = f"expected a weight for each of its {len(P)} control points, found {len(given)}"
-        raise _error("bezier", problem, found=len(given), expected=len(P))
+        raise curve_error("bezier", problem, found=len(given), expected=len(P))
     return _closed_if_ends_meet(Curve((Piece(P, weights=np.array(given)),)))
 
 
@@ -281,12 +271,12 @@ def arc(start: npt.ArrayLike, through: npt.ArrayLike, end: npt.ArrayLike) -> Cur
     >>> round(arc([1, 0], [0, 1], [-1, 0]).length, 3)
     3.141
     """
-    a, b, c = _points([start, through, end], "arc", 3)
+    a, b, c = checked_points([start, through, end], "arc", 3)
     u, v = b - a, c - a
     uu, uv, vv = u @ u, u @ v, v @ v
     area = uu * vv - uv * uv  # squared area of the parallelogram
     if area <= 1e-24 * max(uu, vv) ** 2:
-        raise _error("arc", "its three points lie on one line; use a polyline")
+        raise curve_error("arc", "its three points lie on one line; use a polyline")
     centre = a + (0.5 * vv * (uu - uv) * u + 0.5 * uu * (vv - uv) * v) / area
     first = a - centre
     across, other = (p - centre - ((p - centre) @ first) / (first @ first) * first for p in (b, c))
@@ -306,7 +296,7 @@ def circle(centre: npt.ArrayLike, radius: float) -> Curve:
     >>> round(circle([0, 0], 2.0).length / 2, 2)
     6.28
     """
-    c = _points([centre], "circle", 1)[0]
+    c = checked_points([centre], "circle", 1)[0]
     axes = validate.positive("circle: radius", radius) * np.eye(2, len(c))
     return Curve((Piece(np.concatenate([[c], axes]), 2.0 * math.pi),), closed=True)
 
@@ -321,13 +311,15 @@ def ellipse(centre: npt.ArrayLike, axes: npt.ArrayLike, sweep: float = 360.0) ->
     >>> ellipse([0, 0], [[3, 0], [0, 1]], 90).at([1.0]).round(12).tolist()
     [[0.0, 1.0]]
     """
-    P = np.concatenate([_points([centre], "ellipse", 1), _points(axes, "ellipse", 2, exactly=True)])
+    P = np.concatenate(
+        [checked_points([centre], "ellipse", 1), checked_points(axes, "ellipse", 2, exactly=True)]
+    )
     u, v = P[1:]
     if (u @ u) * (v @ v) - (u @ v) ** 2 <= 1e-24 * max(u @ u, v @ v) ** 2:
-        raise _error("ellipse", "its axes lie on one line; use a polyline", found=P[1:].tolist())
+        raise curve_error("ellipse", "its axes lie on one line; use a polyline", found=P[1:].tolist())
     angle = validate.number("ellipse: sweep", sweep)
     if not 0.0 < abs(angle) <= 360.0:
-        raise _error("ellipse", f"sweep must be between 0 and 360 degrees, found {angle:g}", found=angle)
+        raise curve_error("ellipse", f"sweep must be between 0 and 360 degrees, found {angle:g}", found=angle)
     return Curve((Piece(P, math.radians(angle)),), closed=abs(angle) == 360.0)
 
 
@@ -338,84 +330,21 @@ def join(*curves: Curve) -> Curve:
     True
     """
     if not curves:
-        raise _error("join", "give at least one curve")
+        raise curve_error("join", "give at least one curve")
     closed = [number for number, curve in enumerate(curves) if curve.closed]
     if closed and len(curves) > 1:
-        raise _error("join", f"curve {closed[0]} is closed; only open curves can be joined", where=closed[0])
+        raise curve_error(
+            "join", f"curve {closed[0]} is closed; only open curves can be joined", where=closed[0]
+        )
     if len({curve.pieces[0].points.shape[1] for curve in curves}) > 1:
-        raise _error("join", "some curves are plane and some in space; give all in space")
+        raise curve_error("join", "some curves are plane and some in space; give all in space")
     tolerance = 1e-9 * max(curve.length for curve in curves)
     for number in range(1, len(curves)):
         before, after = _end(curves[number - 1], 1), _end(curves[number], 0)
         if np.linalg.norm(after - before) > tolerance:
-            gap = (
-                f"curve {number} starts at {after.tolist()}, but curve {number - 1} ends at {before.tolist()}"
-            )
-            raise _error("join", gap, where=number)
+            gap = f"curve {number} starts at {after.tolist()}, but curve {number - 1} ends at"
+            raise curve_error("join", f"{gap} {before.tolist()}", where=number)
     return _closed_if_ends_meet(Curve(tuple(piece for curve in curves for piece in curve.pieces)))
-
-
-def curve(spec: Any, closed: bool = False) -> Curve:
-    """A curve from plain data, as a project file holds it.
-
-    Parameters
-    ----------
-    spec : a Curve; a list of points; a mapping with one of ``polyline``, ``bezier`` (also with
-        ``weights``), ``arc`` (three points), ``circle`` (``{"centre": …, "radius": …}``) or ``ellipse``
-        (``{"centre": …, "axes": …, "sweep": …}``); or a list of such mappings, joined.
-    closed : whether a list of points is to be closed.
-
-    >>> curve({"circle": {"centre": [0, 0], "radius": 1.0}}).closed
-    True
-    >>> curve([{"polyline": [[0, 0], [2, 0]]}, {"arc": [[2, 0], [1, 1], [0, 0]]}]).closed
-    True
-    """
-    if isinstance(spec, Curve):
-        return spec
-    if isinstance(spec, Mapping):
-        return _from_mapping(spec)
-    if isinstance(spec, Sequence) and spec and isinstance(spec[0], Mapping | Curve):
-        return join(*(curve(part) for part in spec))
-    return polyline(spec, closed=closed)
-
-
-CURVES = ("polyline", "bezier", "arc", "circle", "ellipse")
-"""The keys that make a table a curve."""
-
-TABLES = {"circle": ({"centre", "radius"}, set()), "ellipse": ({"centre", "axes"}, {"sweep"})}
-"""Kinds of curves given by a table: the keys that it must have, and those that it may have."""
-
-
-def _from_mapping(spec: Mapping[str, Any]) -> Curve:
-    besides = {"closed": "polyline", "weights": "bezier"}
-    kinds = [key for key in spec if key not in besides]
-    for key in kinds:
-        validate.choice("curve", key, CURVES)
-    if len(kinds) != 1:
-        problem = f"a curve needs exactly one of {', '.join(CURVES)}; found {list(spec)}"
-        raise OptionError(problem, what="curve", found=list(spec), expected=CURVES)
-    (kind,) = kinds
-    value = spec[kind]
-    if kind == "polyline" and "weights" not in spec:
-        return polyline(value, closed=bool(spec.get("closed", False)))
-    for key, owner in besides.items():
-        if key in spec and kind != owner:
-            problem = f"only a {owner} has the key {key}"
-            if key == "closed":
-                problem += f"; a {kind} is closed if it ends at its start"
-            raise OptionError(problem, what=key)
-    if kind == "bezier":
-        return bezier(value, spec.get("weights"))
-    if kind == "arc":
-        return arc(*_points(value, "arc", 3, exactly=True))
-    needed, allowed = TABLES[kind]
-    for key in value if isinstance(value, Mapping) else ():
-        if key not in needed | allowed:
-            raise _error(kind, unknown("key", key, sorted(needed | allowed)), where=key)
-    if not isinstance(value, Mapping) or not needed <= set(value) <= needed | allowed:
-        wanted = "centre and radius" if kind == "circle" else "centre, axes and perhaps sweep"
-        raise _error(kind, f"expected {wanted}, found {value!r}", found=value)
-    return circle(**value) if kind == "circle" else ellipse(**value)
 
 
 def _closed_if_ends_meet(path: Curve) -> Curve:
@@ -428,25 +357,25 @@ def _end(path: Curve, end: int) -> Floats:
     return path.at([float(end * len(path.pieces))])[0]
 
 
-def _error(what: str, problem: str, **fields: object) -> OptionError:
+def curve_error(what: str, problem: str, **fields: object) -> OptionError:
     """The error about a kind of curve."""
     return OptionError(f"{what}: {problem}", what=what, **fields)
 
 
-def _points(points: Any, what: str, least: int, exactly: bool = False) -> Floats:
+def checked_points(points: Any, what: str, least: int, exactly: bool = False) -> Floats:
     """(k,2) or (k,3) the points, checked."""
     try:
         P = np.array(points)
     except (TypeError, ValueError):
         P = np.array("ragged")
     if P.dtype.kind not in "iuf":  # numpy would take the text "8" for a number
-        raise _error(what, "expected points, all [x, y] or all [x, y, z]", found=points)
+        raise curve_error(what, "expected points, all [x, y] or all [x, y, z]", found=points)
     P = P.astype(float)
     if P.ndim != 2 or P.shape[1] not in (2, 3):
-        raise _error(what, f"expected points [x, y] or [x, y, z], found shape {P.shape}", found=P.shape)
+        raise curve_error(what, f"expected points [x, y] or [x, y, z], found shape {P.shape}", found=P.shape)
     if len(P) < least or (exactly and len(P) != least):
-        raise _error(what, f"expected {least} points, found {len(P)}", found=len(P), expected=least)
+        raise curve_error(what, f"expected {least} points, found {len(P)}", found=len(P), expected=least)
     bad = np.flatnonzero(~np.isfinite(P).all(axis=1))
     if len(bad):
-        raise _error(what, f"point {bad[0]} = {P[bad[0]].tolist()} is not finite", where=int(bad[0]))
+        raise curve_error(what, f"point {bad[0]} = {P[bad[0]].tolist()} is not finite", where=int(bad[0]))
     return P

@@ -19,18 +19,14 @@ SAMPLES, BISECTIONS = 66, 60  # of a coordinate of a Bézier curve, and to find 
 class Piece:
     """One smooth piece: a Bézier curve of any degree, or an arc if ``sweep`` is not 0.
 
-    Attributes
-    ----------
-    points : (k,d) Bézier control points; of an arc (3,d) the centre, and the vectors from there to
-        its start and to the point a quarter turn on. These need not be as long as each other, nor at a
-        right angle: then the arc is one of an ellipse.
-    sweep : the angle of the arc, radians.
-    weights : (k,) > 0 of the control points of a rational Bézier curve; None if all are 1.
+    The ``points`` (k,d) are Bézier control points; of an arc (3,d) the centre, and the vectors from there to
+    its start and to the point a quarter turn on. These need not be as long as each other, nor at a right
+    angle: then the arc is one of an ellipse.
     """
 
     points: Floats
-    sweep: float = 0.0
-    weights: Floats | None = None
+    sweep: float = 0.0  # the angle of the arc, radians
+    weights: Floats | None = None  # (k,) > 0 of a rational Bézier curve's control points; None if all are 1
 
     def at(self, t: Floats) -> Floats:
         """(n,d) points at t (n,) in 0..1."""
@@ -99,8 +95,9 @@ class Piece:
             _, u, v = self.points
             angle = self.sweep * end
             tangent = math.copysign(1.0, self.sweep) * (v * math.cos(angle) - u * math.sin(angle))
-        else:
-            tangent = _first_step(self.points) if end == 0 else -_first_step(self.points[::-1])
+        else:  # from the first control point to the first that differs from it, or the same at the end
+            steps = self.points[1:] - self.points[0] if end == 0 else self.points[-1] - self.points[-2::-1]
+            tangent = steps[np.argmax((steps != 0.0).any(axis=1))]
         length = float(np.linalg.norm(tangent))
         return tangent / length if length > 0.0 else tangent
 
@@ -145,18 +142,11 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """Pieces of one kind, evaluated together.
+    """Pieces of one kind, evaluated together."""
 
-    Attributes
-    ----------
-    points : (p,k,d) as of a Piece; homogeneous, (p,k,d+1), if they are rational.
-    sweep : (p,) of arcs, 0 of others.
-    rational : whether they are rational Bézier curves.
-    """
-
-    points: Floats
-    sweep: Floats
-    rational: bool
+    points: Floats  # (p,k,d) as of a Piece; homogeneous, (p,k,d+1), if they are rational
+    sweep: Floats  # (p,) of arcs, 0 of others
+    rational: bool  # whether they are rational Bézier curves
 
     @classmethod
     def of(cls, pieces: Sequence[Piece]) -> Alike:
@@ -203,13 +193,6 @@ def to_local(points: Floats, plane: Plane) -> Floats:
 def to_space(local: Floats, plane: Plane) -> Floats:
     """(n,3) positions of points given by coordinates on Π and height."""
     return local @ plane.axes + np.array(plane.point)
-
-
-def _first_step(control: Floats) -> Floats:
-    """From the first control point to the first one that differs from it."""
-    steps = control[1:] - control[0]
-    moved = np.flatnonzero((steps != 0.0).any(axis=1))
-    return steps[moved[0]] if len(moved) else steps[0]
 
 
 def point_text(point: Floats) -> str:

@@ -37,18 +37,6 @@ def values_text(table: pd.DataFrame, units: Units = NO_UNITS) -> str:
     return ", ".join(f"{label} {value:.6g}{units.behind(dimension)}" for label, value, dimension in rows)
 
 
-def _away(value: float, wanted: float) -> str:
-    """How far a value is from the one wanted, after a comma.
-
-    >>> _away(2.00442, 2.0), _away(0.8, 1.0), _away(1.0, 0.0)
-    (', 0.22 % more', ', 20 % less', '')
-    """
-    if wanted == 0.0:
-        return ""
-    share = (value - wanted) / abs(wanted)
-    return f", {100 * abs(share):.2g} % {'more' if share > 0.0 else 'less'}"
-
-
 class NoStart(SurfaceError):
     """There is no equilibrium to start a search for targets from; the message says why."""
 
@@ -115,22 +103,21 @@ class Design:
         text = self.status.value
         missed = self.targets[~self.targets["met"]]
         for label, row in missed.iterrows():
-            known = not math.isnan(row["limit"])
-            reached = f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['value']:.6g}"
-            unit = units.behind(row["dimension"])
-            away = _away(row["limit"], row["wanted"]) if known else ""
-            text += f"; {label}: wanted {row['wanted']:.6g}{unit}, {reached}{unit}{away}"
+            limit, wanted, unit = row["limit"], row["wanted"], units.behind(row["dimension"])
+            reached = f"so far {row['value']:.6g}{unit}"
+            if not math.isnan(limit):
+                reached = f"nearest reachable {limit:.6g}{unit}"
+            if wanted and not math.isnan(limit):
+                away = 100.0 * (limit - wanted) / abs(wanted)
+                reached += f", {abs(away):.2g} % {'more' if away > 0.0 else 'less'}"
+            text += f"; {label}: wanted {wanted:.6g}{unit}, {reached}"
         if len(missed):
             text += f" ({values_text(self.parameters, units)})"
             text += f"; a step further, {self.reason}" if self.reason else ""
-        return text + self._too_few()
-
-    def _too_few(self) -> str:
-        """That there are more targets than parameters, and what may vary, too; or empty."""
         number, count = len(self.targets), len(self.parameters)
-        if self.status is not DesignStatus.CONFLICT or number <= count:
-            return ""
-        varied = " ".join(map(str, self.parameters.index))
-        others = [repr(p.name) for p in self.surface.patches if p.pressure and p.name not in varied]
-        such = f", such as {' or '.join(others)}" if others else ""
-        return f"; {number} targets need {number} parameters, and {count} may vary: add to vary{such}"
+        if self.status is DesignStatus.CONFLICT and number > count:
+            varied = " ".join(map(str, self.parameters.index))
+            others = [repr(p.name) for p in self.surface.patches if p.pressure and p.name not in varied]
+            such = f", such as {' or '.join(others)}" if others else ""
+            text += f"; {number} targets need {number} parameters, and {count} may vary: add to vary{such}"
+        return text

@@ -6,36 +6,68 @@ dq = ⟨∂q/∂X, dX⟩ + Σ ∂q/∂α_i dα_i + Σ ∂q/∂p_i dp_i, and so o
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
+from ..certificate.cables import chord
 from ..certificate.reactions import SupportForces, support_forces
-from ..certificate.tables import sides_at
+from ..certificate.tables import lean_sines, sides_at
 from ..forces.functional import weighted
+from ..forces.parameters import gradient_by
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
-from ..surface.geometry import area_vectors, cross_2d
+from ..surface.geometry import area_vectors, cross_2d, segment_lengths
 from ..surface.values import part_index
-from . import cable_quantities
-from .lean import lean
-from .measurement import Branches, Measurement, largest
+
+TIE = 1e-6  # of a maximum's size: a change of parameters as small, relative, may bring another one to the top
 
 
-@dataclass(frozen=True)
-class Measure:
-    """How a quantity is measured, ``of`` as in ``Target``.
+class Branches(NamedTuple):
+    """The quantities that a maximum is taken over: a row of derivatives for each."""
 
-    Misfits are divided by its usual ``size`` where the value wanted is 0.
-    """
+    by_position: csr_array  # (q,3n)
+    by: Mapping[str, Floats] = {}  # (q,k) by kinds of values
+
+    @classmethod
+    def of(cls, vertices: Ints, slopes: Floats, n: int, by: Mapping[str, Floats] | None = None) -> Branches:
+        """Branches whose derivatives are ``slopes`` (q,p,3) at the ``vertices`` (q,p)."""
+        column = (3 * vertices[:, :, None] + np.arange(3)).ravel()
+        row = np.repeat(np.arange(len(vertices)), 3 * vertices.shape[1])
+        return cls(csr_array((slopes.ravel(), (row, column)), shape=(len(vertices), 3 * n)), by or {})
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """A quantity's value, and its derivatives."""
+
+    value: float
+    by_position: Floats  # (n,3)
+    by: Mapping[str, Floats] = field(default_factory=dict)  # (k,) by the kinds of values it depends on itself
+    ties: Branches | None = None  # of a maximum, those that come within TIE of it, if there are several
+
+
+class Measure(NamedTuple):
+    """How a quantity is measured, ``of`` as in ``Target``, and its usual size, for misfits from 0."""
 
     measure: Callable[[Surface, Any], Measurement]
     size: Callable[[Surface], float]
+
+
+def largest(values: Floats, size: float, branches: Callable[[Ints], Branches]) -> Measurement:
+    """The largest of ``values``, of the usual ``size``; ``branches`` gives derivatives of some of them."""
+    order = np.argsort(-values, kind="stable")
+    near = order[values[order] >= values[order[0]] - TIE * size]
+    found = branches(near)
+    slope = found.by_position[[0]].toarray().reshape(-1, 3)
+    first = {kind: rows[0] for kind, rows in found.by.items()}
+    return Measurement(float(values[order[0]]), slope, first, found if len(near) > 1 else None)
 
 
 def _apex(surface: Surface, of: str | None) -> Measurement:
@@ -50,7 +82,7 @@ def _apex(surface: Surface, of: str | None) -> Measurement:
 
 
 def vertices_up(surface: Surface, of: str | None) -> Ints:
-    """The vertices of a patch, or of all under pressure, from the lowest over Π to the highest."""
+    """The vertices of a patch, or of the roof, from the lowest over Π to the highest."""
     vertices = np.unique(surface.faces[_faces_of(surface, of)])
     return vertices[np.argsort(surface.plane.height(surface.vertices[vertices]))]
 
@@ -102,16 +134,16 @@ def _curvature(surface: Surface, of: str) -> Measurement:
         raise OptionError(message, what="of", found=of)
     if alpha == 0.0:
         raise OptionError(f"curvature of {of}: a wall without tension has none", what="of", found=of)
-    by_tension, by_pressure = np.zeros((2, len(surface.patches)))
-    by_tension[index], by_pressure[index] = -p / (2.0 * alpha**2), 1.0 / (2.0 * alpha)
-    return Measurement(float(p / (2.0 * alpha)), np.zeros_like(surface.vertices), by_tension, by_pressure)
+    one = _chosen_patches(surface, of)
+    by = {"tensions": -p / (2.0 * alpha**2) * one, "pressures": one / (2.0 * alpha)}
+    still = np.zeros_like(surface.vertices)
+    return Measurement(float(p / (2.0 * alpha)), still, by | {"snows": -by["pressures"]})
 
 
 def _pressure(surface: Surface, of: str) -> Measurement:
     """The pressure of the air in a room of prescribed volume, force/length²."""
     row = np.linalg.pinv(surface.room_signs.T)[part_index(surface, "volumes", of)]
-    rest, snow = np.zeros_like(surface.vertices), {"snow": np.zeros_like(row)}
-    return Measurement(float(row @ surface.pressures), rest, by_pressure=row, by_load=snow)
+    return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), {"pressures": row})
 
 
 def _reaction(surface: Surface, of: str | None) -> Measurement:
@@ -161,7 +193,7 @@ def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
         together = csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(near), len(at)))
         along = csr_array((_dot(pull, n)[:, 0], (np.arange(len(at)), k)), shape=(len(at), patches))
         raised = csr_array(along.multiply(z[:, None]))
-        by = {kind: (together @ m).toarray() for kind, m in (("tension", along), ("weight", raised))}
+        by = {kind: (together @ m).toarray() for kind, m in (("tensions", along), ("weights", raised))}
         return Branches(csr_array(together @ sheet), by)
 
     return largest(sizes, float(surface.tensions.max()), branches)
@@ -170,6 +202,79 @@ def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
 def _dot(u: Floats, v: Floats) -> Floats:
     """(s,1) the products of vectors (s,3)."""
     return np.asarray(np.einsum("ij,ij->i", u, v)[:, None])
+
+
+def _lean(surface: Surface, of: str | None) -> Measurement:
+    """Largest angle of a wall's triangles from the vertical of Π, degrees; of all walls if ``of`` is None.
+
+    θ = arcsin |s|, s = ⟨ν, n⟩, ν = N / |N|; N = (b - a) × (c - a) changes by da × (b - c) with the corner a,
+    so ∂s/∂a = (b - c) × (n - s ν) / |N|. The largest of all θ and -θ: where walls are upright it has a kink.
+    """
+    walls = [surface.patch_index(of)] if of is not None else np.flatnonzero(surface.walls).tolist()
+    for wall in walls:
+        if not surface.walls[wall]:
+            text = f"lean of {of}: that patch is under pressure; a wall can lean"
+            raise OptionError(text, what="of", found=of)
+    if not walls:
+        raise OptionError("lean: the surface has no walls", what="of", found=of)
+    sines = np.where(np.isin(surface.patch_of_face, walls), lean_sines(surface), 0.0)
+    signs = np.repeat([1.0, -1.0], surface.m)
+    own = np.flatnonzero(np.tile(np.isin(surface.patch_of_face, walls), 2))
+
+    def branches(near: Ints) -> Branches:
+        sign, face = signs[own[near]], own[near] % surface.m
+        s, corners = sines[face][:, None], surface.vertices[surface.faces[face]]
+        normal = 2.0 * area_vectors(corners)
+        length = np.linalg.norm(normal, axis=1)[:, None]
+        across = (np.array(surface.plane.normal) - s * normal / length) / length
+        rate = np.degrees(sign[:, None] / np.sqrt(np.maximum(1.0 - s * s, 1e-12)))
+        sides = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)
+        slopes = rate[:, :, None] * np.cross(sides, across[:, None])
+        return Branches.of(surface.faces[face], slopes, surface.n)
+
+    return largest(np.degrees(np.arcsin(np.clip(signs * np.tile(sines, 2), -1.0, 1.0)))[own], 90.0, branches)
+
+
+def _sag(surface: Surface, of: str) -> Measurement:
+    """The largest distance of a cable's vertices from its chord, the straight line between its two ends.
+
+    With the chord from a to b and x at the share s of it, the distance along the unit vector e changes by
+    ⟨e, dx - (1 - s) da - s db⟩.
+    """
+    order, share, out = chord(surface, of)
+    distance = np.linalg.norm(out, axis=1)
+    size = float(np.linalg.norm(np.diff(surface.vertices[order[-2:]], axis=0)))
+    direction = out / np.where(distance > 0.0, distance, 1.0)[:, None]
+
+    def branches(near: Ints) -> Branches:
+        along, e = share[near][:, None], direction[near]
+        ends = np.tile(order[-2:], (len(near), 1))
+        slopes = np.stack([e, (along - 1.0) * e, -along * e], axis=1)
+        return Branches.of(np.column_stack([order[near], ends]), slopes, surface.n)
+
+    return largest(distance, size, branches)
+
+
+def _length(surface: Surface, of: str) -> Measurement:
+    """The length L of a cable."""
+    one = np.zeros(len(surface.cables))
+    one[surface.cable_index(of)] = 1.0
+    length = segment_lengths(surface.vertices, surface.cables[surface.cable_index(of)].edges).sum()
+    return Measurement(float(length), gradient_by(surface, {"cables": one}))
+
+
+def _force(surface: Surface, of: str) -> Measurement:
+    """τ, the force in a cable: the same all along it."""
+    one = np.zeros(len(surface.cables))
+    one[surface.cable_index(of)] = 1.0
+    tension = surface.cables[surface.cable_index(of)].tension
+    return Measurement(tension, np.zeros_like(surface.vertices), {"cables": one})
+
+
+def _margin(surface: Surface, of: str | None) -> Measurement:
+    """The factor of ``pcmc.margin``, which stands on this package: so it is found when it is asked for."""
+    found: Measurement = import_module("pcmc.margins.targets").measured_margin(surface, of)
+    return found
 
 
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:
@@ -193,11 +298,10 @@ MEASURES = {
     "area": Measure(_area, lambda surface: surface.size**2),
     "curvature": Measure(_curvature, lambda surface: 1.0 / surface.size),
     "pressure": Measure(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
-    "lean": Measure(lean, lambda surface: 90.0),
-    "sag": Measure(cable_quantities.sag, lambda surface: surface.size),
-    "length": Measure(cable_quantities.length, lambda surface: surface.size),
-    "force": Measure(
-        cable_quantities.force, lambda surface: max(cable.tension for cable in surface.cables) or 1.0
-    ),
+    "lean": Measure(_lean, lambda surface: 90.0),
+    "sag": Measure(_sag, lambda surface: surface.size),
+    "length": Measure(_length, lambda surface: surface.size),
+    "force": Measure(_force, lambda surface: max(cable.tension for cable in surface.cables) or 1.0),
     "reaction per length": Measure(_reaction, lambda surface: float(surface.tensions.max())),
+    "margin": Measure(_margin, lambda surface: 1.0),
 }

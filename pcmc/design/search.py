@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,8 +29,8 @@ from ..surface import Surface
 from .outcome import Design, DesignStatus, NoStart
 from .quantities import vertices_up
 from .sensitivity import slopes
-from .steps import Iterate, StepPlan, Trial
-from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
+from .steps import StepPlan, Trial
+from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 TRIES = 6  # points tried along a step, each nearer, before it is given up
@@ -109,33 +109,34 @@ def meet(
     return Search(surface, aims, parameters, tolerance, solves, callback, options).run()
 
 
-@dataclass(eq=False)
 class Search:
     """The state of a search. The unknowns x are tensions, reciprocal tensions, or pressures."""
 
-    surface: Surface
-    targets: list[Target]
-    parameters: list[Parameter]
-    tolerance: float
-    max_solves: int
-    callback: Callable[[pd.Series], object] | None
-    options: dict[str, Any]
-
-    def __post_init__(self) -> None:
-        surface, parameters = self.surface, self.parameters
-        self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **self.options}
+    def __init__(
+        self,
+        surface: Surface,
+        targets: list[Target],
+        parameters: list[Parameter],
+        tolerance: float,
+        max_solves: int,
+        callback: Callable[[pd.Series], object] | None,
+        options: dict[str, Any],
+    ) -> None:
+        self.surface, self.targets, self.parameters = surface, targets, parameters
+        self.tolerance, self.max_solves, self.callback = tolerance, max_solves, callback
+        self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **options}
         self.given = np.array([p.value(surface) for p in parameters])
         self.limits = np.array([p.bounds(surface) for p in parameters], dtype=float)
         self.reciprocal = np.array([p.tension_under_pressure(surface) for p in parameters])
         self.bounds = np.sort(self.converted(self.limits.T), axis=0)
         self.metric = _metric(parameters, self.reciprocal)
-        self.scale = np.array([t.scale(surface) for t in self.targets])
+        self.scale = np.array([t.scale(surface) for t in targets])
         self.trust = 1.0  # longest step, as a part of the unknowns' sizes
         self.solves = 0
         self.instead: dict[int, Target] = {}  # of targets, by their numbers: see ``aimed``
         self.best: Trial | None = None
         self.rows: list[dict[str, Any]] = []
-        self.failed: Result | Overload | None = None
+        self.failed: Result | Overload | None = None  # the last point without an equilibrium
 
     @property
     def failure(self) -> str:
@@ -155,7 +156,11 @@ class Search:
             values = np.where(x == self.converted(known), known, values)
         return values
 
-    def ahead(self, here: Iterate, step: Floats) -> Floats:
+    def sizes(self, here: Trial) -> Floats:
+        """(parameters,) the unit for changes of each unknown."""
+        return np.maximum(np.abs(here.x), 0.05 * (self.bounds[1] - self.bounds[0]))
+
+    def ahead(self, here: Trial, step: Floats) -> Floats:
         """The unknowns a step ahead, which are at a bound where they are beside it only by rounding."""
         x = here.x + step
         for bound in self.bounds:
@@ -168,15 +173,13 @@ class Search:
             return self.search()
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
-            if self.best is None:
-                given = self.trial(self.initial_unknowns(), _unsolved(self.surface))
-                return self.design(DesignStatus.STOPPED, given)
-            status = DesignStatus.MET if self.is_met(self.best) else DesignStatus.STOPPED
-            return self.design(status, self.best)
+            best = self.best or self.trial(self.first_unknowns, _unsolved(self.surface))
+            met = self.best is not None and self.is_met(best)
+            return self.design(DesignStatus.MET if met else DesignStatus.STOPPED, best)
 
     def search(self) -> Design:
         """Step after step to the targets, or as near to them as possible."""
-        here, before = self.first_iterate(), None
+        here, before = self.first_trial(), None
         while True:
             if self.is_met(here):
                 return self.design(DesignStatus.MET, here)
@@ -194,13 +197,14 @@ class Search:
                 return self.design(there, here)
             here, before = there, here
 
-    def initial_unknowns(self) -> Floats:
+    @property
+    def first_unknowns(self) -> Floats:
         """The unknowns of the surface given, within their bounds."""
         return np.clip(self.converted(self.given), *self.bounds)
 
-    def first_iterate(self) -> Iterate:
+    def first_trial(self) -> Trial:
         """The first solution; tensions are raised until there is one."""
-        x, first, reason = self.initial_unknowns(), None, ""
+        x, first, reason = self.first_unknowns, None, ""
         while self.solves < min(STARTS, self.max_solves):
             first = self.solve_from(self.surface, x, {})
             reason = reason or self.failure  # that of the tensions given says most
@@ -213,12 +217,15 @@ class Search:
             raise NoStart(f"meet: no equilibrium was found to start from: {hint}", what="surface")
         return first
 
-    def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Iterate | None:
+    def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Trial | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
 
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
-        surface = self.with_unknowns(start, x)
+        values: dict[str, dict[str, float]] = {parameter.key: {} for parameter in self.parameters}
+        for parameter, value in zip(self.parameters, self.values(x).tolist(), strict=True):
+            values[parameter.key] |= dict.fromkeys(parameter.names, value)
+        surface = start.retensioned(**values)
         load = overload(surface)
         if load is not None and load.ratio > 1.0 + coarseness(surface):
             self.failed = load
@@ -227,31 +234,23 @@ class Search:
         result = solve(surface, "newton", **{**quality, **self.options})
         self.solves += 1
         trial = self.trial(x, result) if result.converged else None
-        self.failed = result if trial is None else self.failed
-        if trial is not None and (self.best is None or trial.phi < self.best.phi):
+        if trial is None:
+            self.failed = result
+        elif self.best is None or trial.phi < self.best.phi:
             self.best = trial
         self.record(x, result.status.name.lower(), trial)
         if result.status is Status.STOPPED:
             raise StopIteration
         return None if trial is None else self.with_jacobian(trial)
 
-    def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
-        """The surface with the tensions and pressures that the unknowns stand for."""
-        values: dict[str, dict[str, float]] = {f"{kind}s": {} for kind in KINDS}
-        for parameter, value in zip(self.parameters, self.values(x).tolist(), strict=True):
-            values[f"{parameter.kind}s"] |= dict.fromkeys(parameter.names, value)
-        return surface.retensioned(**values)
-
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""
         quantities = np.array([measure(result.surface, t).value for t in self.targets])
         wanted = self.wanted(quantities)
-        aimed = [
-            self.aimed(result.surface, k, *pair)
-            for k, pair in enumerate(zip(quantities, wanted, strict=True))
-        ]
-        r = (np.array([value for _, value in aimed]) - wanted) / self.scale
-        return Trial(x, result, quantities, r, float(np.linalg.norm(r)), [aim for aim, _ in aimed])
+        pairs = enumerate(zip(quantities, wanted, strict=True))
+        aims, values = zip(*(self.aimed(result.surface, k, *pair) for k, pair in pairs), strict=True)
+        r = (np.array(values) - wanted) / self.scale
+        return Trial(x, result, quantities, r, float(np.linalg.norm(r)), list(aims))
 
     def aimed(self, surface: Surface, number: int, value: float, wanted: float) -> tuple[Target, float]:
         """The quantity that the search changes for a target, and its value: the target's own, as a rule.
@@ -271,41 +270,40 @@ class Search:
         """(targets,) the wanted values nearest to these."""
         return np.array([t.nearest(q) for t, q in zip(self.targets, quantities, strict=True)])
 
-    def with_jacobian(self, at: Trial) -> Iterate | None:
+    def with_jacobian(self, at: Trial) -> Trial | None:
         """The trial with its derivatives; None at a fold."""
         try:
             found = np.array([own for own, *_ in slopes(at.result.surface, at.aims, self.parameters)])
         except SurfaceError:
             return None
-        jacobian = found * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
-        jacobian = jacobian * (at.r != 0.0)[:, None] / self.scale[:, None]
-        return Iterate(at.x, at.result, at.quantities, at.r, at.phi, at.aims, jacobian)
+        by_unknown = found * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
+        return replace(at, jacobian=by_unknown * (at.r != 0.0)[:, None] / self.scale[:, None])
 
     def is_met(self, at: Trial) -> bool:
         """Whether every target is met."""
         return bool(np.abs(at.r).max() <= self.tolerance)
 
-    def gauss_newton(self, here: Iterate) -> tuple[Floats, float]:
+    def gauss_newton(self, here: Trial) -> tuple[Floats, float]:
         """Step of least linearised misfit within bounds, cut to ``trust``; the misfit of the whole step."""
         size = self.sizes(here)
         A = here.jacobian * size
         mu = DAMPING * float(np.linalg.norm(A, 2)) or 1.0
-        room = (self.bounds - here.x) / size
-        room[1] = np.maximum(room[1], room[0] + 1e-14)
+        low, high = (self.bounds - here.x) / size
+        high = np.maximum(high, low + 1e-14)
         least = lsq_linear(
             np.vstack([A, mu * self.metric]),
             np.append(-here.r, np.zeros(len(size))),
-            bounds=(room[0], room[1]),
+            bounds=(low, high),
             method="bvls",
             tol=1e-14,
         )
-        d = np.clip(least.x, *room)
+        d = np.clip(least.x, low, high)
         misfit = float(np.linalg.norm(here.r + A @ d))
         d *= min(1.0, self.trust / (np.abs(d).max() or 1.0))
         return d * size, misfit
 
-    def line_search(self, here: Iterate, plan: StepPlan) -> Iterate | DesignStatus:
-        """An iterate with less misfit along the step, or why there is none."""
+    def line_search(self, here: Trial, plan: StepPlan) -> Trial | DesignStatus:
+        """A trial with less misfit along the step, or why there is none."""
         t, longest = plan.first, float((np.abs(plan.step) / self.sizes(here)).max())
         reason = DesignStatus.SOLVES
         for attempt in range(TRIES):
@@ -323,10 +321,6 @@ class Search:
                 break
         return reason
 
-    def sizes(self, here: Iterate) -> Floats:
-        """(parameters,) the unit for changes of each unknown."""
-        return np.maximum(np.abs(here.x), 0.05 * (self.bounds[1] - self.bounds[0]))
-
     def record(self, x: Floats, status: str, trial: Trial | None = None) -> None:
         """Add a row to the history, and call the callback with it."""
         row = dict(zip((p.label for p in self.parameters), self.values(x).tolist(), strict=True))
@@ -343,29 +337,30 @@ class Search:
             unknown = status in (DesignStatus.SOLVES, DesignStatus.STOPPED)
             limit = np.full_like(here.quantities, math.nan) if unknown else here.quantities
         missed = np.abs(here.r) > self.tolerance
-        targets = pd.DataFrame(
-            {
-                "value": here.quantities,
-                "dimension": [t.dimension for t in self.targets],
-                "wanted": self.wanted(here.quantities),
-                "misfit": here.r,
-                "met": ~missed,
-                "limit": np.where(missed, limit, here.quantities),
-            },
-            index=[t.label for t in self.targets],
+        targets = {
+            "value": here.quantities,
+            "dimension": [t.dimension for t in self.targets],
+            "wanted": self.wanted(here.quantities),
+            "misfit": here.r,
+            "met": ~missed,
+            "limit": np.where(missed, limit, here.quantities),
+        }
+        parameters = {
+            "start": self.given,
+            "value": [p.value(here.result.surface) for p in self.parameters],
+            "dimension": [p.dimension for p in self.parameters],
+            "low": self.limits[:, 0],
+            "high": self.limits[:, 1],
+        }
+        return Design(
+            status,
+            here.result,
+            pd.DataFrame(targets, index=[t.label for t in self.targets]),
+            pd.DataFrame(parameters, index=[p.label for p in self.parameters]),
+            self.solves,
+            pd.DataFrame(self.rows),
+            self.failure if status is DesignStatus.AT_FOLD else "",
         )
-        parameters = pd.DataFrame(
-            {
-                "start": self.given,
-                "value": [p.value(here.result.surface) for p in self.parameters],
-                "dimension": [p.dimension for p in self.parameters],
-                "low": self.limits[:, 0],
-                "high": self.limits[:, 1],
-            },
-            index=[p.label for p in self.parameters],
-        )
-        reason = self.failure if status is DesignStatus.AT_FOLD else ""
-        return Design(status, here.result, targets, parameters, self.solves, pd.DataFrame(self.rows), reason)
 
 
 def _unsolved(surface: Surface) -> Result:

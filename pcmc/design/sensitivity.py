@@ -17,7 +17,6 @@ Where rooms prescribe volumes, their pressures δ change with λ, too, and J is 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -27,16 +26,10 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import StandingPart, place_wall_rows, standing_part
-from ..contact.pull import excess_pull
-from ..forces.functional import energy_and_gradient
-from ..forces.jacobian import Linearisation, linearise
-from ..forces.motion_space import MotionSpace, force_scale, motion_space
+from ..contact.pinching import place_wall_rows
 from ..forces.parameters import gradient_by
-from ..forces.pattern import hessian_pattern
-from ..forces.rooms import prescribed_volumes, volume_defects, volume_gradients_at
-from ..forces.second_variation import assemble
-from ..stability.factorisation import BorderedFactor, Factor, SingularMatrix, factoriser
+from ..stability.equilibrium import Equilibrium
+from ..stability.factorisation import SingularMatrix
 from ..surface import Surface
 from ..surface.values import rates_of
 from .quantities import Measurement
@@ -106,102 +99,84 @@ def slopes(
     surface: Surface, targets: Sequence[Target], parameters: Sequence[Parameter]
 ) -> list[tuple[Floats, Floats, Floats]]:
     """dq/dλ (parameters,) of each target: of one branch, and of those leading while λ falls and grows."""
-    response = _LinearResponse.of(surface)
-    shown = response.part.surface
-    changes = [response.motion(p, parameters) for p in parameters]
-    return [_slopes(shown, measure(shown, target), parameters, changes) for target in targets]
+    at = Equilibrium.of(surface)
+    rates = [_rates(at.surface, parameter, parameters) for parameter in parameters]
+    motions = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
+    return [_slopes(at.surface, measure(at.surface, t), parameters, rates, motions) for t in targets]
+
+
+def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
+    """(k,) d/dλ of each patch's, cable's or room's own number; walls follow unless they are parameters."""
+    alike = (one for one in parameters if one.kind == parameter.kind)
+    named = {name: float(name in parameter.names) for one in alike for name in one.names}
+    return rates_of(surface, parameter.key, named)
 
 
 def _slopes(
     surface: Surface,
     quantity: Measurement,
     parameters: Sequence[Parameter],
-    changes: Sequence[tuple[Floats, Floats]],
+    rates: Sequence[Floats],
+    responses: Sequence[tuple[Floats, Floats]],
 ) -> tuple[Floats, Floats, Floats]:
-    """``slopes`` of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) of each parameter."""
-    motions = np.stack([motion for motion, _ in changes])
-    slope = np.einsum("pnd,nd->p", motions, quantity.by_position)
+    """``slopes`` of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) for each parameter."""
+    slope = np.einsum("pnd,nd->p", np.stack([motion for motion, _ in responses]), quantity.by_position)
     falling, growing = np.zeros((2, len(parameters)))
-    for k, parameter in enumerate(parameters):
-        by_part = quantity.by(parameter.kind)
-        if by_part is not None:
-            slope[k] += by_part @ _rates(surface, parameter, parameters)
-        if quantity.by_pressure is not None and surface.rooms:
-            slope[k] += quantity.by_pressure @ (changes[k][1] @ surface.room_signs)
+    for k, (parameter, own, (motion, pressures)) in enumerate(zip(parameters, rates, responses, strict=True)):
+        if parameter.key in quantity.by:
+            slope[k] += quantity.by[parameter.key] @ own
+        if "pressures" in quantity.by and surface.rooms:
+            slope[k] += quantity.by["pressures"] @ (pressures @ surface.room_signs)
         falling[k] = growing[k] = slope[k]
         if quantity.ties is not None:
-            each = quantity.ties.by_position @ motions[k].ravel()
-            if parameter.kind in quantity.ties.by:
-                each += quantity.ties.by[parameter.kind] @ _rates(surface, parameter, parameters)
+            each = quantity.ties.by_position @ motion.ravel()
+            if parameter.key in quantity.ties.by:
+                each += quantity.ties.by[parameter.key] @ own
             rounding = SAME * (np.abs(each).max() + abs(quantity.value / (parameter.value(surface) or 1.0)))
             if np.ptp(each) > rounding:
                 falling[k], growing[k] = each.min(), each.max()
     return slope, falling, growing
 
 
-def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-    """(k,) d/dλ of each patch's, cable's or room's own number; walls follow unless they are parameters."""
-    alike = [one for one in parameters if one.kind == parameter.kind]
-    named = {name: float(name in parameter.names) for one in alike for name in one.names}
-    return rates_of(surface, f"{parameter.kind}s", named)
+def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tuple[Floats, Floats]]:
+    """dX/dλ (n,3) and dδ/dλ (r,) while values change at these rates."""
+    if at.residual_with_pull > TOLERANCE:
+        found = at.residual_with_pull
+        message = f"sensitivities: the surface is not at rest (residual {found:.1e}); solve it first"
+        raise SurfaceError(message, what="surface", found=found, expected=TOLERANCE)
+    try:
+        inverse = at.factorised(soften=False).bordered
+    except SingularMatrix:
+        raise SurfaceError(AT_FOLD, what="surface") from None
+    surface, space, walls = at.surface, at.space, at.part.walls
+    count, units = space.size, at.volume_units
+    gradients = units[:, None, None] * at.volume_gradients
+    walls_follow = bool((walls.top_free & ~at.part.resting).any())
 
+    def motion(s: Floats) -> Floats:  # walls that hang from their junction follow it, as in the solver
+        d = space.to_vectors(s)
+        if not walls_follow:
+            return d
+        ahead, here = (place_wall_rows(surface, walls, X, space) for X in (at.X + d, at.X))
+        return ahead - here
 
-@dataclass(frozen=True, eq=False)
-class _LinearResponse:
-    """The equations of a surface at rest, factorised; ``walls_follow``: walls hang from a moving crest."""
+    def times(z: Floats) -> Floats:
+        d = motion(z[:count])
+        change = at.jacobian.times(d)
+        if not len(units):
+            return change
+        pressed = space.to_coordinates(np.tensordot(z[count:], gradients, axes=1))
+        return np.append(change - pressed, np.einsum("rnd,nd->r", gradients, d))
 
-    part: StandingPart
-    walls_follow: bool
-    space: MotionSpace
-    jacobian: Linearisation
-    inverse: Factor | BorderedFactor
-    volume_units: Floats
-    volume_gradients: Floats
-
-    @classmethod
-    def of(cls, surface: Surface) -> _LinearResponse:
-        part = standing_part(surface)
-        shown, walls, resting, classes = part.surface, part.walls, part.resting, part.classes
-        X = shown.vertices
-        space = motion_space(shown, classes, X)
-        gradient = energy_and_gradient(shown, X)[1]
-        unheld = np.linalg.norm(excess_pull(shown, walls, resting))
-        left = np.hypot(np.linalg.norm(space.to_coordinates(gradient)), unheld)
-        scale = force_scale(shown, classes, X)
-        residual = float(np.hypot(left / scale, np.linalg.norm(volume_defects(shown))))
-        if residual > TOLERANCE:
-            message = f"sensitivities: the surface is not at rest (residual {residual:.1e}); solve it first"
-            raise SurfaceError(message, what="surface", found=residual, expected=TOLERANCE)
-        pattern = hessian_pattern(classes, space)
-        try:
-            factor = factoriser(pattern).factor(assemble(shown, classes, space, pattern, X))
-        except SingularMatrix:
-            raise SurfaceError(AT_FOLD, what="surface") from None
-        inverse: Factor | BorderedFactor = factor
-        units = scale / np.abs(prescribed_volumes(shown))
-        gradients = units[:, None, None] * volume_gradients_at(shown, X)
-        if shown.rooms:
-            columns = np.stack([space.to_coordinates(gradient) for gradient in gradients], axis=1)
-            inverse = BorderedFactor(factor, columns)
-        walls_follow = bool((walls.top_free & ~resting).any())
-        jacobian = linearise(shown, classes, space, X, gradient)
-        return cls(part, walls_follow, space, jacobian, inverse, units, gradients)
-
-    def motion(self, parameter: Parameter, parameters: Sequence[Parameter]) -> tuple[Floats, Floats]:
-        """dX/dλ (n,3) and dδ/dλ (r,) for one of the parameters."""
-        shown, rooms = self.part.surface, len(self.volume_units)
-        rates = _rates(shown, parameter, parameters)
-        force = gradient_by(shown, {f"{parameter.kind}s": rates})
-        volumes = self.volume_units * rates if parameter.kind == "volume" else np.zeros(rooms)
-        right = np.append(-self.space.to_coordinates(force), volumes)
+    def response(of: dict[str, Floats]) -> tuple[Floats, Floats]:
+        right = np.append(-space.to_coordinates(gradient_by(surface, of)), units * of.get("volumes", 0.0))
         if not np.any(right):
-            return np.zeros_like(shown.vertices), np.zeros(rooms)
-        size = self.space.size + rooms
+            return np.zeros_like(at.X), np.zeros(len(units))
         residuals: list[float] = []
         z, _ = gmres(
-            LinearOperator((size, size), self._times, dtype=float),
+            LinearOperator((len(right), len(right)), times, dtype=float),
             right,
-            M=LinearOperator((size, size), self.inverse.solve, dtype=float),
+            M=LinearOperator((len(right), len(right)), inverse.solve, dtype=float),
             rtol=ACCURACY,
             restart=40,
             maxiter=1,
@@ -210,23 +185,6 @@ class _LinearResponse:
         )
         if not residuals or residuals[-1] > NO_SOLUTION:
             raise SurfaceError(AT_FOLD, what="surface")
-        return self._vertex_motion(z[: self.space.size]), self.volume_units * z[self.space.size :]
+        return motion(z[:count]), units * z[count:]
 
-    def _times(self, z: Floats) -> Floats:
-        """J, or the bordered matrix, times z (N+r,)."""
-        size = self.space.size
-        motion = self._vertex_motion(z[:size])
-        change = self.jacobian.times(motion)
-        if not len(self.volume_units):
-            return change
-        push = self.space.to_coordinates(np.tensordot(z[size:], self.volume_gradients, axes=1))
-        return np.append(change - push, np.einsum("rnd,nd->r", self.volume_gradients, motion))
-
-    def _vertex_motion(self, s: Floats) -> Floats:
-        """B s (n,3); walls that hang from their crest follow it, as in the solver."""
-        d = self.space.to_vectors(s)
-        if not self.walls_follow:
-            return d
-        shown, walls = self.part.surface, self.part.walls
-        ahead = place_wall_rows(shown, walls, shown.vertices + d, self.space)
-        return ahead - place_wall_rows(shown, walls, shown.vertices, self.space)
+    return [response(of) for of in rates]

@@ -7,7 +7,7 @@ the reachable limit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,7 +21,7 @@ FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A surface at rest: unknowns x, quantities, relative misfits r and φ = ‖r‖.
+    """A surface at rest: unknowns x, quantities, relative misfits r, φ = ‖r‖, and J = ∂r/∂x once it is known.
 
     ``aims`` are the quantities whose misfits these are: the targets', but at a held top (``Search.aimed``).
     """
@@ -32,13 +32,7 @@ class Trial:
     r: Floats
     phi: float
     aims: list[Target]
-
-
-@dataclass(frozen=True, eq=False)
-class Iterate(Trial):
-    """A trial with its derivatives J = ∂r/∂x."""
-
-    jacobian: Floats
+    jacobian: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +43,15 @@ class StepPlan:
     ρ = φ (g_before/g - 1) / (φ_before - φ). Then the misfit vanishes after 1 - ρ/2 of the way that the
     slope alone predicts. If ρ > 1, a fold comes first, after 1/(2ρ) of that way, where the misfit has
     fallen by φ/ρ.
-
-    Attributes
-    ----------
-    step : the Gauss-Newton step, t = 1.
-    first : t to try first.
-    to_limit : φ/ρ over the slope; quantities linear in t have their values at the fold there.
-    at_fold : whether the fold is so near that it is not worth a further solve.
     """
 
-    step: Floats
-    first: float = 1.0
-    to_limit: float = 0.0
-    at_fold: bool = False
+    step: Floats  # the Gauss-Newton step, t = 1
+    first: float = 1.0  # t to try first
+    to_limit: float = 0.0  # φ/ρ over the slope; quantities linear in t have their values at the fold there
+    at_fold: bool = False  # whether the fold is so near that it is not worth a further solve
 
     @classmethod
-    def of(cls, before: Iterate | None, here: Iterate, step: Floats) -> StepPlan:
+    def of(cls, before: Trial | None, here: Trial, step: Floats) -> StepPlan:
         """The plan for a step from here; ``before`` is the last iterate."""
         if before is None or not before.phi > here.phi:
             return cls(step)

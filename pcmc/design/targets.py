@@ -149,6 +149,11 @@ class Parameter:
                 validate.number(key, getattr(self, key), where=self.label)
 
     @property
+    def key(self) -> str:
+        """Its kind as in ``pcmc.surface.values.KINDS``."""
+        return f"{self.kind}s"
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The names as a tuple, also of a single one."""
         return (self.patch,) if isinstance(self.patch, str) else tuple(self.patch)
@@ -168,12 +173,11 @@ class Parameter:
 
     def value(self, surface: Surface) -> float:
         """Its value on a surface; of several patches that of the first."""
-        kind = f"{self.kind}s"
-        return float(part_values(surface, kind)[part_index(surface, kind, self.names[0])])
+        return float(part_values(surface, self.key)[part_index(surface, self.key, self.names[0])])
 
     def check(self, surface: Surface) -> None:
         """Refuse a patch or room that is not there, and a pressure that follows from a prescribed volume."""
-        parts = [part_index(surface, f"{self.kind}s", name) for name in self.names]
+        parts = [part_index(surface, self.key, name) for name in self.names]
         if self.kind == "pressure":
             refuse_varied_pressure(surface, parts)
 

@@ -19,8 +19,7 @@ import numpy.typing as npt
 from ..base.arrays import plain
 from ..base.errors import unknown
 from ..base.validate import checked_name
-from ..design import Parameter
-from ..margins.targets import Target
+from ..design import Parameter, Target
 from ..surface.values import KINDS
 
 TYPES = {"f": "<f4", "u": "<u4"}

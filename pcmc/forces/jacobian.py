@@ -40,26 +40,17 @@ from .second_variation import add_products, circle_curvatures
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Bᵀ Df[·] at one shape; made by ``linearise``.
-
-    Attributes
-    ----------
-    sheet_rows : (s,) vertices inside sheets whose normal may turn.
-    sheet_factor : (n,3) (∇E - n n·∇E) / |a| inside sheets, which Da is multiplied with; zero elsewhere.
-    curve_rows, curve_factor : (b,) numbers in ``classes.curve`` of the vertices whose curve may turn,
-        and -(t·∇E) / |c| there, which Dc is multiplied with.
-    circle_rows, circle_factor : (k,), (k,3) as ``circle_curvatures`` gives them.
-    """
+    """Bᵀ Df[·] at one shape; made by ``linearise``."""
 
     surface: Surface
     classes: VertexClasses
     space: MotionSpace
     X: Floats
-    sheet_rows: Ints
-    sheet_factor: Floats
-    curve_rows: Ints
-    curve_factor: Floats
-    circle_rows: Ints
+    sheet_rows: Ints  # (s,) vertices inside sheets whose normal may turn
+    sheet_factor: Floats  # (n,3) (∇E - n n·∇E) / |a| there, which Da is multiplied with; zero elsewhere
+    curve_rows: Ints  # (b,) numbers in ``classes.curve`` of the vertices whose curve may turn
+    curve_factor: Floats  # (b,) -(t·∇E) / |c| there, which Dc is multiplied with
+    circle_rows: Ints  # (k,) and (k,3) as ``circle_curvatures`` gives them
     circle_factor: Floats
 
     def times(self, d: Floats) -> Floats:
@@ -80,56 +71,43 @@ def linearise(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Linearisation:
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
-    single = (classes.kind == SHEET) & (space.dimension == 1)
-    for _, along_line in surface.on_line:
-        single &= ~along_line
-    sheet_factor = _sheet_factor(surface, classes, single, space.basis, X, gradient)
-    slides = np.zeros(len(classes.curve), dtype=bool)
-    for _, mask in surface.sliding:
-        slides |= mask[classes.curve]
-    rows = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
-    chord = curve_chords(surface, classes, X)[rows]
-    for plane, mask in surface.sliding:
-        here = mask[classes.curve[rows]]
-        chord[here] = plane.along(chord[here])
+    freedom, axis = surface.admissible_at(X)
+    single = (classes.kind == SHEET) & (space.dimension == 1) & (freedom > 1)
+    sheet_factor, area_vector = np.zeros_like(X), vertex_area_vectors(X, classes.faces)[0]
+    _across_normals(area_vector, single, freedom, axis, space.basis, gradient, sheet_factor)
+    free = freedom[classes.curve]
+    rows = np.flatnonzero((space.dimension[classes.curve] == free - 1) & (free > 1))
+    chord, vertices = curve_chords(surface, classes, X)[rows], classes.curve[rows]
+    across = np.where((freedom == 2)[:, None], axis, 0.0)[vertices]
+    chord -= np.einsum("ij,ij->i", chord, across)[:, None] * across
     square = np.einsum("ij,ij->i", chord, chord)
-    along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
-    sheet_rows = np.flatnonzero(single)
-    turning = circle_curvatures(surface, space, X)
-    return Linearisation(
-        surface, classes, space, X, sheet_rows, sheet_factor, rows, -along / square, *turning
-    )
-
-
-def _sheet_factor(
-    surface: Surface, classes: VertexClasses, single: Bools, basis: Floats, X: Floats, gradient: Floats
-) -> Floats:
-    """``Linearisation.sheet_factor``; ``single`` (n,) are the vertices whose normal may turn."""
-    out = np.zeros_like(X)
-    area_vector = vertex_area_vectors(X, classes.faces)[0]
-    _across_normals(area_vector, single, basis, gradient, out)
-    for plane, mask in surface.sliding:
-        sliding = np.flatnonzero(single & mask)
-        if not len(sliding):
-            continue
-        length = np.linalg.norm(area_vector[sliding], axis=1)
-        normal = area_vector[sliding] / length[:, None]
-        shadow = np.linalg.norm(plane.along(normal), axis=1)
-        b, g = basis[sliding, 0], gradient[sliding]
-        rest = plane.along(g - np.einsum("ij,ij->i", g, b)[:, None] * b)
-        rest -= np.einsum("ij,ij->i", rest, normal)[:, None] * normal
-        out[sliding] = rest / (shadow * length)[:, None]
-    return out
+    along = np.einsum("ij,ij->i", chord, gradient[vertices])
+    sheets, circles = (np.flatnonzero(single), sheet_factor), circle_curvatures(surface, space, X)
+    return Linearisation(surface, classes, space, X, *sheets, rows, -along / square, *circles)
 
 
 @compiled
-def _across_normals(area_vector: Floats, chosen: Bools, basis: Floats, gradient: Floats, out: Floats) -> None:
+def _across_normals(
+    area_vector: Floats,
+    chosen: Bools,
+    freedom: Ints,
+    axis: Floats,
+    basis: Floats,
+    gradient: Floats,
+    out: Floats,
+) -> None:
+    """``Linearisation.sheet_factor``, where a plane lets the normal turn only along itself."""
     for v in range(len(area_vector)):
         if not chosen[v]:
             continue
-        n, g = vector(basis[v, 0]), point(gradient, v)
-        across = sub(g, scaled(dot(n, g), n))
-        accumulate(out, v, divided(across, norm(point(area_vector, v))))
+        b, g, length, shadow = vector(basis[v, 0]), point(gradient, v), norm(point(area_vector, v)), 1.0
+        rest = sub(g, scaled(dot(b, g), b))
+        if freedom[v] == 2:
+            a, n = point(axis, v), divided(point(area_vector, v), length)
+            rest = sub(rest, scaled(dot(rest, a), a))
+            rest = sub(rest, scaled(dot(rest, n), n))
+            shadow = norm(sub(n, scaled(dot(n, a), a)))
+        accumulate(out, v, divided(rest, shadow * length))
 
 
 @compiled

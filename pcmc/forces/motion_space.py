@@ -56,29 +56,17 @@ PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
 @dataclass(frozen=True, eq=False)
 class VertexClasses:
-    """The active faces, which exert forces, and the class of each vertex: both stay as vertices move.
+    """The active faces, which exert forces, and the class of each vertex: both stay as vertices move."""
 
-    Attributes
-    ----------
-    active : (m,) bool, faces with a tension or a pressure.
-    faces, patch_of_face : the active faces alone; those without pressure turned over where that gives
-        a sheet one side.
-    kind : (n,) SHEET, CURVE or POINT: how many edges end there at which active sheets meet, end, or
-        change tension, pressure or side.
-    curve, beside : (c,) vertices on a curve, and their neighbours along it (c,2).
-    idle : (n,) vertices of no active face.
-    level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
-    """
-
-    active: Bools
-    faces: Ints
+    active: Bools  # (m,) faces with a tension or a pressure
+    faces: Ints  # these alone; those without pressure turned over where that gives a sheet one side
     patch_of_face: Ints
     topology: Topology
-    kind: Ints
-    curve: Ints
-    beside: Ints
-    idle: Bools
-    level: Bools
+    kind: Ints  # (n,) SHEET, CURVE or POINT: by the edges at which sheets meet, end, or change law or side
+    curve: Ints  # (c,) vertices on a curve
+    beside: Ints  # (c,2) their neighbours along it
+    idle: Bools  # (n,) vertices of no active face
+    level: Bools  # (n,) curve vertices beside one that rests on Π: their tangent is taken along Π
 
     def mesh(self, surface: Surface) -> Mesh:
         """The active faces, with the tensions and pressures of a surface of these classes."""
@@ -86,18 +74,11 @@ class VertexClasses:
 
 
 class MotionSpace(NamedTuple):
-    """Orthonormal basis of the motion space at each vertex; an unknown is a component along one vector.
+    """Orthonormal basis of the motion space at each vertex; an unknown is a component along one vector."""
 
-    Attributes
-    ----------
-    basis : (n,3,3) float; basis[v, c] for c < dimension[v] are unit vectors, the rest zero.
-    dimension : (n,) int, 0 to 3.
-    start : (n+1,) int, the first unknown of each vertex; the last entry is the number of unknowns.
-    """
-
-    basis: Floats
-    dimension: Ints
-    start: Ints
+    basis: Floats  # (n,3,3) basis[v, c] for c < dimension[v] are unit vectors, the rest zero
+    dimension: Ints  # (n,) 0 to 3
+    start: Ints  # (n+1,) the first unknown of each vertex; the last entry is the number of unknowns
 
     @classmethod
     def of(cls, basis: Floats, dimension: Ints) -> MotionSpace:
@@ -152,7 +133,13 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     else:
         topo = topology(faces, alike, surface.n)
     if (topo.one_way_edge & ~topo.seam_edge).any():
-        turned = _against_the_others(topo) & ((surface.net_pressures == 0.0) & ~in_room)[patch]
+        # faces to turn over so that each sheet has one side; none of a sheet that has only one
+        flat, m = topo.edge_of_face.ravel(), len(faces)
+        smooth = (topo.valence == 2) & ~topo.seam_edge
+        hit = np.flatnonzero(smooth[flat])
+        one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
+        label = one_sided_copies(one, other, topo.one_way_edge[smooth], m)
+        turned = (label[:m] > label[m:]) & ((surface.net_pressures == 0.0) & ~in_room)[patch]
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         topo = topology(faces, alike, surface.n)
     faces.setflags(write=False)  # compiled loops then see one type of array
@@ -171,7 +158,10 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     kind = vertex_kind(links[:, 0], surface.n)
     shared = topo.fans > 1
     if pull is not None:
-        shared |= _pulled_unevenly(edges, pull[on_curve], surface.n)
+        least, most = np.full(surface.n, np.inf), np.zeros(surface.n)
+        np.minimum.at(least, edges, pull[on_curve, None])
+        np.maximum.at(most, edges, pull[on_curve, None])
+        shared |= least < most  # where curve edges of different line tension meet
     if crest is not None:
         shared[crest[:, 0]] = False
     kind[shared] = POINT
@@ -179,14 +169,6 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     level = np.zeros(surface.n, dtype=bool) if level is None else level
     return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level)
-
-
-def _pulled_unevenly(edges: Ints, pull: Floats, n: int) -> Bools:
-    """(n,) vertices at which curve edges (e,2) of different line tension (e,) meet."""
-    least, most = np.full(n, np.inf), np.zeros(n)
-    np.minimum.at(least, edges, pull[:, None])
-    np.maximum.at(most, edges, pull[:, None])
-    return least < most
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
@@ -266,17 +248,16 @@ def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
 
     With a weight, α + w z stands for α.
     """
-    faces = classes.faces
-    sheets = _norm_of_forces(X, faces, effective_tensions(surface, X, faces, classes.patch_of_face))
-    if not surface.cables:
-        return sheets or 1.0
-    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) or 1.0
+    return _tension_forces(surface, X, classes.faces, classes.patch_of_face) or 1.0
 
 
 def tension_forces(surface: Surface) -> float:
     """The same norm for all triangles and cables of a surface, force; 0 without tension."""
-    X, F, patch = surface.vertices, surface.faces, surface.patch_of_face
-    sheets = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
+    return _tension_forces(surface, surface.vertices, surface.faces, surface.patch_of_face)
+
+
+def _tension_forces(surface: Surface, X: Floats, F: Ints, patch: Ints) -> float:
+    sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
     return sqrt(sheets**2 + squared_cable_forces(surface).sum()) if surface.cables else sheets
 
 
@@ -301,16 +282,6 @@ def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
         for d in range(3):
             out[0, v, d], out[1, v, d] = first[d], second[d]
     return out[0], out[1]
-
-
-def _against_the_others(topo: Topology) -> Bools:
-    """(m,) faces to turn over so that each sheet has one side; none of a sheet that has only one."""
-    flat, m = topo.edge_of_face.ravel(), len(topo.faces)
-    smooth = (topo.valence == 2) & ~topo.seam_edge
-    hit = np.flatnonzero(smooth[flat])
-    one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
-    label = one_sided_copies(one, other, topo.one_way_edge[smooth], m)
-    return np.asarray(label[:m] > label[m:])
 
 
 @compiled

@@ -39,9 +39,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
     for name, values in content.scalars.items():
-        if len(values) == surface.n:
-            finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
-            data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
+        finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
+        data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
     turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     place = np.eye(4)
     place[:3, 3] = file_origin(turned, surface.size)

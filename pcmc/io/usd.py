@@ -46,8 +46,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     middle = file_origin(surface.vertices, surface.size)
     if middle.any():
         roof.AddTranslateOp().Set(tuple(middle.tolist()))
-    at_vertices = {SUPPORT: support_of(surface).astype(float)}
-    at_vertices |= {name: values for name, values in content.scalars.items() if len(values) == surface.n}
+    at_vertices = {SUPPORT: support_of(surface).astype(float), **content.scalars}
     shades = linear(scalar_colors(content.scalars[content.colour])[0]) if content.colour else None
     for k, patch_color, used, faces in patch_meshes(surface):
         color = linear(patch_color)

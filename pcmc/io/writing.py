@@ -100,7 +100,7 @@ def write(
             walls = encode_walls(surface, shown)
     bare = getattr(solved, "bare", ())
     metadata = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
-    content = Content(metadata, scalars, colour, _values(certificate), walls, units, bare)
+    content = Content(metadata, carried, colour, _values(certificate), walls, units, bare)
     with writing(path), atomic_write(path) as temporary:
         try:
             for name in carried:

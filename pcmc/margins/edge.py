@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,36 +39,23 @@ OPEN = (MarginEnd.NONE, MarginEnd.MESH)  # ends that leave the margin open above
 class Margin:
     """How far a surface at rest is from the edge. ``print`` shows a sentence.
 
-    Attributes
-    ----------
-    what, more : what is varied, such as "pressure" or "tension of west", and whether it grows.
-    factor : times the present value up to which the equilibrium stays stable; NaN where that is 0.
-    values : at that end, by label, such as {"pressure of roof": 1.43}, in units of each.
-    bar : how far the limit of ``factor`` (where it is NaN: of the value) on finer and finer meshes may be
-        from it. From two meshes it is an estimate; infinite from one, and where the meshes end differently.
-    limit, limit_bar : the extrapolated number and its bar; NaN and infinite without a limit in sight.
-    ends_by : what ends it. With ``NONE`` and ``MESH`` the margin is at least this.
-    detail : what else is to be known: ridges that come to rest on the way, the finer mesh, symmetry.
-    surface : at the end.
-    mode : (n,3) the motion in which it leaves the equilibrium; (0,3) where there is none.
-    where : what moves most in it, such as "'north' inflates"; empty without a mode.
-    index : of the surface given. A saddle is followed until it has more ways down.
+    A bar is an estimate from two meshes; infinite from one, and where the meshes end differently.
     """
 
-    what: str
-    more: bool
-    factor: float
-    values: Mapping[str, float]
-    bar: float
-    limit: float
+    what: str  # what is varied, such as "pressure" or "tension of west"
+    more: bool  # whether it grows
+    factor: float  # times the present value up to which the equilibrium stays stable; NaN where that is 0
+    values: Mapping[str, float]  # at that end, by label, such as {"pressure of roof": 1.43}, in units of each
+    bar: float  # how far the limit of ``factor`` (where that is NaN: of the value) may be on finer meshes
+    limit: float  # the number extrapolated to ever finer meshes; NaN without a limit in sight
     limit_bar: float
-    ends_by: MarginEnd
-    detail: str
-    surface: Surface = field(repr=False)
-    mode: Floats = field(repr=False)
-    where: str
-    index: int
-    dimension: str = ""
+    ends_by: MarginEnd  # what ends it; with NONE and MESH the margin is at least this
+    detail: str  # what else is to be known: ridges that come to rest on the way, the finer mesh, symmetry
+    surface: Surface = field(repr=False)  # at the end
+    mode: Floats = field(repr=False)  # (n,3) the motion in which it leaves the equilibrium; (0,3) without one
+    where: str  # what moves most in it, such as "'north' inflates"; empty without a mode
+    index: int  # of the surface given; a saddle is followed until it has more ways down
+    dimension: str = ""  # of the values, as a name of ``Units``
 
     @property
     def value(self) -> float:
@@ -164,13 +152,19 @@ def margin(
     if index is None:
         message = f"margin: the surface is not at rest, so it has none ({certificate.verdict.value})"
         raise SurfaceError(message, what="surface", found=certificate.residual)
-    ends, notes = [find_end(surface, varied, index, most, callback)], list[str]()
-    if ends[0].ends_by is MarginEnd.MESH:
-        notes = [only_coarse(ends[0].surface, standing_part(ends[0].surface).walls.pinchable)]
-    if meshes > 1 and ends[0].ends_by is not MarginEnd.NONE:
-        finer, note = _on_finer_meshes(surface, varied, index, most, meshes, corners, callback)
-        ends, notes = [*ends, *finer], [*notes, note]
-    end, unit = ends[0], varied.unit or 1.0
+    find = partial(find_end, varied=varied, index=index, most=most, callback=callback)
+    end, unit, notes = find(surface), varied.unit or 1.0, list[str]()
+    ends = [end]
+    if end.ends_by is MarginEnd.MESH:
+        notes = [only_coarse(end.surface, standing_part(end.surface).walls.pinchable)]
+    if meshes > 1 and end.ends_by is not MarginEnd.NONE:
+        try:
+            check = check_mesh(surface, meshes, corners=corners, callback=callback)
+            ends += map(find, check.surfaces[1:] if check.persists else ())
+            doubt = "" if check.persists else f"the mesh check finds that the roof {check.verdict.value}"
+        except PcmcError as error:
+            ends, doubt = ends[:1], str(error)
+        notes.append(f"no bar: {doubt}" if doubt else _shown(ends[1:], unit))
     numbers = np.array([[unit * one.factor] for one in ends])
     alike = {one.ends_by in OPEN for one in ends} == {False}
     bars = extrapolate(numbers if alike else numbers[:1], np.array([EVENT_ACCURACY * abs(numbers[0, 0])]))
@@ -200,25 +194,9 @@ def margin(
     )
 
 
-def _on_finer_meshes(
-    surface: Surface,
-    varied: Varied,
-    index: int,
-    most: float,
-    meshes: int,
-    corners: npt.ArrayLike,
-    callback: Callback | None,
-) -> tuple[list[End], str]:
-    """The ends on finer meshes, and what is to be known about these; without ends where one is lost."""
-    try:
-        check = check_mesh(surface, meshes, corners=corners, callback=callback)
-        if not check.persists:
-            return [], f"no bar: the mesh check finds that the roof {check.verdict.value}"
-        ends = [find_end(finer, varied, index, most, callback) for finer in check.surfaces[1:]]
-    except PcmcError as error:
-        return [], f"no bar: {error}"
-    unit = varied.unit or 1.0
-    return ends, ", ".join(
+def _shown(ends: list[End], unit: float) -> str:
+    """The ends on finer meshes in words."""
+    return ", ".join(
         f"on {end.surface.m} triangles {unit * end.factor:.4g} ({end.ends_by.value.partition(':')[0]})"
         for end in ends
     )

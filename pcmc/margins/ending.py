@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..base.arrays import Floats
 from ..certificate import Verdict
 from ..continuation import Branch, Ending, follow
-from ..continuation.switching import ALONG
+from ..continuation.branch_point import ALONG
 from ..forces.triangles import compressed, effective_tensions
 from ..meshing.quality import triangle_quality
 from ..solvers import solve
@@ -38,23 +38,14 @@ class MarginEnd(Enum):
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The end of stability on one mesh.
-
-    Attributes
-    ----------
-    ends_by, factor : what ends it, at which λ.
-    surface : there.
-    motion : (n,3) the change of the surface on the last step before; zeros where the mesh changed on it.
-    contacts : λ at which ridges come to rest or lift off before.
-    detail : the last difficulty of a branch that was lost.
-    """
+    """The end of stability on one mesh."""
 
     ends_by: MarginEnd
-    factor: float
-    surface: Surface
-    motion: Floats
-    contacts: tuple[float, ...] = ()
-    detail: str = ""
+    factor: float  # λ there
+    surface: Surface  # there
+    motion: Floats  # (n,3) the change of the surface on the last step before; zeros where the mesh changed
+    contacts: tuple[float, ...] = ()  # λ at which ridges come to rest or lift off before
+    detail: str = ""  # the last difficulty of a branch that was lost
 
 
 def find_end(
@@ -68,32 +59,41 @@ def find_end(
     sense, contacts = (1.0 if varied.more else -1.0), list[float]()
     branch, step = _follow(surface, varied, index, most, callback, LARGEST), LARGEST
     while True:
-        events, last = branch.events, branch.points.arclength.iloc[-1]
-        before = branch.points.arclength.iloc[max(len(branch.points) - 2, 0)]
+        events, end = branch.events, branch.points.arclength.iloc[-1]
+        begin = branch.points.arclength.iloc[max(len(branch.points) - 2, 0)]
         touches = events.kind == "contact"
-        contacts += events.parameter[touches & (events.arclength <= before)].tolist()
+        contacts += events.parameter[touches & (events.arclength <= begin)].tolist()
         ended = events[(events.kind == "fold") | ((events.kind == "index") & (events.index_after > index))]
-        unclear = (touches & (events.arclength > before)).any() and len(ended)
+        unclear = (touches & (events.arclength > begin)).any() and len(ended)
         if not unclear or step <= FINEST:
             break
-        step = SHORTER * min(last - before, step)
+        step = SHORTER * min(end - begin, step)
         branch = _follow(branch.surfaces[len(branch.points) - 2], varied, index, most, callback, step)
-    squeezed = _compression(branch)
-    detail = ""
+    squeezed, there, detail = _compression(branch), branch.last, ""
     if squeezed is not None and (ended.empty or sense * (squeezed - ended.parameter.iloc[0]) <= 0.0):
-        kind, factor, there = MarginEnd.COMPRESSION, squeezed, branch.last
+        kind, factor = MarginEnd.COMPRESSION, squeezed
     elif len(ended):
         row = int(ended.index[0])
-        factor, there = float(events.parameter[row]), branch.event_surfaces[row]
-        kind = _kind(events, row)
+        event: Any = events.loc[row]
+        factor, there = float(event.parameter), branch.event_surfaces[row]
+        touched = (touches & (events.arclength == event.arclength)).any()
+        kind = MarginEnd.CONTACT if touched else MarginEnd.BIFURCATION
+        if event.kind == "fold" or event.along_branch >= ALONG:
+            kind = MarginEnd.FOLD
     elif branch.ending is Ending.REACHED:
-        kind, factor, there = MarginEnd.NONE, float(branch.points.parameter.iloc[-1]), branch.last
+        kind, factor = MarginEnd.NONE, float(branch.points.parameter.iloc[-1])
     else:
-        factor, there = float(branch.points.parameter.iloc[-1]), branch.last
-        kind, detail = _lost(branch, varied, factor), branch.detail
+        factor, detail = float(branch.points.parameter.iloc[-1]), branch.detail
+        # a solve a little beyond its last point tells what a branch that was lost ends by
+        beyond = varied.direction.line(there).surface_at(there, factor + sense * BEYOND * max(factor, 1.0))
+        down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
+        kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
             detail += f" near {_worst_place(there)}"
-    return End(kind, factor, there, _motion(branch), tuple(contacts), detail)
+    last = branch.last.vertices
+    before = branch.surfaces.get(len(branch.points) - 2, branch.last).vertices
+    motion = last - before if before.shape == last.shape else np.zeros_like(last)
+    return End(kind, factor, there, motion, tuple(contacts), detail)
 
 
 def _follow(
@@ -118,23 +118,6 @@ def _follow(
     return branch
 
 
-def _kind(events: pd.DataFrame, row: int) -> MarginEnd:
-    """What the event is that ends stability."""
-    event = events.loc[row]
-    if event.kind == "fold" or event.along_branch >= ALONG:
-        return MarginEnd.FOLD
-    touches = (events.kind == "contact") & (events.arclength == event.arclength)
-    return MarginEnd.CONTACT if touches.any() else MarginEnd.BIFURCATION
-
-
-def _lost(branch: Branch, varied: Varied, factor: float) -> MarginEnd:
-    """What a branch that was lost ends by: a solve a little beyond its last point tells."""
-    change = (BEYOND if varied.more else -BEYOND) * max(factor, 1.0)
-    beyond = varied.direction.line(branch.last).surface_at(branch.last, factor + change)
-    down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
-    return MarginEnd.WALL_DOWN if down else MarginEnd.MESH
-
-
 def _worst_place(surface: Surface) -> str:
     """Where the worst triangle of the roof is, walls left out as their triangles may vanish."""
     faces = surface.faces[surface.roof[surface.patch_of_face]]
@@ -152,12 +135,3 @@ def _compression(branch: Branch) -> float | None:
         for s in surfaces
     ]
     return float(np.interp(0.0, least[::-1], parameters[::-1]))
-
-
-def _motion(branch: Branch) -> Floats:
-    """(n,3) the change of the surface on the last step; zeros where the mesh changed on it."""
-    last = branch.last.vertices
-    before = branch.surfaces.get(len(branch.points) - 2)
-    if before is None or before.vertices.shape != last.shape:
-        return np.zeros_like(last)
-    return last - before.vertices

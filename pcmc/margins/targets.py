@@ -18,16 +18,12 @@ import numpy as np
 from ..base.errors import OptionError
 from ..certificate import certify
 from ..certificate.certificate import TOLERANCE
-from ..design import Target, meet, sensitivities  # from here they know the margin
-from ..design.measurement import Measurement
-from ..design.quantities import MEASURES, Measure
+from ..design.quantities import Measurement
 from ..forces.parameters import gradient_by
 from ..surface import Surface
 from .edge import Margin, margin
 from .ending import MarginEnd
 from .varied import Varied
-
-__all__ = ["Target", "meet", "sensitivities"]
 
 
 @lru_cache(maxsize=4)
@@ -38,7 +34,7 @@ def _known(surface: Surface, what: str) -> Margin | None:
     return margin(surface, what, meshes=1, certificate=certificate) if at_rest else None
 
 
-def _margin(surface: Surface, of: str | None) -> Measurement:
+def measured_margin(surface: Surface, of: str | None) -> Measurement:
     """The factor of ``pcmc.margin``, on this mesh alone; constant without an end, NaN if not at rest."""
     what = of or "pressure"
     if surface.rooms:
@@ -66,8 +62,5 @@ def _margin(surface: Surface, of: str | None) -> Measurement:
     for kind, names in {**named, "cable": [cable.name for cable in end.cables]}.items():
         across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
         multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
-        slopes[kind] = -across * np.where(multiplied, found.factor, 1.0) / along
-    return Measurement(found.factor, still, slopes.pop("tension"), slopes.pop("pressure"), slopes)
-
-
-MEASURES["margin"] = Measure(_margin, lambda surface: 1.0)
+        slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along
+    return Measurement(found.factor, still, slopes)

@@ -15,29 +15,18 @@ from ..continuation import Direction
 from ..design import Parameter
 from ..surface import Surface
 
-TOWARDS = ("more", "less")
-
 Part = tuple[str, str]  # the kind of a parameter, such as "tension", and the name of what it belongs to
 
 
 @dataclass(frozen=True, eq=False)
 class Varied:
-    """Numbers that change together: in proportion to λ, which is 1 on the surface; where all are 0, to λ.
+    """Numbers that change together: in proportion to λ, which is 1 on the surface; where all are 0, to λ."""
 
-    Attributes
-    ----------
-    what : in words, such as "pressure" or "tension of west".
-    parts : the kind and the name of each.
-    values : (k,) the present values.
-    more : whether they grow on the way to the edge.
-    unit : what λ = 1 means for each where all are 0 now; 0 where they are not.
-    """
-
-    what: str
+    what: str  # in words, such as "pressure" or "tension of west"
     parts: tuple[Part, ...]
-    values: Floats
-    more: bool
-    unit: float = 0.0
+    values: Floats  # (k,) the present values
+    more: bool  # whether they grow on the way to the edge
+    unit: float = 0.0  # what λ = 1 means for each where all are 0 now; 0 where they are not
 
     @classmethod
     def of(cls, surface: Surface, what: str, towards: str | None = None) -> Varied:
@@ -45,7 +34,7 @@ class Varied:
         known = named(surface)
         parts = known[validate.choice("what", what, [*known])]
         if towards is not None:
-            validate.choice("towards", towards, TOWARDS)
+            validate.choice("towards", towards, ("more", "less"))
         walls = {patch.name for patch, wall in zip(surface.patches, surface.walls, strict=True) if wall}
         pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
         more = not pulls if towards is None else towards == "more"

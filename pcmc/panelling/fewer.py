@@ -86,18 +86,14 @@ def fewer_families(
 
     Parameters
     ----------
-    surface, tolerance, mirror_images, walls, anyway : as in ``panels``.
+    surface, tolerance, mirror_images, walls, anyway : as in ``panels``, with its errors.
     change : the most that a panel's corner may leave the shape before, length, > 0. Sliding along a curved
         shape takes a little of it: the shape before has flat triangles.
-    at_rest : whether each round ends with a solve. The result is then as certified as the surface was, and
-        the motions are along the shape. Without it, vertices also move across the shape: there are fewer
-        families, and the certificate shows the forces and curvature errors left.
+    at_rest : whether each round ends with a solve. The result is then as certified as the surface was.
+        Without it, vertices also move across the shape: there are fewer families, and the certificate
+        shows the forces and curvature errors left.
     rounds : the most that are made. It ends earlier where no way to join families helps.
     callback : called after each round with its number and the number of families so far.
-
-    Raises
-    ------
-    SurfaceError : the surface is not certified, or has no panels.
 
     Examples
     --------

@@ -6,7 +6,8 @@
 do not say. May import ``io`` and the rooms below it.
 """
 
-from ..curves.curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
+from ..curves.curve_data import curve
+from ..curves.curves import Curve, arc, bezier, circle, ellipse, join, polyline
 from ..meshing.labelled import surface_from_labels
 from ..meshing.walls import add_walls
 from .parts import CableLine, Divider, Hole, PatchSpec

@@ -15,12 +15,12 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
 from ..curves.pieces import point_text
 from ..surface.topology import components
-from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, overlap
+from .lines import SNAP, Cut, Kind, Line, LineTree, check_holes, check_line, overlap
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Vertices (k,) along a line from one meeting or corner to the next; first = last if it is closed.
+    """Vertices (k,) along a line from one cut or corner to the next; first = last if it is closed.
 
     ``at`` (k,) are their parameters on the line, where those of a closed one go on beyond its end.
     """
@@ -69,23 +69,23 @@ def arrange(
     for line in lines:
         check_line(line)
     check_holes(lines)
-    meetings: list[Places] = []
+    cuts: list[Cut] = []
     for k, line in enumerate(lines):
         ends = [] if line.curve.closed else [0.0, float(len(line.curve.pieces))]
-        meetings += [[(k, t)] for t in (*ends, *line.curve.corners.tolist())]
+        cuts += [[(k, t)] for t in (*ends, *line.curve.corners.tolist())]
     tree = LineTree(lines)
-    meetings += [*tree.crossings(), *_ends(tree, snap)]
+    cuts += [*tree.crossings(), *_ends(tree, snap)]
     xy = required_points[:, :2]
     passing = tree.at(xy, snap)
     for point, places, within in zip(xy, passing, shapely.contains_xy(tree.area, xy), strict=True):
         if not places and not within:
             problem = f"the support or point at {point_text(point)} is outside the plan or in a hole"
             raise PlanError(problem, what="supports", where=tuple(point.tolist()))
-    meetings += [*tree.at(cut_points, snap), *passing]
-    nodes, of_meeting, stops = _nodes(lines, meetings, snap)
-    chains, points = _chains(lines, nodes, stops, edge_length)
+    cuts += [*tree.at(cut_points, snap), *passing]
+    nodes, of_cut, along_lines = _nodes(lines, cuts, snap)
+    chains, points = _chains(lines, nodes, along_lines, edge_length)
     chains = _inside_plan(tree, chains, points[:, :2], edge_length)
-    vertex = of_meeting[len(meetings) - len(passing) :]
+    vertex = of_cut[len(cuts) - len(passing) :]
     alone = np.array([not places for places in passing], dtype=bool)
     vertex[alone] = len(points) + np.arange(alone.sum())
     points = np.concatenate([points, required_points[alone]])
@@ -103,7 +103,7 @@ def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, 
     return [(point.x, point.y) for point in points]
 
 
-def _ends(tree: LineTree, snap: float) -> Iterator[Places]:
+def _ends(tree: LineTree, snap: float) -> Iterator[Cut]:
     """Dividers end on other lines or outside the plan; supports may end anywhere."""
     loose = [k for k, line in enumerate(tree.lines) if not (line.curve.closed or line.bounds)]
     ends = [(k, t) for k in loose for t in (0.0, float(len(tree.lines[k].curve.pieces)))]
@@ -120,58 +120,56 @@ def _ends(tree: LineTree, snap: float) -> Iterator[Places]:
         yield [end, *passing]
 
 
-Stops = list[tuple[float, int]]  # parameters and nodes along a line
+LineNodes = list[tuple[float, int]]  # parameters and nodes along a line
 
 
-def _nodes(
-    lines: Sequence[Line], meetings: Sequence[Places], snap: float
-) -> tuple[Floats, Ints, list[Stops]]:
+def _nodes(lines: Sequence[Line], cuts: Sequence[Cut], snap: float) -> tuple[Floats, Ints, list[LineNodes]]:
     """The vertices where lines meet, one for those nearer to each other than ``snap``.
 
-    Returns their points (k,3) with heights, the vertex of each meeting, -1 for one without places, and the
-    stops along each line, no vertex twice in a row; a closed line returns to its first.
+    Returns their points (k,3) with heights, the vertex of each cut, -1 for one at no line, and the
+    nodes along each line, no vertex twice in a row; a closed line returns to its first.
     """
-    line = np.array([i for places in meetings for i, _ in places], dtype=np.int64)
-    t = np.array([s for places in meetings for _, s in places])
-    of_meeting = np.full(len(meetings), -1)
+    line = np.array([i for cut in cuts for i, _ in cut], dtype=np.int64)
+    t = np.array([s for cut in cuts for _, s in cut])
+    of_cut = np.full(len(cuts), -1)
     if not len(line):
-        return np.zeros((0, 3)), of_meeting, [[] for _ in lines]
+        return np.zeros((0, 3)), of_cut, [[] for _ in lines]
     where = np.empty((len(line), 3))
     for number in np.unique(line):
         where[line == number] = lines[number].curve.at(t[line == number])
     near = cKDTree(where[:, :2]).query_pairs(snap, output_type="ndarray")
-    count = np.array([len(places) for places in meetings])
+    count = np.array([len(cut) for cut in cuts])
     first = np.cumsum(count) - count
     same = np.stack([np.repeat(first, count), np.arange(len(line))], axis=1)
     node = components(np.concatenate([near, same]), len(line))
-    of_meeting[count > 0] = node[first[count > 0]]
+    of_cut[count > 0] = node[first[count > 0]]
     kind = np.array([lines[i].kind for i in line])
     order = np.lexsort((kind, node))
     leader = order[np.searchsorted(node[order], np.arange(node.max() + 1))]
     points = where[leader]
     points[kind[leader] == Kind.DIVIDER, 2] = np.nan
-    stops: list[Stops] = [[] for _ in lines]
+    along_lines: list[LineNodes] = [[] for _ in lines]
     for k in np.lexsort((node, t)).tolist():
-        along = stops[line[k]]
+        along = along_lines[line[k]]
         if not along or along[-1][1] != node[k]:
             along.append((float(t[k]), int(node[k])))
-    for one, along in zip(lines, stops, strict=True):
+    for one, along in zip(lines, along_lines, strict=True):
         if one.curve.closed and along:
             if len(along) > 1 and along[0][1] == along[-1][1]:
                 along.pop()
             along.append((along[0][0] + len(one.curve.pieces), along[0][1]))
-    return points, of_meeting, stops
+    return points, of_cut, along_lines
 
 
 def _chains(
-    lines: Sequence[Line], nodes: Floats, stops: Sequence[Stops], edge_length: float
+    lines: Sequence[Line], nodes: Floats, along_lines: Sequence[LineNodes], edge_length: float
 ) -> tuple[list[Chain], Floats]:
     """Each line's chains from node to node; the points (n,3) of the nodes, and of the chains between."""
     chains: list[Chain] = []
     new, n = [nodes], len(nodes)
     given = set(np.flatnonzero(~np.isnan(nodes[:, 2])).tolist())
     direct: set[tuple[int, int]] = set()
-    for number, (one, along) in enumerate(zip(lines, stops, strict=True)):
+    for number, (one, along) in enumerate(zip(lines, along_lines, strict=True)):
         curve, divides = one.curve, one.kind is Kind.DIVIDER
         known = [1.0, 1.0, np.nan if divides else 1.0]
         if not along:  # a closed line that meets nothing

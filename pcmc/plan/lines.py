@@ -23,7 +23,7 @@ BLOCK = 64  # chords of a line that are looked up at once
 TINY = 1e-300  # no chord without length divides by zero
 MOST_CROSSINGS = 20_000  # of lines
 
-Places = list[tuple[int, float]]  # numbers of lines, and the parameter on each, of one vertex
+Cut = list[tuple[int, float]]  # numbers of lines, and the parameter on each, of one vertex
 
 
 class Kind(IntEnum):
@@ -113,7 +113,7 @@ class LineTree:
         self.tree = shapely.STRtree(self.chords)
         self.sag = max(0.0 if line.straight else SAG * line.shape.length for line in lines)
 
-    def at(self, xy: Floats, snap: float) -> list[Places]:
+    def at(self, xy: Floats, snap: float) -> list[Cut]:
         """For each point (n,2) the lines that pass through it, to ``snap``, with their parameters there."""
         points = shapely.points(xy)
         point, chord = self.tree.query(points, predicate="dwithin", distance=snap + self.sag)
@@ -121,7 +121,7 @@ class LineTree:
         pair = point[near] * len(self.lines) + self.owner[chord[near]]
         first = near[np.unique(pair, return_index=True)[1]]  # the nearest chord of each line
         point, owner, chord = point[first], self.owner[chord[first]], self.chord[chord[first]]
-        passing: list[Places] = [[] for _ in xy]
+        passing: list[Cut] = [[] for _ in xy]
         t, distance = np.empty((2, len(point)))
         for number in np.unique(owner):
             own = owner == number
@@ -138,7 +138,7 @@ class LineTree:
         shapely.prepare(area)
         return area
 
-    def crossings(self) -> list[Places]:
+    def crossings(self) -> list[Cut]:
         """The places where two lines cross that are not both of the boundary."""
         bounds = np.array([line.bounds for line in self.lines])[self.owner]
         own = np.flatnonzero(~bounds)

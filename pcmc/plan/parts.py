@@ -11,7 +11,8 @@ import numpy as np
 from ..base import validate
 from ..base.errors import OptionError, PcmcError, PlanError, unknown
 from ..base.validate import checked_name
-from ..curves.curves import CURVES, Curve, curve
+from ..curves.curve_data import CURVES, curve
+from ..curves.curves import Curve
 from ..meshing.walls import EDGES
 from ..surface import Plane
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from .walls import most_in_corners
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
 ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
-ROOM = 1.6  # tension, over the least at which a roof over the plan exists
+ABOVE_LEAST = 1.6  # a first tension, over the least at which a roof over the plan exists
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
 MANY, ROUGH = 4000, 1e-5  # curves of more points are simplified, by so much of their length
@@ -124,11 +124,10 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     parts = parts_of(drawing)
     specs = _patches(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
-    for key in ("pressure", "weight"):  # of all patches, which have their own tensions here
-        if key in values:
-            common = values.pop(key)
-            for spec in specs:
-                spec.setdefault(key, common)
+    common = {"pressure": 0.0} if sail else {}  # an edge that nothing holds closes no space for a pressure
+    common |= {key: values.pop(key) for key in ("pressure", "weight") if key in values}
+    for spec, (key, value) in product(specs, common.items()):
+        spec.setdefault(key, value)
     tensions = [spec["tension"] for spec in specs]
     edge_length = values.setdefault("edge_length", _edge_length(parts, drawing))
     outline = Line("the outline", Kind.OUTLINE, drawing.outline)
@@ -157,8 +156,6 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
             entry.setdefault("cable", cable)
     patches: dict[str, dict[str, Any]] = {}
     for spec in specs:
-        if sail:  # an edge that nothing holds closes no space for a pressure
-            spec.setdefault("pressure", 0.0)
         same = patches.setdefault(spec.pop("name"), spec)
         if same is not spec:  # several parts of one name are one patch
             same["at"] = [*_as_points(same["at"]), *_as_points(spec["at"])]
@@ -207,7 +204,7 @@ def _patches(
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
     least = least_tension(_roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE))
-    default = float(f"{ROOM * least:.2g}") if tension is None else tension
+    default = float(f"{ABOVE_LEAST * least:.2g}") if tension is None else tension
     labels, specs = _labels(parts, drawing), []
     for k, part in enumerate(parts):
         point = [_rounded(value, part.radius) for value in part.middle]

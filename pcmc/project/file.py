@@ -246,8 +246,7 @@ def _output(table: Mapping[str, Any]) -> Output:
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], list[Parameter]]:
     """The targets of a project, and the parameters that may vary."""
-    from ..design import Parameter
-    from ..margins.targets import Target
+    from ..design import Parameter, Target
 
     if "tolerance" in table:
         validate.positive("targets.tolerance", table["tolerance"])

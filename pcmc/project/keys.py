@@ -14,7 +14,7 @@ from ..accuracy.adaptive import ACCURACY_OF
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
-from ..curves.curves import CURVES
+from ..curves.curve_data import CURVES
 from ..drawings import FORMATS
 from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
@@ -262,11 +262,10 @@ def solve_section(method: str) -> Section:
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-    from ..design import Parameter  # needed by projects with targets only
+    from ..design import Parameter, Target  # needed by projects with targets only
     from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
     from ..design.targets import SHORT
-    from ..margins.targets import Target
 
     wanted = _of_class(Target, quantity=(*MEASURES, *SHORT))
     changing = _of_class(Parameter, kind=KINDS_OF_PARAMETER)

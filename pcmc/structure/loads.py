@@ -28,16 +28,10 @@ class Step:
 
 @dataclass(frozen=True)
 class SelfWeight:
-    """The weight of the elements, ρ t g per area, against Π's normal; it stays in all later steps.
+    """The weight of the elements, ρ t g per area, against Π's normal; it stays in all later steps."""
 
-    Parameters
-    ----------
-    gravity : g > 0, length/time²; by default 9.81 m/s² in the model's unit of length, and seconds.
-    name : of its step.
-    """
-
-    gravity: float | None = None
-    name: str = "self-weight"
+    gravity: float | None = None  # g > 0, length/time²; by default 9.81 m/s² in the model's unit of length
+    name: str = "self-weight"  # of its step
 
     def __post_init__(self) -> None:
         if self.gravity is not None:
@@ -54,17 +48,11 @@ class Snow:
     """A load per plan area, against Π's normal, besides the snow that the form was found under.
 
     It keeps its size and direction while the surface deforms.
-
-    Parameters
-    ----------
-    load : s, force per area of the plan; negative for a lift.
-    patches : names of the patches that carry it; by default all that are not walls.
-    name : of its step.
     """
 
-    load: float
-    patches: Sequence[str] = ()
-    name: str = "snow"
+    load: float  # s, force per area of the plan; negative for a lift
+    patches: Sequence[str] = ()  # names of those that carry it; by default all that are not walls
+    name: str = "snow"  # of its step
 
     def __post_init__(self) -> None:
         load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
@@ -94,15 +82,12 @@ class Snow:
 class Wind:
     """Pressures of wind zones, which are patches. They add to the patches' own pressures.
 
-    Parameters
-    ----------
-    pressures : force per area by patch name, along the patch's positive normal as ``Patch.pressure``: above
-        0 for suction on a roof. The load follows the normal while the surface deforms.
-    name : of its step.
+    They act along the patch's positive normal as ``Patch.pressure``, above 0 for suction on a roof, and
+    follow it while the surface deforms.
     """
 
-    pressures: Mapping[str, float]
-    name: str = "wind"
+    pressures: Mapping[str, float]  # force per area by patch name
+    name: str = "wind"  # of its step
 
     def __post_init__(self) -> None:
         if not isinstance(self.pressures, Mapping) or not self.pressures:

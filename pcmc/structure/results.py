@@ -26,24 +26,16 @@ FAR = 1e-4  # of the size: a node farther from its vertex belongs to another sur
 class StepResults:
     """The end of one step of the analysis. Vertices and faces that are not in the model have NaN.
 
-    Attributes
-    ----------
-    name : of the step.
-    model : the structural model.
-    displacements : (n,3) length.
-    reactions : (n,3) forces of the supports on the structure; zero at vertices that nothing holds.
-    stresses : (m,3,3) stress tensors in the axes of space, force/area, the mean over the thickness. From an
-        .frd file they are the mean of a triangle's corners, where all elements around have been averaged,
-        those of other patches too.
-    cable_tensions : the tension (k,) of the edges of each cable, force, by its name; from a .dat file alone.
+    Stresses from an .frd file are the mean of a triangle's corners, where all elements around have been
+    averaged, those of other patches too.
     """
 
-    name: str
+    name: str  # of the step
     model: StructuralModel
-    displacements: Floats
-    reactions: Floats
-    stresses: Floats
-    cable_tensions: Mapping[str, Floats]
+    displacements: Floats  # (n,3) length
+    reactions: Floats  # (n,3) forces of the supports on the structure; zero at vertices that nothing holds
+    stresses: Floats  # (m,3,3) tensors in the axes of space, force/area, the mean over the thickness
+    cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force; from a .dat alone
 
     @cached_array
     def deflections(self) -> Floats:
@@ -78,14 +70,8 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     (a third of its triangles' pressures, its weight and snow) is added here, so that the reactions are those
     of ``pcmc.certify``.
 
-    Parameters
-    ----------
-    path : the file that ``ccx`` wrote for the model's input file; .dat has the stresses by element.
-    model : the structural model that was written.
-
-    Raises
-    ------
-    FileError : for a file that is missing, damaged, incomplete, or of another model.
+    ``path`` is what ``ccx`` wrote for the input file of the model; .dat has the stresses by element.
+    FileError for a file that is missing, damaged, incomplete, or of another model.
     """
     path = Path(path)
     if not isinstance(model, StructuralModel):

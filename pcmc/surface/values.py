@@ -9,15 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-
-if TYPE_CHECKING:
-    from .surface import Surface
 
 KINDS = {
     **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
@@ -30,7 +27,7 @@ ALIKE = 1e-12  # of the largest change of a pressure; smaller differences are ro
 SHARE = 0.3  # of the smaller tension: the wall's tension above the difference of its neighbours'
 
 
-def all_values(surface: Surface) -> dict[str, dict[str, float]]:
+def all_values(surface: Any) -> dict[str, dict[str, float]]:
     """The values of a Surface by kind and name, as ``Surface.retensioned`` takes them."""
     return {
         kind: {part.name: getattr(part, field) for part in getattr(surface, parts)}
@@ -38,13 +35,13 @@ def all_values(surface: Surface) -> dict[str, dict[str, float]]:
     }
 
 
-def part_values(surface: Surface, kind: str) -> Floats:
+def part_values(surface: Any, kind: str) -> Floats:
     """The values of one kind, in the order of the patches, cables or rooms."""
     parts, field = KINDS[kind]
     return np.array([getattr(part, field) for part in getattr(surface, parts)], dtype=float)
 
 
-def part_index(surface: Surface, kind: str, name: str) -> int:
+def part_index(surface: Any, kind: str, name: str) -> int:
     """Index of the patch, cable or room of this name that has a value of this kind."""
     parts = KINDS[kind][0]
     names = [part.name for part in getattr(surface, parts)]
@@ -67,7 +64,7 @@ def with_values(
     return tuple(replace(part, **changes[part.name]) if changes[part.name] else part for part in parts)
 
 
-def rates_of(surface: Surface, kind: str, by_name: Mapping[str, float]) -> Floats:
+def rates_of(surface: Any, kind: str, by_name: Mapping[str, float]) -> Floats:
     """The rates of change of the values of one kind, given by name; walls that are not named follow."""
     named = {part_index(surface, kind, name): rate for name, rate in by_name.items()}
     rates = np.zeros(len(getattr(surface, KINDS[kind][0])))
@@ -75,7 +72,7 @@ def rates_of(surface: Surface, kind: str, by_name: Mapping[str, float]) -> Float
     return rates + wall_changes(surface, rates, named) if kind in ("pressures", "snows") else rates
 
 
-def wall_changes(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:
+def wall_changes(surface: Any, change: Floats, named: Collection[int] = ()) -> Floats:
     """(k,) changes of the walls' pressures, or snow, that follow from those ``change`` (k,) of the patches'.
 
     The changes cancel along the edges where one wall meets two sheets. They are 0 for the walls in

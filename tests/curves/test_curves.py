@@ -6,7 +6,8 @@ from refusals import refused
 
 from pcmc import Plane
 from pcmc.base.errors import OptionError
-from pcmc.curves.curves import arc, bezier, circle, curve, join, polyline
+from pcmc.curves.curve_data import curve
+from pcmc.curves.curves import arc, bezier, circle, join, polyline
 from pcmc.curves.pieces import to_local, to_space
 
 

@@ -19,7 +19,7 @@ from pcmc.curves.curve_data import curve_data
 from pcmc.io.libraries import read_arrays
 from pcmc.plan import plan_from
 from pcmc.plan.drawing import read_drawing
-from pcmc.plan.proposal import ROOM, least_tension, proposed
+from pcmc.plan.proposal import ABOVE_LEAST, least_tension, proposed
 
 rhino3dm = pytest.importorskip("rhino3dm")
 shapely = pytest.importorskip("shapely")
@@ -231,7 +231,7 @@ def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():
     assert least_tension(barrel) == pytest.approx(1.0, rel=0.02)
     side = 1.0 / (2.0 + math.sqrt(math.pi))  # a unit square's Cheeger constant is 2 + √π
     assert least_tension(shapely.box(0, 0, 1, 1)) == pytest.approx(side, rel=1e-6)
-    assert ROOM > 1.0
+    assert ABOVE_LEAST > 1.0
 
 
 def test_the_reading_process_gives_plain_values(tmp_path):

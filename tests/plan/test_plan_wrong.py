@@ -10,7 +10,8 @@ import pytest
 from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
-from pcmc.curves.curves import circle, curve, polyline
+from pcmc.curves.curve_data import curve
+from pcmc.curves.curves import circle, polyline
 from pcmc.plan import PatchSpec, Plan, patch_names, plan_from
 from tests.plan.test_plan import BOX, vertices_of
 
