@@ -12,9 +12,8 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..surface import Surface
-from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import area_vectors
-from ..surface.sections import section
+from ..surface.sections import curves_by_kind, section
 from .sheet import (
     FORMATS,
     SCALES,

@@ -21,8 +21,8 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
-from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import bounding_size
+from ..surface.sections import curves_by_kind
 from .formats import Content
 from .libraries import load_library, read_arrays, require
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
@@ -103,7 +103,7 @@ def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str 
 def read(path: Path) -> MeshData:
     """Layers as patches; curves, surfaces and other objects are left out, with a note."""
     require("rhino3dm")
-    arrays = read_arrays("io/reading_surfaces.py", "rhino_arrays", path)
+    arrays = read_arrays("io/reading_scripts.py", "rhino_arrays", path)
     layers = arrays["layers"]
     X, corners, counts, named = [], [], [], []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}

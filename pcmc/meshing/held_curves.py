@@ -32,8 +32,6 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | N
         edges meet, the two that turn least go on into each other.
     corners : vertices that are corners in any case.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> angle = 2 * np.pi * np.arange(12) / 12
     >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
@@ -56,8 +54,6 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     middle: an error of first order, half of what the arcs over the next edge differ by, to the scale of the
     edges; where that has no two arcs, all of the rise. None where nothing moves: on circles and lines.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> angle = 2 * np.pi * np.arange(24) / 24
     >>> rim = np.stack([2 * np.cos(angle), np.sin(angle), 0 * angle], axis=1)

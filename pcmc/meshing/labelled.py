@@ -51,10 +51,8 @@ def surface_from_labels(
 
     Raises
     ------
-    OptionError
-        For an unknown name or option.
-    SurfaceError
-        If the arrays are no such mesh; names the first wrong index.
+    OptionError : an unknown name or option.
+    SurfaceError : the arrays are no such mesh; names the first wrong index.
 
     >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> s = surface_from_labels(square, [[0, 1, 2], [0, 3, 2]], ["a", "b"], tension=2.0)
@@ -112,11 +110,7 @@ def _by_name(value: Any, names: list[str], what: str) -> dict[str, float]:
 
 
 def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
-    """Faces oriented so that neighbours in a patch agree, and the patch faces outwards.
-
-    That is where its area projected along Π's normal, or in a closed mesh the volume seen from its centre,
-    is positive.
-    """
+    """Faces oriented alike in a patch, and outwards: its area along Π, or the volume, is positive."""
     m, n = len(F), len(X)
     edge, place = F[:, SIDES].reshape(-1, 2), np.repeat(patch, 3)
     pairs = twins((place * n + edge.min(axis=1)) * n + edge.max(axis=1))

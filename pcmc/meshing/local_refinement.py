@@ -31,8 +31,8 @@ def refine_near(
     """The same surface with finer triangles near points: half the edge length at half the distance.
 
     Level k of 1 … ``levels`` cuts all triangles within the distance r_k = radius 2^(1-k) of a point, as
-    ``refine_faces`` does. So the edges near the points are 2^-levels times as long as before, and a
-    level adds about the same number of triangles as the one before.
+    ``refine_faces`` does. So the edges there get 2^-levels times as long, and each level adds about as many
+    triangles as the one before.
 
     Parameters
     ----------
@@ -41,18 +41,12 @@ def refine_near(
     radius : distance up to which the first level cuts triangles, length.
     project : as in ``refine``: puts new fixed vertices (k,3) on a curved boundary.
 
-    Returns
-    -------
-    Surface
-        Vertex i keeps its number; patches, tensions and the plane stay.
+    Vertex i keeps its number; patches, tensions and the plane stay.
 
     Raises
     ------
-    OptionError
-        For points that are no finite (k,3) array, or wrong ``levels`` or ``radius``.
+    OptionError : the points are no finite (k,3) array, or ``levels`` or ``radius`` are wrong.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
@@ -94,8 +88,6 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     chosen : (m,) mask or indices of triangles.
     project : as in ``refine``: puts new fixed vertices (k,3) on a curved boundary.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))

@@ -54,10 +54,8 @@ def triangulate(
 
     Raises
     ------
-    OptionError
-        If ``edge_length`` is not positive, or the point of a hole is outside.
-    SurfaceError
-        If points coincide, if segments cross, or if they enclose no area.
+    OptionError : ``edge_length`` is not positive, or the point of a hole is outside.
+    SurfaceError : points coincide, segments cross, or they enclose no area.
 
     >>> corners = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2.0]])
     >>> sides = np.stack([np.arange(6), (np.arange(6) + 1) % 6], axis=1)

@@ -50,13 +50,9 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
 
     Raises
     ------
-    OptionError
-        If ``levels`` is not a whole number ≥ 0, or ``project`` returns another shape.
-    SurfaceError
-        If ``project`` degenerates a triangle.
+    OptionError : ``levels`` is not a whole number ≥ 0, or ``project`` returns another shape.
+    SurfaceError : ``project`` degenerates a triangle.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
@@ -71,11 +67,7 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
 
 
 def refinable(name: str, levels: object, triangles: int) -> int:
-    """The number of refinements, if so many triangles can be counted in 32 bits afterwards.
-
-    >>> refinable("levels", 3, 1000)
-    3
-    """
+    """The number of refinements, if so many triangles can be counted in 32 bits afterwards."""
     most = int(np.log2(validate.MOST / triangles) / 2.0)
     hint = f"each makes four times as many triangles of {triangles}"
     return validate.integer(name, levels, most=most, hint=hint)
@@ -101,10 +93,7 @@ def prolongation(surface: Surface) -> csr_array:
 
 
 def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
-    """(e,) masks of the edges whose midpoint is fixed, and of those whose midpoint slides on Π.
-
-    Of the fixed ones, those on no curve are a guess.
-    """
+    """(e,) the edges whose midpoint is fixed, a guess off the curves; and those where it slides on Π."""
     topo, (fixed, sliding) = surface.topology, surface.given_supports.fixed_and_sliding()
     start, end = topo.edges.T
     boundary = topo.boundary_edge
@@ -125,11 +114,7 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 
 
 def _last_edges(surface: Surface, inside: Bools, fixed: Bools) -> Bools:
-    """(e,) the edges by which lines of held edges ``inside`` (e,) a patch go straight on to the boundary.
-
-    At the end of a line this is the edge to a fixed vertex of the boundary that turns least, by ``CORNER`` at
-    most. A single vertex inside is no line, and ends none.
-    """
+    """(e,) the edges by which lines of held edges ``inside`` a patch go on to the boundary, turning least."""
     topo, X, more = surface.topology, surface.vertices, np.zeros(len(inside), dtype=bool)
     ends = np.bincount(topo.edges[inside].ravel(), minlength=surface.n) == 1
     before = np.zeros(surface.n, dtype=np.int64)

@@ -71,17 +71,12 @@ def remesh(
 
     Raises
     ------
-    MissingExtra
-        Without the library mmgpy.
-    OptionError
-        For lengths that are not positive, or that would make more than 20 million triangles; for a
+    MissingExtra : without the library mmgpy.
+    OptionError : for lengths that are not positive, or would make more than 20 million triangles; for a
         ``chord`` that edges of 0.3 ``edge_length``, the shortest, do not come near; if ``project`` returns
         another shape.
-    SurfaceError
-        When MMG gives up, or does not keep a curve.
+    SurfaceError : MMG gives up, or does not keep a curve.
 
-    Examples
-    --------
     >>> from pcmc.plan import Plan
     >>> dome = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=2.0, edge_length=1.0).surface()
     >>> fine = remesh(dome, 0.5)

@@ -64,10 +64,8 @@ def add_walls(
 
     Raises
     ------
-    OptionError
-        For a pair of patches without a border, or an unknown ``bottom``.
-    SurfaceError
-        If a border is not above Π, so that there is no room for a wall.
+    OptionError : a pair of patches without a border, or an unknown ``bottom``.
+    SurfaceError : a border is not above Π, so that there is no room for a wall.
 
     >>> from pcmc.plan import Divider, Plan
     >>> seam = Divider([[2, 0], [2, 2]], wall=None)
@@ -136,8 +134,7 @@ def build_walls(
 
     Raises
     ------
-    SurfaceError
-        If an upper edge is not above the floor.
+    SurfaceError : an upper edge is not above the floor.
     """
     builder = _Builder(vertices, plane, edge_length, fixed, floor)
     for top in tops:

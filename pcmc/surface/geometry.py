@@ -37,41 +37,31 @@ def vector(a: Floats) -> Vector:
 
 @inlined
 def add(a: Vector, b: Vector) -> Vector:
-    """a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @inlined
 def sub(a: Vector, b: Vector) -> Vector:
-    """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @inlined
 def scaled(s: float, a: Vector) -> Vector:
-    """s a."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @inlined
 def divided(a: Vector, s: float) -> Vector:
-    """a / s."""
     return a[0] / s, a[1] / s, a[2] / s
 
 
 @inlined
 def dot(a: Vector, b: Vector) -> float:
-    """⟨a, b⟩."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
 def cross(a: Vector, b: Vector) -> Vector:
-    """a × b.
-
-    >>> cross((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    (0.0, 0.0, 1.0)
-    """
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -87,7 +77,6 @@ def cross_sum(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
 
 @inlined
 def norm(a: Vector) -> float:
-    """|a|."""
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 

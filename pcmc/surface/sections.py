@@ -1,14 +1,17 @@
-"""Sections: where a plane cuts the triangles, joined to polylines."""
+"""The lines that a roof is drawn with: sections by a plane, and its ridges, rims and wall lines."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Floats
 from .surface import Surface
-from .topology import joined
+from .topology import Curve, joined
+
+RIDGE, RIM, WALL = "RIDGE", "RIM", "WALL"  # the kinds of curves
 
 
 class Polyline(NamedTuple):
@@ -63,3 +66,17 @@ def without_repeats(points: Floats, closed: bool) -> Floats:
     if not closed:
         new[0] = True
     return points[new]
+
+
+def curves_by_kind(surface: Surface) -> Iterator[tuple[str, Curve]]:
+    """Each curve with its kind, by the sheets at it that are no walls: two or more, one, or none.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> [(kind, len(curve.vertices)) for kind, curve in curves_by_kind(square)]
+    [('RIM', 4)]
+    """
+    for curve in (*surface.topology.junctions, *surface.topology.boundary_loops):
+        roofs = sum(not surface.walls[k] for k in curve.sheets)
+        yield (WALL, RIM, RIDGE)[min(roofs, 2)], curve
