@@ -350,7 +350,7 @@ def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, 
         raise AssertionError
 
     certificate, schedule = drawings.certificate, drawings.schedule
-    monkeypatch.setattr("pcmc.certificate.required.certify", computed)
+    monkeypatch.setattr("pcmc.certificate.certificate.certify", computed)
     again = pcmc.panels(squares, 0.01, certificate=certificate)
     assert again.certificate is certificate
     model = pcmc.StructuralModel(squares, pcmc.Material(1e6), 0.001, certificate=certificate)
