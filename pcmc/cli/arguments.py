@@ -41,6 +41,11 @@ def count(meaning: str) -> Any:
     return option("NUMBER", meaning, parser=integer)
 
 
+def by_part(meaning: str) -> Any:
+    """An option with a value for each of some parts; see ``by_name``."""
+    return option("NAME=VALUE", meaning)
+
+
 def flag(name: str, meaning: str) -> Any:
     """An option without a value."""
     return typer.Option(name, help=meaning)
@@ -65,6 +70,7 @@ def integer(text: str | int) -> int:
 
 EVERY = "A bare VALUE applies to every patch"
 LOADED = f"{EVERY} under pressure"
+UPDATED = "wall pressures are updated"
 MESH_CHECK = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
 START = "The start shape of a project, before it is solved, instead of its designed roof."
 CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
@@ -89,19 +95,12 @@ MANY_FILES = option("FILE", "File to write; may be repeated.", *OUTPUT)
 class Loads:
     """Values of the command line that replace those of a surface: each a list of NAME=VALUE, or VALUE."""
 
-    tension: Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {LOADED}.")] = None
-    pressure: Annotated[
-        list[str] | None,
-        option("NAME=VALUE", f"Pressure on a patch. {LOADED}; wall pressures are updated."),
-    ] = None
-    weight: Annotated[list[str] | None, option("NAME=VALUE", f"Weight of a patch per area. {EVERY}.")] = None
-    snow: Annotated[
-        list[str] | None, option("NAME=VALUE", f"Snow on a patch, per area of the plan. {LOADED}.")
-    ] = None
-    cable: Annotated[
-        list[str] | None, option("NAME=VALUE", "Tension of a cable. A bare VALUE applies to all.")
-    ] = None
-    volume: Annotated[list[str] | None, option("NAME=VALUE", "Volume of a room that has one already.")] = None
+    tension: Annotated[list[str] | None, by_part(f"Tension of a patch. {LOADED}.")] = None
+    pressure: Annotated[list[str] | None, by_part(f"Pressure on a patch. {LOADED}; {UPDATED}.")] = None
+    weight: Annotated[list[str] | None, by_part(f"Weight of a patch per area. {EVERY}.")] = None
+    snow: Annotated[list[str] | None, by_part(f"Snow on a patch, per area of the plan. {LOADED}.")] = None
+    cable: Annotated[list[str] | None, by_part("Tension of a cable. A bare VALUE applies to all.")] = None
+    volume: Annotated[list[str] | None, by_part("Volume of a room that has one already.")] = None
 
     @property
     def change(self) -> Callable[[Surface], Surface] | None:

@@ -21,6 +21,8 @@ from .reports import report
 
 OUT = "File to write; its suffix selects the format."
 SCALAR = "Scalar of the file that colours the vertices of a .glb or .usda."
+EXAMPLE = "A generator, such as two_caps, instead of a file."
+PARAMETER = "Parameter of the example; may be repeated."
 WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
 COLOUR = "--colour", "--color"
 
@@ -100,12 +102,8 @@ def plot(
 
 def explore(
     file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
-    example: Annotated[
-        str | None, option("NAME", "A generator, such as two_caps, instead of a file.")
-    ] = None,
-    parameter: Annotated[
-        list[str] | None, option("NAME=VALUE", "Parameter of the example; may be repeated.", "--set")
-    ] = None,
+    example: Annotated[str | None, option("NAME", EXAMPLE)] = None,
+    parameter: Annotated[list[str] | None, option("NAME=VALUE", PARAMETER, "--set")] = None,
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, count("Port; 0 for any free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,

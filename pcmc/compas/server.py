@@ -54,20 +54,6 @@ class Settings:
     secret: str  # what a request must show
     port: int  # where the service listens
 
-    def text(self) -> str:
-        """The settings as their file has them: the folder, and the arguments of ``compas.rpc.Proxy``."""
-        proxy = {
-            "package": PACKAGE,
-            "service": PACKAGE,
-            "python": sys.executable,
-            "url": f"http://{USER}:{self.secret}@{HOST}",
-            "port": self.port,
-            "autoreload": False,
-            "max_conn_attempts": STARTS,
-            "working_directory": str(settings_path().parent),  # Python imports from there: not any folder
-        }
-        return json.dumps({"folder": str(self.folder), "proxy": proxy}, indent=2) + "\n"
-
     def place(self, path: object) -> Path:
         """The path of a file in the folder, links resolved; FileError for one that leads out of it."""
         if not isinstance(path, str):
@@ -106,11 +92,23 @@ def set_up(folder: str | os.PathLike[str]) -> Path:
         tried = 20_000 + secrets.randbelow(10_000)
         with socket.socket() as probe:
             port = tried if probe.connect_ex((HOST, tried)) else 0
+    secret = secrets.token_urlsafe(32)
+    proxy = {
+        "package": PACKAGE,
+        "service": PACKAGE,
+        "python": sys.executable,
+        "url": f"http://{USER}:{secret}@{HOST}",
+        "port": port,
+        "autoreload": False,
+        "max_conn_attempts": STARTS,
+        "working_directory": str(path.parent),  # Python imports from there: not any folder
+    }
     with writing(path):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with atomic_write(path) as temporary:
             temporary.touch(0o600)
-            temporary.write_text(Settings(place, secrets.token_urlsafe(32), port).text(), encoding="utf-8")
+            text = json.dumps({"folder": str(place), "proxy": proxy}, indent=2) + "\n"
+            temporary.write_text(text, encoding="utf-8")
     return path
 
 

@@ -258,7 +258,7 @@ def _unit(
 def read(path: Path) -> MeshData:
     """The surface in a file that pcmc wrote; other .ifc files are refused."""
     require("ifcopenshell", extra="ifc")
-    arrays = read_arrays("io/reading_surfaces.py", "ifc_arrays", path)
+    arrays = read_arrays("io/reading_scripts.py", "ifc_arrays", path)
     if arrays["text"] is None or not arrays["parts"]:
         text = "pcmc reads only .ifc files that it wrote; export the mesh of the roof as .obj or .3dm"
         raise FileError(text, where="Pcmc_Surface")

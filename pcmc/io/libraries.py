@@ -66,7 +66,7 @@ def unreadable(kind: str, error: Exception) -> FileError:
 
 
 def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
-    """The plain values that a function in a script of this package, such as io/reading_meshes.py, returns.
+    """The plain values that a function in a script of this package, such as io/reading_scripts.py, returns.
 
     FileError if the library refuses the file, crashes or takes too long.
     """

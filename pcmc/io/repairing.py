@@ -131,7 +131,7 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
             holes=holes,
             edge_length=0.0 if edge_length is None or several else edge_length,
         )
-        answer = read_arrays("io/reading_meshes.py", "repaired_arrays", request)
+        answer = read_arrays("io/reading_scripts.py", "repaired_arrays", request)
     kept, patch = np.unique(answer["patch"], return_inverse=True)  # one may have vanished
     patches = tuple(data.patches[k] for k in kept)
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
@@ -168,6 +168,6 @@ def _read(path: Path) -> MeshData:
 def read(path: Path) -> MeshData:
     """Every mesh of the file; meshes of one name are one patch."""
     require("pymeshlab", extra="repair")
-    found = enumerate(read_arrays("io/reading_meshes.py", "meshlab_arrays", path)["meshes"], 1)
+    found = enumerate(read_arrays("io/reading_scripts.py", "meshlab_arrays", path)["meshes"], 1)
     meshes = [(Path(name).stem or f"mesh {k}", X, F) for k, (name, X, F) in found]
     return Metadata().of_meshes(meshes, path.stem)

@@ -103,7 +103,7 @@ def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str 
 def read(path: Path) -> MeshData:
     """Layers as patches; curves, surfaces and other objects are left out, with a note."""
     require("rhino3dm")
-    arrays = read_arrays("io/reading_surfaces.py", "rhino_arrays", path)
+    arrays = read_arrays("io/reading_scripts.py", "rhino_arrays", path)
     layers = arrays["layers"]
     X, corners, counts, named = [], [], [], []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}

@@ -58,7 +58,7 @@ def read(path: Path) -> MeshData:
         if len(match[1]) > 18 or int(match[1]) > ITEMS * len(data):
             text = f"{match[0][:60].decode()}, but the file has only {len(data)} bytes"
             raise FileError(text, where=1 + data.count(b"\n", 0, match.start()), found=match[1][:60].decode())
-    arrays = read_arrays("io/reading_surfaces.py", "vtk_arrays", path)
+    arrays = read_arrays("io/reading_scripts.py", "vtk_arrays", path)
     corners, counts, chosen = _cells(arrays)
     points = np.asarray(arrays["points"]).reshape(-1, 3)
     cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}

@@ -117,13 +117,7 @@ _lock = threading.Lock()
 def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
     """Run one case in a process of ``team``, a name that belongs to one sweep.
 
-    Returns
-    -------
-    dict : the fields of a Record from ``status`` on.
-
-    Raises
-    ------
-    SweepError : the case function cannot be imported here.
+    Returns the fields of a Record from ``status`` on. SweepError if the function cannot be imported here.
     """
     with _lock:
         if team not in _teams:

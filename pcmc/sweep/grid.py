@@ -123,10 +123,7 @@ class Sweep:
 
 
 def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorator: ``check(**parameters)`` refuses a bad case of the function before any case is run.
-
-    For functions whose signature does not list their parameters, because it has ``**arguments``.
-    """
+    """Decorator of a function with ``**arguments``: ``check`` refuses a bad case before any case is run."""
 
     def mark(function: Callable[..., Any]) -> Callable[..., Any]:
         function.__dict__["check"] = check

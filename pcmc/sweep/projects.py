@@ -83,10 +83,9 @@ def solve_project(
 
     Parameters
     ----------
-    project : its file. project_digest : ``pcmc.project.digest`` of it when the sweep was declared: a case and
-        its store belong to one state of the project.
-    method, mesh_check, search : as of ``project_sweep``.
-    values : as of ``pcmc.project.varied``.
+    project, project_digest : its file, and ``pcmc.project.digest`` of it when the sweep was declared: a case
+        and its store belong to one state of the project.
+    method, mesh_check, search, values : as of ``project_sweep``, and ``pcmc.project.varied``.
 
     Returns
     -------

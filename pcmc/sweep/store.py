@@ -65,9 +65,7 @@ class Store:
     def append(self, records: Iterable[Record]) -> None:
         """Write records in one transaction, and return when the disk holds them.
 
-        Raises
-        ------
-        FileError : the disk is full or fails. The records stored before stay.
+        FileError if the disk is full or fails; the records stored before stay.
         """
         new = {record.case: record for record in records}
         rows = []
@@ -116,11 +114,8 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
 def read_store(path: str | os.PathLike[str]) -> list[Record]:
     """The records of a store, in the order of the grid; a sweep may be running on it.
 
-    Cases whose values the last sweep on it had no longer in its grid are not returned.
-
-    Raises
-    ------
-    FileError : the file cannot be read, or is no store.
+    Cases whose values the last sweep on it had no longer in its grid are not returned. FileError if the file
+    cannot be read, or is no store.
     """
     with _connected(Path(path), "rw") as database:
         database.execute("BEGIN")

@@ -58,13 +58,9 @@ def _frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     """Write a table to ``.csv`` or ``.parquet``; the file is complete or not there at all.
 
-    Floats are written with the digits that give the same float back. In Parquet, which has one
-    type per column, a column of mixed types is written as text.
-
-    Raises
-    ------
-    FileError : another suffix, or a file that cannot be written.
-    MissingExtra : ``.parquet`` without pyarrow.
+    Floats are written with the digits that give the same float back. In Parquet, which has one type per
+    column, a column of mixed types is written as text. FileError for another suffix, or a file that cannot be
+    written; MissingExtra for ``.parquet`` without pyarrow.
     """
     path = Path(path)
     suffix = suffix_of(path, TABLES, "a table")
@@ -100,11 +96,10 @@ def columns_of(table: pd.DataFrame, name: str, parameters: Container[str] = ()) 
 
 
 def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[str] = ()) -> pd.DataFrame:
-    """The parameters, how each case ended, and quantities, each as of ``columns_of``.
+    """The parameters, how each case ended, and quantities, each as of ``columns_of``, in the surface's units.
 
-    By default these are the apex of each patch, the greatest height over Π; and of the roof the rise of the
-    highest apex over the lowest support, the area, and the largest reaction per length; and the margins,
-    with what ends each. All are in the surface's units.
+    By default these are the apex of each patch over Π; the rise of the highest apex over the lowest support,
+    the area and the largest reaction per length of the roof; and the margins, with what ends each.
 
     >>> import pandas as pd
     >>> frame = pd.DataFrame({"a": [1.0], "verdict": ["stable"], "residual": [1e-12], "west.apex": [2.0]})
@@ -121,10 +116,7 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
 def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
     """The names of numbers with their units in brackets, as far as these are known.
 
-    Parameters
-    ----------
-    units : of the project or surface; nothing is added without one.
-    cables : names whose tension is a force.
+    ``cables`` are names whose tension is a force.
 
     >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
     ['west.tension [kN/m]', 'hem.tension [kN]']
@@ -152,15 +144,9 @@ def draw_sweep(
 ) -> Image:
     """A picture of a sweep over one or two varied numbers, × where not certified.
 
-    Parameters
-    ----------
-    labels : the names of columns as they are shown, such as ``with_units`` gives.
-    show : what is drawn, as of ``columns_of``; over two numbers the last of its columns. By default the
-        apexes over one number, the rise over two.
-
-    Raises
-    ------
-    OptionError : if not one or two numbers vary, or no case has a shape.
+    ``labels`` are the names of columns as they are shown, such as ``with_units`` gives; ``show`` is what is
+    drawn, as of ``columns_of``; over two numbers the last of its columns. By default it is the apexes over
+    one number, the rise over two. OptionError if not one or two numbers vary, or no case has a shape.
     """
     from ..plot import heatmap, lines
 

@@ -64,6 +64,10 @@ def sent(explorer, data):
             "vary: each needs a patch",
         ),
         ("NAME/settle", '{"tensions": ' + DEEP, "nested too deep"),
+        ("NAME/settle", '{"tension": {"cap": 1}}', "unknown key 'tension'; did you mean 'tensions'?"),
+        ("NAME/undo", '{"steps": 2}', "unknown key 'steps'"),
+        ("NAME/news", '{"since": 2}', "unknown key 'since'"),
+        ("NAME/save", '{"name": "a", "replace": 1}', "replace: expected true or false"),
     ],
 )
 def test_wrong_values_are_answered_in_one_line(explorer, session, path, body, line):
