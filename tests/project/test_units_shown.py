@@ -110,7 +110,7 @@ def test_the_page_shows_the_units_of_mesh_check_and_targets(bubbles):
 def test_a_notebook_gives_its_units_to_the_page(given, tension):
     view = explore.show(generators.spherical_cap(0.5), units=given)
     try:
-        assert view.explorer.roof.units.tension == tension
+        assert view.explorer.roof.outcome.units.tension == tension
     finally:
         view.close()
 
@@ -120,7 +120,7 @@ def test_serve_takes_units(monkeypatch):
     monkeypatch.setattr(explore, "open_and_wait", lambda explorer, _: opened.append(explorer))
     explore.serve(generators.spherical_cap(0.5), units="mm")
     opened[0].close()
-    assert opened[0].roof.units == Units("mm")
+    assert opened[0].roof.outcome.units == Units("mm")
 
 
 def test_wrong_units_are_refused():
