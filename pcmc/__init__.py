@@ -15,8 +15,8 @@ design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
 margins                    how far a roof is from the edge of its stability
-panelling                  families of panels
-compas structure           COMPAS; structural models
+compas                     meshes of COMPAS, and a server for them
+panelling structure        families of panels; structural models
 drawings plot report       sheets, pictures, and pages for those who build
 advice                     first tensions for a rise, and what to type where a roof fails
 project                    a whole design in one file

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,8 +16,9 @@ import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
+from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
-from ..forces.functional import patch_areas
+from ..forces.functional import energy, patch_areas
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
 from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
@@ -296,6 +298,37 @@ def certify(
         leaning=lean_table(standing),
         symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
+
+
+def certified(surface: Surface, anyway: bool, known: Certificate | None = None) -> Certificate:
+    """The certificate of a surface that something is to be built after; computed where it is not ``known``.
+
+    SurfaceError if the surface is not certified, unless ``anyway``, and if ``known`` is another surface's.
+    """
+    validate.flag("anyway", anyway)
+    if known is not None:
+        own = energy(surface)
+        if len(known.reactions) != surface.n or not math.isclose(known.energy, own, rel_tol=1e-9):
+            text = "certificate: belongs to another surface; pass certify(surface), or leave it out"
+            raise SurfaceError(text, what="certificate", found=known.energy, expected=own)
+    certificate = certify(surface) if known is None else known
+    require_certified(certificate, anyway)
+    return certificate
+
+
+def warning_mark(certificate: Certificate) -> str:
+    """What each page about a surface that is not certified is marked with; empty for one that is."""
+    verdict = certificate.verdict.value.split(":")[0]
+    return "" if certificate.certified else f"NOT CERTIFIED: {verdict}"
+
+
+def require_certified(certificate: Certificate, anyway: bool) -> None:
+    """SurfaceError for the certificate of a surface that is not certified, unless ``anyway``."""
+    if not (certificate.certified or validate.flag("anyway", anyway)):
+        verdict = certificate.verdict
+        text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
+        text += " anyway=True (--allow-uncertified)"
+        raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")
 
 
 def _stability(

@@ -14,7 +14,7 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError
 from ..base.units import Units
-from ..certificate.required import require_certified
+from ..certificate.certificate import require_certified
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
 from ..panelling import fewer_families

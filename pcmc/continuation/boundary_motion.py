@@ -61,11 +61,12 @@ class BoundaryMotion:
             message = "BoundaryMotion: the surface has no fixed vertex that could move"
             raise OptionError(message, what="parameter", found=0)
         if surface.rooms:
+            name = surface.rooms[0].name
             message = (
-                f"BoundaryMotion: room {surface.rooms[0].name!r} prescribes a volume, which is not followed"
+                f"BoundaryMotion: room {name!r} prescribes a volume, which is not followed as the boundary"
             )
-            hint = "as the boundary moves; remove the room, and give its pressure"
-            raise OptionError(f"{message} {hint}", what="parameter", found=surface.rooms[0].name)
+            message += " moves; remove the room, and give its pressure"
+            raise OptionError(message, what="parameter", found=name)
         line = BoundaryLine(self.start, {}, {}, self.positions, int(surface.pinned.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.pinned], axis=1)
         if off.max() > SAME_PLACE * surface.size:

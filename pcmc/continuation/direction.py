@@ -111,30 +111,22 @@ class Direction:
         (first, value), *others = given
         for name, other in others:
             if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
-                message = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}"
-                hint = "give weights in proportion to the surface's own values, or relative=True"
-                raise OptionError(
-                    f"{message}: {hint}",
-                    what="parameter",
-                    where=name,
-                    found=float(other),
-                    expected=float(value),
+                text = (
+                    f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give weights"
                 )
+                text += " in proportion to the surface's own values, or relative=True"
+                raise OptionError(text, what="parameter", where=name, found=other, expected=value)
         return float(value)
 
 
 def _refuse_slack(surface: Surface, rates: Rates) -> None:
     """Refuse a tension of 0: from there on triangles, or a curve, would slide for nothing."""
-    for part in np.flatnonzero(rates.get("tensions", ())):
-        if surface.tensions[part] <= 0.0:
-            name = surface.patches[part].name
-            message = f"the tension of {name!r} is 0, where its triangles stop pulling; start from one > 0"
+    why = {"tensions": "{!r} is 0, where its triangles stop pulling", "cables": "the cable {!r} is 0"}
+    for kind in [kind for kind in why if kind in rates]:
+        for part in np.flatnonzero((rates[kind] != 0.0) & (part_values(surface, kind) <= 0.0)):
+            name = getattr(surface, KINDS[kind][0])[part].name
+            message = f"the tension of {why[kind].format(name)}; start from one > 0"
             raise OptionError(message, what="parameter", where=name, found=0.0)
-    for part in np.flatnonzero(rates.get("cables", ())):
-        if surface.cables[part].tension <= 0.0:
-            name, found = surface.cables[part].name, surface.cables[part].tension
-            message = f"the tension of the cable {name!r} is 0; start from one > 0"
-            raise OptionError(message, what="parameter", where=name, found=found)
 
 
 @dataclass(frozen=True, eq=False)

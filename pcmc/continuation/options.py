@@ -11,7 +11,7 @@ CONTROLS = ("arclength", "parameter", "volume", "height")
 
 
 class Ending(Enum):
-    """Why a branch ends. The value is a sentence."""
+    """Why a branch ends."""
 
     REACHED = "the branch reached the requested value"
     FOLDS = "the branch passed the requested number of folds"

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from ..base.errors import NoBranch, SurfaceError
 from ..base.interrupts import stop_requested
@@ -46,8 +46,7 @@ MAX_BEND = 0.5  # correction over step length above which a step is refused
 MANY_ITERATIONS = 7  # a correction that took more Newton steps may have ended on another branch
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
+class Step(NamedTuple):
     """A step that succeeded: its segment, its correction over its length, and the events on it."""
 
     segment: Segment
@@ -110,9 +109,6 @@ class Tracer:
     def run(self) -> tuple[Ending, str]:
         """Follow the branch to its end; why it ends, and the last difficulty."""
         try:
-            self.record()
-            if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
-                return Ending.REACHED, ""
             return self.advance()
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
@@ -120,6 +116,9 @@ class Tracer:
 
     def advance(self) -> tuple[Ending, str]:
         """Step after step."""
+        self.record()
+        if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
+            return Ending.REACHED, ""
         length, difficulty = min(abs(self.options.step), self.options.largest), ""
         for _ in range(self.options.steps):
             step = None
@@ -298,18 +297,17 @@ class Tracer:
     def record(self) -> None:
         """Add the last point to the table of points, and call the callback."""
         here, number = self.here, len(self.rows)
-        self.rows.append(
-            {
-                **self.columns(here.state),
-                "arclength": self.arclength,
-                "index": here.index,
-                "lowest_eigenvalue": here.eigenvalues[0],
-                "residual": here.state.residual,
-                "quality": here.state.quality,
-                "slope": here.tangent.slope,
-                "iterations": here.state.iterations,
-            }
-        )
+        row = {
+            **self.columns(here.state),
+            "arclength": self.arclength,
+            "index": here.index,
+            "lowest_eigenvalue": here.eigenvalues[0],
+            "residual": here.state.residual,
+            "quality": here.state.quality,
+            "slope": here.tangent.slope,
+            "iterations": here.state.iterations,
+        }
+        self.rows.append(row)
         if (number - 1) % self.options.keep:
             self.surfaces.pop(number - 1, None)
         self.surfaces[number] = self.surface_at(self.here.state)

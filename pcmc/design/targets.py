@@ -29,21 +29,17 @@ class Target:
 
     Parameters
     ----------
-    quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
-        ``"volume"`` between a patch and Π (``volumes_below``), and ``"area"``; ``"curvature"``,
-        (p - s) / (2α), a patch's mean curvature at rest; ``"reaction per length"``, the greatest pull along
-        an edge that holds a patch (``"reaction"`` stands for it); ``"lean"`` of a wall, its
-        largest angle from the vertical, degrees;
-        ``"margin"``, the factor of ``pcmc.margin`` up to which the roof stays stable;
-        ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
-        cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
-        and its ``"force"``, which is its tension.
+    quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π; ``"volume"``
+        between a patch and Π (``volumes_below``), and ``"area"``; ``"curvature"``, (p - s) / (2α), a patch's
+        mean curvature at rest; ``"reaction per length"`` or ``"reaction"``, the greatest pull along an edge
+        that holds a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees; ``"margin"``,
+        the factor of ``pcmc.margin`` up to which the roof stays stable; ``"pressure"`` of a room of
+        prescribed volume; of a cable ``"sag"``, the largest distance of its vertices from the chord between
+        its ends, its ``"length"``, and its ``"force"``, which is its tension.
     of : name of the patch, room or cable; what a margin varies, such as ``"tension of west"``, by default
-        the pressure; for ``"height"`` the point (x, y) in the coordinates of Π. None:
-        all patches under pressure together (for reactions all edges that are held); not for
-        ``"curvature"``, ``"pressure"`` and the quantities of cables.
-    value, at_most, at_least : a value, or a limit on one side or both. A target to be met has at least one of
-        them; ``pcmc.sensitivities`` needs none.
+        the pressure; for ``"height"`` the point (x, y) in the coordinates of Π. None: all patches under
+        pressure together (for reactions all edges that are held), where the quantity is not of one alone.
+    value, at_most, at_least : a value, or limits. ``pcmc.sensitivities`` needs none.
     name : of the point of a height, such as ``"crown"``: shown instead of its coordinates.
 
     Examples
@@ -193,9 +189,8 @@ class Parameter:
         present = self.value(surface)
         if present == 0.0 and None in (self.low, self.high):
             raise OptionError(f"{self.label} is 0 now; give low and high", what=self.label, found=0.0)
-        ends = sorted((present / FACTOR, present * FACTOR))
-        low = ends[0] if self.low is None else self.low
-        high = ends[1] if self.high is None else self.high
+        least, most = sorted((present / FACTOR, present * FACTOR))
+        low, high = least if self.low is None else self.low, most if self.high is None else self.high
         validate.number("high", high, above=low, where=self.label)
         if self.tension_under_pressure(surface):
             validate.number("low", low, above=0.0, where=self.label)

@@ -18,7 +18,7 @@ from ..base.errors import OptionError
 from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
-from ..certificate.required import certified, warning_mark
+from ..certificate.certificate import certified, warning_mark
 from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
 from . import dxf, pdf, views

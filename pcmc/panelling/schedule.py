@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
 from ..certificate import Certificate
-from ..certificate.required import certified
+from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from .families import families

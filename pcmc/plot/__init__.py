@@ -4,9 +4,8 @@ With a path every function writes a PNG; each returns the picture as an (h,w,3) 
 ``panels`` and the rooms below it.
 """
 
-from .arrows import reactions, vectors
 from .curves import convergence, diagram, heatmap, histories, lines
-from .pictures import draw, families, panel
+from .pictures import draw, families, panel, reactions, vectors
 
 __all__ = [
     "convergence",

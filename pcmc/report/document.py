@@ -14,8 +14,8 @@ import pandas as pd
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate, quantities
+from ..certificate.certificate import certified, warning_mark
 from ..certificate.quantities import Figure
-from ..certificate.required import certified, warning_mark
 from ..drawings.pdf import register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions

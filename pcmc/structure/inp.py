@@ -54,7 +54,7 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
 def _sections(model: StructuralModel) -> Iterator[str]:
     """The text of the file, part by part."""
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
-    yield f"*HEADING\npcmc structural model, {'' if certificate.certified else 'NOT CERTIFIED: '}"
+    yield f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"
     yield f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")
     yield from (f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1))
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()

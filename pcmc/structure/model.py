@@ -14,7 +14,7 @@ from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate import Certificate
-from ..certificate.required import certified
+from ..certificate.certificate import certified
 from ..contact.pinching import standing_faces, standing_part
 from ..forces.cables import directions
 from ..forces.triangles import effective_tensions
@@ -133,6 +133,11 @@ class StructuralModel:
     def verdict(self) -> str:
         """The sentence of the certificate's verdict."""
         return str(self.certificate.verdict.value)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the surface is certified."""
+        return bool(self.certificate.certified)
 
     @property
     def note(self) -> str:

@@ -16,7 +16,7 @@ from pcmc.contact.pinching import standing_part
 from pcmc.design.targets import measure
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
-from pcmc.plot import arrows
+from pcmc.plot import pictures
 from pcmc.surface.colours import rgb
 from pcmc.surface.geometry import area_vectors
 
@@ -161,7 +161,7 @@ def test_the_largest_reaction_is_one_number(solved):
 def test_forces_at_points_have_arrows_of_their_own(monkeypatch, solved):
     _, result = solved
     found, drawn = result.certify(), {}
-    monkeypatch.setattr(arrows, "vectors", lambda s, field, *_, **more: drawn.update(more, field=field))
+    monkeypatch.setattr(pictures, "vectors", lambda s, field, *_, **more: drawn.update(more, field=field))
     plot.reactions(result.surface, units=Units("m", "kN"))
     at_points = found.supports[found.supports["kind"].isin(["point", "cable end"])]
     sizes = np.sort(np.linalg.norm(drawn["points"], axis=1))[::-1]

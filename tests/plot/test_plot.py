@@ -16,7 +16,7 @@ from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import State
-from pcmc.plot import arrows, colors, raster
+from pcmc.plot import colors, pictures, raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 from pcmc.project import paint
 from pcmc.surface.colours import WALLS, patch_colors, rgb
@@ -266,9 +266,9 @@ def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path
     """Half of each boundary edge to either end; the same numbers as the page for exploring has."""
     surface = two_squares(6)
     found, drawn = pcmc.certify(surface), []
-    vectors = arrows.vectors
+    vectors = pictures.vectors
     monkeypatch.setattr(
-        arrows, "vectors", lambda s, field, *_, **__: drawn.append(field) or vectors(s, field)
+        pictures, "vectors", lambda s, field, *_, **__: drawn.append(field) or vectors(s, field)
     )
     paint(surface, tmp_path / "a.png", ["diagonal"], "reactions")
     shown = page_fields(State(surface, found, surface), np.zeros(3))["reactions"]

@@ -87,7 +87,7 @@ def test_a_run_with_all_outputs_computes_each_finding_once(folder, monkeypatch):
     calls = counted(
         monkeypatch,
         "pcmc.project.outcome.certify",
-        "pcmc.certificate.required.certify",
+        "pcmc.certificate.certificate.certify",
         "pcmc.certificate.certify",
         "pcmc.panelling.panels",
         "pcmc.drawings.drawing_set.panels",

@@ -20,7 +20,7 @@ from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
 from pcmc.surface.supports import apply_supports
-from tests.energy.test_linearise import slope
+from tests.forces.test_linearise import slope
 
 DEEP, BESIDE = 0.7, 0.2
 
