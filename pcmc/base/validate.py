@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
+from operator import ge, gt, le, lt
 from reprlib import Repr
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -45,15 +46,10 @@ def number(
     pcmc.base.errors.OptionError: gamma: expected a finite number ≥ 0 and < 1, found 1.5
     """
     given = real(value)
-    if not (
-        math.isfinite(given)
-        and (above is None or given > above)
-        and (least is None or given >= least)
-        and (below is None or given < below)
-        and (most is None or given <= most)
-    ):
-        limits = [(above, ">"), (least, "≥"), (below, "<"), (most, "≤")]
-        bounds = " and ".join(f"{sign} {limit:g}" for limit, sign in limits if limit is not None)
+    rules = ((above, ">", gt), (least, "≥", ge), (below, "<", lt), (most, "≤", le))
+    limits = [(limit, sign, holds) for limit, sign, holds in rules if limit is not None]
+    if not (math.isfinite(given) and all(holds(given, limit) for limit, _, holds in limits)):
+        bounds = " and ".join(f"{sign} {limit:g}" for limit, sign, _ in limits)
         refuse(name, value, f"a finite number {bounds}".rstrip(), where, hint, error)
     return given
 

@@ -139,13 +139,26 @@ def held_edges(surface: Surface) -> Ints:
 
 
 def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
-    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2)."""
+    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2).
+
+    With a, b an edge's ends, c the next vertex of the curve beyond one, ℓ = |b - a|: the circle has the
+    curvature κ = 2 |(b - a) × (c - a)| / (ℓ |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ.
+    """
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond = _continuations(X, edges, corner)
     if corners is not None:
         smooth = ~np.isin(edges[edge, end], corners)
         edge, end, beyond = edge[smooth], end[smooth], beyond[smooth]
-    rises[edge, end] = _rises(X, edges[edge], beyond)
+    a, b, c = *X[edges[edge].T], X[beyond]
+    side = b - a
+    length = np.linalg.norm(side, axis=1)
+    inward = c - a - (np.einsum("ij,ij->i", c - a, side) / length**2)[:, None] * side
+    depth = np.linalg.norm(inward, axis=1)
+    curvature = 2.0 * depth / (np.linalg.norm(c - b, axis=1) * np.linalg.norm(c - a, axis=1))
+    half = 0.5 * curvature * length
+    height = 0.5 * length * half / (1.0 + np.sqrt(np.maximum(1.0 - half**2, 0.0)))
+    height[height < STRAIGHT * length] = 0.0
+    rises[edge, end] = -(height / np.where(depth > 0.0, depth, 1.0))[:, None] * inward
     arcs[edge, end] = True
     return rises, arcs
 
@@ -174,21 +187,3 @@ def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, I
     going_on = np.flatnonzero(partner >= 0)
     going_on = going_on[partner[partner[going_on]] == going_on]
     return order[going_on] // 2, order[going_on] % 2, other[partner[going_on]]
-
-
-def _rises(X: Floats, edges: Ints, beyond: Ints) -> Floats:
-    """(c,3) from the middle of each edge to that of the arc through its ends and a vertex beyond one.
-
-    With a, b the edge's ends, c the third point, ℓ = |b - a|: the circle has the curvature
-    κ = 2 |(b - a) × (c - a)| / (|b - a| |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ.
-    """
-    a, b, c = X[edges[:, 0]], X[edges[:, 1]], X[beyond]
-    side = b - a
-    length = np.linalg.norm(side, axis=1)
-    inward = c - a - (np.einsum("ij,ij->i", c - a, side) / length**2)[:, None] * side
-    depth = np.linalg.norm(inward, axis=1)
-    curvature = 2.0 * depth / (np.linalg.norm(c - b, axis=1) * np.linalg.norm(c - a, axis=1))
-    half = 0.5 * curvature * length
-    height = 0.5 * length * half / (1.0 + np.sqrt(np.maximum(1.0 - half**2, 0.0)))
-    height[height < STRAIGHT * length] = 0.0
-    return -(height / np.where(depth > 0.0, depth, 1.0))[:, None] * inward

@@ -194,12 +194,9 @@ def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCur
         if np.linalg.norm(P - Q, axis=1).max() <= NEAR * size:
             kept.append(one)
             continue
-        for start, end in ((P, Q), (before, X[every])):
-            matrix, shift = _affine(start, end)
-            away = np.linalg.norm(start @ matrix.T + shift - end, axis=1).max()
-            if away <= NEAR * size and _spanned(one.curve.controls, start):
-                kept.append(one.mapped(matrix, shift))
-                break
+        alone = _carried(one.curve, P, Q, NEAR * size)
+        curve = alone or _carried(one.curve, before, X[every], NEAR * size)
+        kept += [replace(one, curve=curve)] if curve else []
     if len(kept) < len(held):
         text = f"{len(held) - len(kept)} of {len(held)} curves that held vertices were drawn on are left out,"
         text += " as these vertices were moved off them: a finer mesh has to guess the boundary between them"
@@ -207,17 +204,17 @@ def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCur
     return tuple(kept)
 
 
-def _affine(P: Floats, Q: Floats) -> tuple[Floats, Floats]:
-    """(3,3) M and (3,) b with M p + b nearest to q for points P, Q (k,3); M = 1 across what P spans."""
+def _carried(curve: Curve, P: Floats, Q: Floats, near: float) -> Curve | None:
+    """The curve under the affine map p → M p + b that takes P to Q (k,3), to ``near``; None without one.
+
+    M is 1 across what P spans, which the curve must not leave.
+    """
     middle, there = P.mean(axis=0), Q.mean(axis=0)
     change = np.linalg.lstsq(P - middle, (Q - there) - (P - middle), rcond=SPAN)[0]
     matrix = np.eye(3) + change.T
-    return matrix, there - matrix @ middle
-
-
-def _spanned(points: Floats, P: Floats) -> bool:
-    """Whether points (k,3) lie in the line, plane or space that points P span."""
-    _, sizes, axes = np.linalg.svd(P - P.mean(axis=0), full_matrices=False)
-    within = axes[sizes > SPAN * sizes[0]]
-    away = points - P.mean(axis=0)
-    return bool(np.abs(away - away @ within.T @ within).max() <= NEAR * (sizes[0] + np.abs(away).max()))
+    shift = there - matrix @ middle
+    _, sizes, axes = np.linalg.svd(P - middle, full_matrices=False)
+    within, away = axes[sizes > SPAN * sizes[0]], curve.controls - middle
+    spanned = np.abs(away - away @ within.T @ within).max() <= NEAR * (sizes[0] + np.abs(away).max())
+    reached = np.linalg.norm(P @ matrix.T + shift - Q, axis=1).max() <= near
+    return curve.mapped(matrix, shift) if spanned and reached else None
