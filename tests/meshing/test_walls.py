@@ -11,11 +11,10 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.continuation import Direction
 from pcmc.drawings import drawing_set
-from pcmc.explore.page_data import control_groups, outline
+from pcmc.explore.page_data import _controls, outline
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
-from pcmc.project.values import values_of
 from pcmc.report.tables import patch_table
 from pcmc.surface.colours import SHEETS, patch_colors, rgb
 
@@ -283,7 +282,7 @@ def test_files_tables_and_pictures_show_a_sail_as_roof(tmp_path):
     rows = patch_table(hall, certificate, Units("m")).rows
     assert [row[1] for row in rows] == ["roof", "roof", "wall"]
     assert [patch["wall"] for patch in outline(hall, np.zeros(3))[0]["patches"]] == [False, False, True]
-    assert [group["wall"] for group in control_groups(hall, values_of(hall))] == [False, False, True]
+    assert [group["wall"] for group in _controls(hall)] == [False, False, True]
     assert pcmc.panels(hall, 0.1, anyway=True).area == pytest.approx(patch_areas(hall)[:2].sum())
     drawn = [c.vertices for c in drawing_set(hall, "m", anyway=True).curves if c.layer == "PCMC-WALL"]
     assert set(np.concatenate(drawn)) <= set(hall.faces[hall.patch_of_face == 2].ravel())

@@ -14,12 +14,15 @@ import { Viewer } from "./viewer.js";
 
 const REPLACE_AFTER = 400; // milliseconds, at least, before a newer request replaces one under way
 const POOR = 0.3; // of the worst triangle: new triangles are offered below it
-const ACTS = { undo: "undo", redo: "redo", reset: "reset", stabilise: "stabilise", remesh: "remesh", back: "undo" };
+const ACTS = {
+  undo: "undo", redo: "redo", reset: "reset", stabilise: "stabilise", remesh: "remesh", back: "undo",
+};
 const ENDING = [...Object.values(ACTS), "recall"]; // the words about targets are then of another surface
 const SHOWS = { mesh: "Mesh", supports: "Supports", walls: "Walls", smooth: "Smooth", grid: "Grid" };
 const FORMATS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
   ".ply": "with the numbers", ".stl": "printing", ".vtp": "ParaView, with the numbers", ".fe": "Surface Evolver",
+  ".png": "picture of this view",
 };
 const find = (selector) => document.querySelector(selector);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
@@ -232,8 +235,8 @@ class Page {
     if (findings.supports) showSupports(find("#supports"), findings, this.units);
     this.variants.show(header, this.units);
     if (!this.next) this.panel.show(header.values, values);
-    const disabled = { check: !atRest, margin: !atRest, verify: !atRest, undo: !header.undo, redo: !header.redo };
-    for (const [id, off] of Object.entries(disabled)) find(`#${id}`).disabled = off;
+    const enabled = { check: atRest, margin: atRest, verify: atRest, undo: header.undo, redo: header.redo };
+    for (const [id, on] of Object.entries(enabled)) find(`#${id}`).disabled = !on;
     const shown = {
       "check-result": false, theorem: false, "margin-result": false, // they were about the last surface
       stabilise: atRest && verdict.name === "saddle",
@@ -332,9 +335,9 @@ class Page {
 
   addExports(formats) {
     const menu = find("#export");
-    const kinds = [...Object.entries(FORMATS).filter(([suffix]) => formats.includes(suffix)), [".png", "picture of this view"]];
-    menu.querySelector("div").replaceChildren(...kinds.map(([value, words]) =>
-      element("button", { type: "button", value, onclick: () => this.save(value) }, element("b", value), ` ${words}`)));
+    const kinds = Object.entries(FORMATS).filter(([suffix]) => suffix === ".png" || formats.includes(suffix));
+    menu.querySelector("div").replaceChildren(...kinds.map(([value, words]) => element("button",
+      { type: "button", value, onclick: () => this.save(value) }, element("b", value), ` ${words}`)));
     menu.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !menu.open) return;
       menu.open = false;
@@ -361,7 +364,8 @@ class Page {
 
   addActs() {
     const clicks = {
-      "#margin-result button": ({ currentTarget }) => this.showEdge(currentTarget.getAttribute("aria-pressed") !== "true"),
+      "#margin-result button": ({ currentTarget }) =>
+        this.showEdge(currentTarget.getAttribute("aria-pressed") !== "true"),
       "#sway": () => {
         if (this.swaying) this.viewer.setVertices(this.arrays.vertices);
         this.sway(!this.swaying);

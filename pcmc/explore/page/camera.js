@@ -156,7 +156,8 @@ export class Camera {
     const zooms = { "+": 1.15, "=": 1.15, "-": 1 / 1.15 };
     element.addEventListener("keydown", (event) => {
       const { key } = event;
-      if (event.ctrlKey || event.metaKey || event.altKey || !(key in arrows || key in zooms || key === "Home")) return;
+      const known = key in arrows || key in zooms || key === "Home";
+      if (event.ctrlKey || event.metaKey || event.altKey || !known) return;
       event.preventDefault();
       if (key === "Home") this.look("diagonal");
       else if (key in zooms) this.closer(zooms[key]);

@@ -26,17 +26,21 @@ export function digits(x, count = 4) {
   return String(Number(x.toPrecision(count)));
 }
 
-export const input = (type, name, attributes = {}) => element("input", { type, "aria-label": name }, attributes);
+export const input = (type, name, attributes = {}) =>
+  element("input", { type, "aria-label": name }, attributes);
 
 export const button = (text, onclick, name = text) =>
   element("button", { type: "button", onclick, ...(name !== text && { "aria-label": name }) }, text);
 
 export const select = (name, options) =>
-  element("select", { "aria-label": name }, ...options.map(([value, text]) => element("option", { value }, text)));
+  element("select", { "aria-label": name },
+    ...options.map(([value, text]) => element("option", { value }, text)));
 
 /** A box or a radio button with its label; `chosen(checked)` is called when it changes. */
-export const choice = (type, label, checked, chosen, attributes) =>
-  element("label", element("input", { type, checked, onchange: (event) => chosen(event.target.checked) }, attributes), label);
+export function choice(type, label, checked, chosen, attributes) {
+  const onchange = (event) => chosen(event.target.checked);
+  return element("label", element("input", { type, checked, onchange }, attributes), label);
+}
 
 /** A row of a table: its head, and a cell for each further text or node. */
 export const tableRow = (head, cells) =>
@@ -46,6 +50,7 @@ export const tableRow = (head, cells) =>
 export function tableOf(title, columns, rows) {
   const heads = columns.map(([name, unit]) =>
     element("th", { scope: "col" }, name, ...(unit ? [element("span.unit", unit)] : [])));
-  return element("table.parts", element("caption", title), element("thead", element("tr", element("td"), ...heads)),
+  return element("table.parts", element("caption", title),
+    element("thead", element("tr", element("td"), ...heads)),
     element("tbody", ...rows.map(([name, texts]) => tableRow(name, texts))));
 }

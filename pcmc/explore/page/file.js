@@ -32,8 +32,8 @@ export function follow(root, header, session, renew) {
 
 /** The page asks for a name, and again before it replaces a file; `notify(text)` shows how it ended. */
 export function addSaving(opener, dialog, { project, file }, session, notify) {
-  const [name, replace, message, same, cancel] = ["[type=text]", "[type=checkbox]", ".message", ".same", ".cancel"]
-    .map((selector) => dialog.querySelector(selector));
+  const parts = ["[type=text]", "[type=checkbox]", ".message", ".same", ".cancel"];
+  const [name, replace, message, same, cancel] = parts.map((selector) => dialog.querySelector(selector));
   opener.hidden = !project;
   opener.onclick = () => {
     name.value ||= `${file.replace(/\.[^.]+$/, "")}${file.endsWith(".toml") ? "-variant" : ""}.toml`;

@@ -44,7 +44,7 @@ function drawn({ asked, shown }) {
 const percent = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
 const smallPercent = (x) => (x !== null && x < 1e-6 ? "below 0.0001 %" : percent(x));
 
-/** Numbers of the surface shown: [name, text, meaning]; the meaning opens below the name, by mouse and keys. */
+/** Numbers of the surface shown: [name, text, meaning]; the meaning opens below the name. */
 export function showFindings(body, findings, figures, units) {
   const of = (name) => figures.find(({ owner, quantity }) => owner === "roof" && quantity === name)?.value;
   const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
@@ -61,7 +61,8 @@ export function showFindings(body, findings, figures, units) {
     ["Residual", digits(findings.residual, 3), "The unbalanced forces, relative to the forces of single triangles. Below 1e-8 the surface counts as at rest."],
     ...(findings.pinched ? [["Pinched wall", `${findings.pinched} vertices`, "Here the valley between two patches has come down to the plane: it rests there, and the wall below it has no height."]] : []),
     ...findings.rooms.map(({ room, pressure }) =>
-      [`Pressure of ${room}`, measured(pressure, "pressure"), "The volume of this room is prescribed; its pressure is the result."]),
+      [`Pressure of ${room}`, measured(pressure, "pressure"),
+        "The volume of this room is prescribed; its pressure is the result."]),
   ];
   const known = new Set([...body.querySelectorAll("details[open] summary")].map((s) => s.textContent));
   body.replaceChildren(...rows.map(([name, text, meaning]) => tableRow(
@@ -95,8 +96,10 @@ export function showSupports(root, { supports, balance }, units) {
   const rows = [...supports, ...balance.filter(({ of }) => of !== "supports")];
   const forces = (row) => ["x", "y", "z"].map((axis) => row[`force_${axis}`]);
   const most = Math.max(...rows.flatMap(forces).map(Math.abs));
-  const name = ({ of, support, name: own, kind }) => (of ? capital(of) : `${support} ${own === support ? kind : own}`);
-  const heads = ["Length", "x", "y", "z"].map((one, k) => [one, units.given ? (k ? units.force : units.length) : ""]);
+  const name = ({ of, support, name: own, kind }) =>
+    (of ? capital(of) : `${support} ${own === support ? kind : own}`);
+  const unit = (kind) => (units.given ? units[kind] : "");
+  const heads = [["Length", unit("length")], ...["x", "y", "z"].map((axis) => [axis, unit("force")])];
   const texts = (row) => [row.length ? digits(row.length, 3) : "",
     ...forces(row).map((x) => digits(Math.abs(x) > 1e-4 * most ? x : 0, 3))];
   root.replaceChildren(...(supports.length
@@ -110,7 +113,8 @@ export function showCheck(root, check) {
   root.querySelector(".word").textContent = capital(`${check.word}: ${check.sentence}`);
   root.querySelector(".detail").textContent = capital(check.detail);
   root.querySelector("tbody").replaceChildren(...check.rows.flatMap(({ name, value, limit, order }) => {
-    const title = order === null ? "No settled order" : `The error falls with order ${digits(order, 2)} of the edge length`;
+    const title = order === null
+      ? "No settled order" : `The error falls with order ${digits(order, 2)} of the edge length`;
     return [element("tr", element("th", { scope: "rowgroup", colSpan: 2 }, capital(name))),
       element("tr", { title }, element("td", value), element("td", limit))];
   }));

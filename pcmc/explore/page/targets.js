@@ -13,8 +13,8 @@ export class Targets {
 
   /** `meet(aims)` is called to meet them, `stop()` to give up. */
   constructor(root, { controls, quantities, aims, units }, meet, stop) {
-    const parts = [".list", ".message", ".vary", ".add", ".meet", ".stop"].map((one) => root.querySelector(one));
-    const [list, message, vary, add, meeting, stopping] = parts;
+    const [list, message, vary, add, meeting, stopping] = [".list", ".message", ".vary", ".add", ".meet", ".stop"]
+      .map((one) => root.querySelector(one));
     Object.assign(this, { list, message, meeting, stopping, units, meet, choices: quantities });
     list.replaceChildren();
     const given = aims.targets.length ? aims.targets : [{ quantity: "apex", of: quantities[0].of[1] }];
@@ -24,14 +24,16 @@ export class Targets {
       label: name, usual: patch !== null && !wall, parameter: { patch: name, kind: patch === null ? "cable" : "tension" },
     }));
     for (const { label, parameter } of aims.vary) {
-      const same = ({ parameter: { kind, patch } }) => kind === parameter.kind && String(patch) === String(parameter.patch);
+      const same = ({ parameter: { kind, patch } }) =>
+        kind === parameter.kind && String(patch) === String(parameter.patch);
       const known = possible.find(same);
       if (known) Object.assign(known, { parameter, given: true });
       else possible.push({ label, parameter, given: true }); // such as a pressure, or several tied
     }
     this.vary = possible.map(({ label: text, parameter, given: aimed, usual }) => {
       const one = { parameter };
-      one.label = choice("checkbox", text, Boolean(aims.vary.length ? aimed : usual), (on) => on && this.release(one),
+      const checked = Boolean(aims.vary.length ? aimed : usual);
+      one.label = choice("checkbox", text, checked, (on) => on && this.release(one),
         { "aria-label": `${text} may change` });
       one.box = one.label.firstChild;
       return one;
@@ -100,7 +102,8 @@ export class Targets {
     const vary = this.vary.filter(({ box }) => box.checked).map(({ parameter }) => parameter);
     if (!this.rows.length || empty || !vary.length) {
       const missing = empty || !this.rows.length;
-      this.say(missing ? "Give each target a number." : "Choose at least one tension that may change.", "missed");
+      const words = missing ? "Give each target a number." : "Choose at least one tension that may change.";
+      this.say(words, "missed");
       empty?.number.focus();
       return;
     }

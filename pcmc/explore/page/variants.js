@@ -3,7 +3,8 @@
 import { button, capital, digits, element, tableRow } from "./elements.js";
 
 /** The row that begins the rows of a patch, or of all, across the table. */
-const heading = (text, kind = "part") => element("tr", element("th", { scope: "row", colSpan: 5 }, element(`span.${kind}`, text)));
+const heading = (text, kind = "part") =>
+  element("tr", element("th", { scope: "row", colSpan: 5 }, element(`span.${kind}`, text)));
 
 export class Variants {
   pictures = new Map();
@@ -51,9 +52,12 @@ export class Variants {
       .filter(({ value, then }) => value !== null && then !== null && then !== undefined);
     const changed = rows.filter(({ value, then }) => digits(value) !== digits(then));
     const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 2)}`;
-    const difference = ({ quantity, dimension, value, then }) => tableRow(
-      element("span", capital(quantity), ...(units.given ? [element("span.unit", ` ${units[dimension]}`)] : [])),
-      [digits(then), digits(value), signed(value - then), then ? signed((100 * (value - then)) / Math.abs(then)) : ""]);
+    const difference = ({ quantity, dimension, value, then }) => {
+      const unit = units.given ? [element("span.unit", ` ${units[dimension]}`)] : [];
+      const percent = then ? signed((100 * (value - then)) / Math.abs(then)) : "";
+      return tableRow(element("span", capital(quantity), ...unit),
+        [digits(then), digits(value), signed(value - then), percent]);
+    };
     const parts = ["", ...new Set(changed.map(({ of }) => of).filter(Boolean))]; // all, then each
     const shown = parts.flatMap((part) => {
       const own = changed.filter(({ of }) => of === part);

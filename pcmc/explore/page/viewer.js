@@ -35,7 +35,8 @@ export class Viewer {
     this.surface = this.parts([[3], [3], [3], [2]]);
     this.elements = gl.createBuffer();
     this.dots = this.parts([[3], [1]]);
-    this.lines = Object.fromEntries(Object.keys(LIFTS).map((name) => [name, this.parts([[3, 3], [4], [2]], true)]));
+    this.lines = {};
+    for (const name of Object.keys(LIFTS)) this.lines[name] = this.parts([[3, 3], [4], [2]], true);
     this.map = gl.createTexture();
     this.setMap(new Uint8Array(256 * 4));
     gl.enable(gl.DEPTH_TEST);
@@ -217,7 +218,8 @@ export class Viewer {
       (step) => point.map((x, i) => (i === k ? x + step : x)))));
     const between = this.marks.slice(1).flatMap((point, k) => [...this.marks[k], ...point]);
     this.placeLines("marks", [...crosses, ...between], MARK, [1.2]);
-    this.placeLines("section", this.cut === WHOLE ? [] : sectionOf(this.X, this.triangles, this.cut), MARK, [1.4]);
+    const section = this.cut === WHOLE ? [] : sectionOf(this.X, this.triangles, this.cut);
+    this.placeLines("section", section, MARK, [1.4]);
     this.redraw();
   }
 
@@ -304,7 +306,8 @@ export class Viewer {
     for (const [name, lift] of Object.entries(LIFTS)) {
       const part = this.lines[name];
       if (part.count && (name !== "mesh" || spacing > 5)) {
-        this.programs.line({ view, screen, lift, cut: ["grid", "section", "marks"].includes(name) ? WHOLE : cut });
+        const kept = ["grid", "section", "marks"].includes(name) ? WHOLE : cut;
+        this.programs.line({ view, screen, lift, cut: kept });
         gl.enable(gl.BLEND);
         gl.bindVertexArray(part.array);
         gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, part.count);
