@@ -216,6 +216,7 @@ def test_a_patch_alone_and_several_quantities():
     assert f"height of {name}" in found.message
 
 
+@pytest.mark.nightly
 def test_an_end_of_a_junction_that_the_mesh_holds_has_no_limit():
     found = solve_to_accuracy(generators.two_caps(1.6), "height=1e-2", most_triangles=4000)
     assert found.status is AccuracyStatus.NO_LIMIT

@@ -288,6 +288,7 @@ def test_wrong_targets_are_named_on_the_page(page):
     assert page.complaints() == []
 
 
+@pytest.mark.nightly
 def test_sliders_agree_with_their_numbers(page, explorer):
     """Also for values beyond the slider's ends, zero, and another sign."""
     page.enter("Pressure p of right", 500)

@@ -22,6 +22,7 @@ CAP = spherical_cap(edge_length=0.25)
 pytestmark = needs_browser
 
 
+@pytest.mark.nightly
 def test_terms_are_explained_where_they_stand_by_keys_too(page):
     from selenium.webdriver.common.keys import Keys
 
@@ -318,6 +319,7 @@ def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path
         running.quit()
 
 
+@pytest.mark.nightly
 def test_points_are_measured_by_mouse_and_keys_and_a_section_follows_its_slider(driver):
     from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.select import Select

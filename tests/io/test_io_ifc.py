@@ -27,6 +27,7 @@ def roof_of(path):
     return model, roof, {part.Name: part for part in roof.IsDecomposedBy[0].RelatedObjects}
 
 
+@pytest.mark.nightly
 def test_the_validator_of_ifcopenshell_accepts_it(tmp_path):
     """With the rules of the schema; and it refuses a file in which a rule is broken."""
     from generators import two_squares

@@ -375,6 +375,7 @@ def test_only_many_triangles_ask_for_opengl(monkeypatch):
     assert asked
 
 
+@pytest.mark.nightly
 def test_a_million_triangles_are_drawn(tmp_path):
     surface = two_squares(460)
     assert surface.m > 900_000

@@ -388,6 +388,14 @@ PRINTED = {"certify": 1e-5, "report": TEXT, "sheets": 1e-6, **SINGLE}
 """The relative rounding of ways whose numbers are not exact."""
 
 
+CELLS = [
+    pytest.param(name, way, marks=[pytest.mark.nightly] if (row + column) % 2 else [])
+    for row, name in enumerate(PROJECTS)
+    for column, way in enumerate(WAYS)
+]
+"""Every project by every way, half of them at night: by day each way takes every second project."""
+
+
 @pytest.fixture(scope="module")
 def roofs(tmp_path_factory) -> Callable[[str], Roof]:
     """Each project's roof, designed once."""
@@ -416,8 +424,7 @@ def folder(tmp_path, tmp_path_factory, monkeypatch):
 
 
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", PROJECTS)
+@pytest.mark.parametrize(("name", "way"), CELLS)
 def test_it_is_the_same_roof(name, way, roofs, folder, capsys):
     roof = roofs(name)
     found = WAYS[way](roof, capsys) if way == "certify" else WAYS[way](roof)

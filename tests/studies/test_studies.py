@@ -78,7 +78,7 @@ def test_large_figures_shrink_and_small_ones_stay(tmp_path):
 def test_shrunken_figures_keep_rare_colours(tmp_path):
     from PIL import Image
 
-    rows, columns = np.mgrid[0:600, 0:900]
+    rows, columns = np.mgrid[0:300, 0:450]
     rng = np.random.default_rng(1)
     picture = np.stack([rows // 3, columns // 4, 200 + rng.integers(0, 50, rows.shape)], axis=2).astype(
         np.uint8
@@ -223,6 +223,7 @@ def test_the_same_run_twice_gives_the_same_bytes_in_every_table(tmp_path):
         assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
 
 
+@pytest.mark.nightly
 def test_command_runs_from_anywhere_and_ends_with_the_comparison(tmp_path):
     command = [sys.executable, "-m", "studies", "run", "example3", "--short", "--results"]
     environment = os.environ | {"PYTHONPATH": str(HOME), "COLUMNS": "200"}

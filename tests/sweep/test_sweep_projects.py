@@ -345,6 +345,7 @@ def test_two_varied_numbers_mark_what_is_not_certified_and_what_is_missing(monke
     assert next(iter(seen["marks"].values())).tolist() == [[False, True], [False, True]]
 
 
+@pytest.mark.nightly
 def test_a_store_says_how_many_cases_it_keeps(roof, capsys):
     given = ["sweep", "roof.toml", "--workers", "1", "--store", "s", "west.tension=3,3.2"]
     assert cli.main(given) == 0
@@ -410,6 +411,7 @@ def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch)
     assert not (roof.parent / "t.csv").exists()
 
 
+@pytest.mark.nightly
 def test_time_limit_and_failed_cases_again(roof, capsys):
     given = ["sweep", "roof.toml", "west.tension=3,3.2", "--store", "s.sqlite", "--workers", "1"]
     assert cli.main([*given, "--time-limit", "0.001"]) == 1

@@ -30,7 +30,7 @@ def with_volume(volume):
 
 
 def test_solve_case_renames_a_number_that_a_parameter_has_the_name_of():
-    values = solve_case("test_sweep_solving:with_volume", "nesterov", volume=2.0, iterations=0)
+    values = solve_case("tests.sweep.test_sweep_solving:with_volume", "nesterov", volume=2.0, iterations=0)
     assert "volume" not in values
     assert values["volume_reached"] == pcmc.certify(two_squares(4, alpha=2.0)).volume
 

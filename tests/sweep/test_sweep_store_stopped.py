@@ -44,7 +44,7 @@ def test_no_second_sweep_slips_in_between_two_transactions(tmp_path):
         (
             "import sys; from pcmc.sweep.store import open_store\n"
             "from pcmc.base.errors import FileError\n"
-            "from test_sweep_store_stopped import SWEEP\n"
+            "from tests.sweep.test_sweep_store_stopped import SWEEP\n"
             "print('ready', flush=True)\n"
             "for _ in range(300):\n"
             "    try:\n"
