@@ -97,7 +97,7 @@ def test_the_names_of_patches_need_no_mesh(monkeypatch):
     across = [{"curve": [[-1, y], [21, y]], "cable": 1.0, "wall": None} for y in (3.1, 7.7)]
     holes = [circle([5, 5], 1.0), circle([15, 8], 1.5)]
     plans = [
-        Plan(BOX, lines, cut, tension=5.0, edge_length=0.4, supports=spots)
+        Plan(BOX, lines, cut, tension=5.0, edge_length=0.22, supports=spots)
         for lines in ([], chords[:1], chords, across, chords + across)
         for cut, spots in (([], []), (holes, [[2.5, 1.3]]), ([], [circle([10, 6], 2), [[2, 3], [3, 1]]]))
     ]
