@@ -14,7 +14,7 @@ from ..certificate.supports import held_curves
 from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..forces.volume_below import volume_below
 from ..surface import Surface
-from ..surface.topology import Curve
+from ..surface.topology import EdgeCurve
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 SAME = 1e-6  # of the size, cubed: volumes this near are one, up to what solving to rest leaves open
@@ -107,7 +107,7 @@ def given_volume(surface: Surface) -> float | None:
     return given if same and np.abs(share @ signs - roof).max() <= ROUNDING else None
 
 
-def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[Curve, str, Floats, float]]:
+def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[EdgeCurve, str, Floats, float]]:
     """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
 
     Of several curves of one name, each is named with its place.

@@ -17,7 +17,7 @@ from ..base.arrays import Floats
 from ..curves.curves import Curve
 from ..plan import Divider, Hole, Plan
 from ..plan.edges import usual_cable
-from ..plan.lines import SNAP, Kind, Line
+from ..plan.lines import SNAP, Kind, PlanLine
 from .rises import Rise
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried
@@ -55,7 +55,7 @@ def point_masts(plan: Plan) -> list[Mast]:
     parts: Sequence[Hole | Divider] = (*plan.holes, *plan.dividers)
     curves = [s for s in plan.supports if isinstance(s, Curve)]
     curves += [plan.outline, *(part.curve for part in parts)]
-    lines = [Line("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in curves]
+    lines = [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in curves]
     points = np.array([plan.plane.to_local(p) if len(p) == 3 else np.append(p, 0.0) for p in given.values()])
     away = np.min([line.nearest(points[:, :2])[1] for line in lines], axis=0)
     inside = away > SNAP * plan.edge_length

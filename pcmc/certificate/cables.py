@@ -16,7 +16,7 @@ from ..surface import Surface
 from ..surface.geometry import cross_2d, segment_lengths
 from ..surface.parts import Cable
 from ..surface.symmetry import mirrored
-from ..surface.topology import Curve
+from ..surface.topology import EdgeCurve
 from .proof import WeakCable
 from .tables import conormal_sum, middle
 
@@ -235,7 +235,7 @@ def _tangents(surface: Surface, pairs: Ints) -> Floats:
     return directions(surface.vertices, pairs)[0]
 
 
-def _parts(surface: Surface) -> list[tuple[Cable, Curve]]:
+def _parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
     """The parts of each cable of tension > 0 between its ends, branches and the supports in between.
 
     A support in between is a mast that it runs over: a fixed vertex beside one that moves.

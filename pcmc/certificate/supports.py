@@ -11,7 +11,7 @@ import pandas as pd
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Plane, Surface
 from ..surface.geometry import segment_lengths
-from ..surface.topology import POINT, Curve, vertex_kind
+from ..surface.topology import POINT, EdgeCurve, vertex_kind
 from .cables import cable_ends
 from .reactions import SupportForces, at_both_ends, held_boundary, sheet_pulls
 from .tables import middle, names_of
@@ -106,7 +106,7 @@ def _labelled(acting: SupportForces) -> Iterator[tuple[str, _Part]]:
         yield f"{letter}{count[letter]}", part
 
 
-def held_curves(surface: Surface) -> tuple[Curve, ...]:
+def held_curves(surface: Surface) -> tuple[EdgeCurve, ...]:
     """The curves of the held boundary but for mirror planes, each along one patch and one support."""
     topo, held = surface.topology, held_boundary(surface)
     stop = vertex_kind(topo.edges[topo.boundary_edge & ~surface.mirror_edge], surface.n) == POINT
@@ -234,7 +234,7 @@ def _points(acting: SupportForces) -> Iterator[_Part]:
 def _line(
     acting: SupportForces,
     kind: str,
-    curve: Curve,
+    curve: EdgeCurve,
     forces: Floats,
     where: str = "",
     pulls: Floats | None = None,
@@ -274,5 +274,5 @@ def _kind(surface: Surface, plane: Plane) -> str:
     return "upright plane" if steep else "plane"
 
 
-def _unique_names(surface: Surface, curve: Curve) -> str:
+def _unique_names(surface: Surface, curve: EdgeCurve) -> str:
     return names_of(surface, dict.fromkeys(curve.sheets))

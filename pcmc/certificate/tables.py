@@ -13,7 +13,7 @@ from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_
 from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
-from ..surface.topology import Curve
+from ..surface.topology import EdgeCurve
 
 ROUNDING = 1e-8  # of the size, about what a solve leaves: a coordinate below is 0
 THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth telling
@@ -58,7 +58,7 @@ def sides_at(surface: Surface, edges: Ints) -> tuple[Ints, Ints, Ints]:
     return at[face, corner], face, corners
 
 
-def middle(surface: Surface, curve: Curve) -> dict[str, float]:
+def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
     """The point half way along a curve, or the centre of a closed one; tells curves of one name apart."""
     ends, lengths = surface.vertices[curve.pairs], segment_lengths(surface.vertices, curve.pairs)
     if curve.closed:

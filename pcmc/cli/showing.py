@@ -120,7 +120,7 @@ def explore(
       pcmc explore --example two_caps --set edge_length=1.2
     """
     from ..explore import open_and_wait, start_roof
-    from ..explore.roof import Roof, read_roof
+    from ..explore.roof import ShownRoof, read_roof
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
@@ -135,7 +135,7 @@ def explore(
             roof, again = read(progress=progress, report=report), read if watch else None
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
-            roof = Roof.of(_example(str(example), values), str(example))
+            roof = ShownRoof.of(_example(str(example), values), str(example))
         progress("solving")
         explorer = start_roof(roof, host, port, again)
     open_and_wait(explorer, browser)

@@ -73,7 +73,7 @@ def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> lis
     return patches
 
 
-class Whole(NamedTuple):
+class WholeMesh(NamedTuple):
     """What belongs to the whole surface and not to a mesh: the first mesh's attribute ``pcmc``."""
 
     plane: Plane = Plane()
@@ -86,11 +86,11 @@ class Whole(NamedTuple):
     ] = ()  # that held vertices were drawn on; their vertices are keys of the meshes
 
 
-def read_whole(named: Mapping[str, Any]) -> Whole:
+def read_whole(named: Mapping[str, Any]) -> WholeMesh:
     """That of the one mesh that has it; without it Π is z = 0, and there is nothing else."""
     owners = [name for name, mesh in named.items() if KEY in mesh.attributes]
     if not owners:
-        return Whole()
+        return WholeMesh()
     values = named[owners[0]].attributes[KEY]
     for other in owners[1:]:
         if named[other].attributes[KEY] != values:
@@ -103,7 +103,7 @@ def read_whole(named: Mapping[str, Any]) -> Whole:
         return kind(**{**row, **vectors})
 
     try:
-        return Whole(
+        return WholeMesh(
             made(Plane, values["plane"]),
             tuple(made(Circle if "radius" in one else Line, one) for one in values.get("guides", ())),
             tuple(made(Plane, one) for one in values.get("planes", ())),
@@ -127,7 +127,7 @@ class Vertex(NamedTuple):
     planes: Sequence[int]  # numbers of the planes besides Π that it slides on
 
 
-def read_vertices(named: Mapping[str, Any], whole: Whole) -> tuple[list[Vertex], bool, int]:
+def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vertex], bool, int]:
     """The vertices of all meshes, one mesh after the other; whether any has an attribute for its support.
 
     And how many more vertices there are, which no face uses.

@@ -137,7 +137,7 @@ def read_settings() -> Settings:
     return settings
 
 
-class Handler(SimpleXMLRPCRequestHandler):
+class CallHandler(SimpleXMLRPCRequestHandler):
     """Answers a request of the owner's program; refuses all others before their content is read."""
 
     timeout = SECONDS  # in seconds; a connection that says nothing holds a thread no longer
@@ -191,7 +191,7 @@ class LoopbackServer(ThreadingMixIn, Server):
     allow_reuse_address = os.name == "posix"  # elsewhere it lets another program take the same port
 
     def __init__(self, port: int) -> None:
-        super().__init__((HOST, port), requestHandler=Handler, logRequests=False)
+        super().__init__((HOST, port), requestHandler=CallHandler, logRequests=False)
         self._lock = threading.Lock()  # warnings are recorded, which two threads cannot do at once
         offered: tuple[Callable[..., Any], ...] = (service.solve, service.certify, read, write)
         self._offered = {f"{PACKAGE}.{function.__name__}": function for function in offered}

@@ -24,7 +24,7 @@ from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from .correction import BorderedMatrix, NotOnBranch, correct, fixed_arclength
 from .options import FollowOptions
-from .state import BranchMesh, State
+from .state import BranchMesh, BranchState
 
 TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
 NULL = 0.05  # of the next eigenvalue: how far from 0 that of the mode may be
@@ -62,7 +62,7 @@ class Tangent:
         square = self.weights @ np.einsum("ij,ij->i", d, d)
         return float(np.sqrt(square + (change / self.scale) ** 2))
 
-    def on(self, old: State, new: State) -> Tangent:
+    def on(self, old: BranchState, new: BranchState) -> Tangent:
         """The tangent on another mesh: each vertex takes it from the nearest one of the old mesh."""
         nearest = cKDTree(old.X).query(new.X)[1]
         return Tangent(self.direction[nearest], self.slope, new.area_weights, self.scale)
@@ -72,14 +72,14 @@ class Tangent:
 class BranchPoint:
     """A point of the branch."""
 
-    state: State
+    state: BranchState
     tangent: Tangent
     eigenvalues: Floats  # all negative ones and at least one more, ascending, force/length³
     index: int  # the number of negative ones
     room_rates: Floats  # (r,) the derivatives of the rooms' pressures by arclength
 
 
-def branch_point(at: State, before: Tangent | float) -> BranchPoint:
+def branch_point(at: BranchState, before: Tangent | float) -> BranchPoint:
     """The point of the branch at a state on it.
 
     ``before`` gives the sense of the tangent: a tangent nearby, or the sign of dλ/ds.
@@ -108,7 +108,7 @@ def _counted() -> Iterator[None]:
         raise NotOnBranch(f"the second variation has no eigenvalues that can be told ({error})") from None
 
 
-def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
+def soft_modes(at: BranchState, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, nearest first, and their motions (k,n,3)."""
     with _counted():
         second = at.rest.factorised(soften=False)
@@ -136,7 +136,7 @@ def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int
     OptionError
         If no mode has the eigenvalue 0 there, or no other branch is found; ``where`` is ``row``.
     """
-    at = State(mesh, mesh.surface.vertices, parameter)
+    at = BranchState(mesh, mesh.surface.vertices, parameter)
     try:
         values, modes = soft_modes(at, 2)
     except NotOnBranch as reason:
@@ -154,7 +154,7 @@ def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int
     return [_off(at, Tangent(sign * mode, 0.0, weights, scale), options, row) for sign in (1.0, -1.0)]
 
 
-def _off(at: State, mode: Tangent, options: FollowOptions, row: int) -> BranchPoint:
+def _off(at: BranchState, mode: Tangent, options: FollowOptions, row: int) -> BranchPoint:
     """The point of the branch at the distance of a step along the mode, or nearer."""
     length, difficulty = min(abs(options.step), options.largest), ""
     while length >= options.smallest:

@@ -29,7 +29,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
 from ..stability.factorisation import SingularMatrix
-from .state import BranchMesh, State
+from .state import BranchMesh, BranchState
 
 ITERATIONS = 12  # most Newton steps of a correction
 SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
@@ -48,7 +48,7 @@ class MeshCollapsed(NotOnBranch):
 class ContactChanged(NotOnBranch):
     """The contact of a wall with Π may change near this state."""
 
-    def __init__(self, near: State) -> None:
+    def __init__(self, near: BranchState) -> None:
         super().__init__("the contact of a wall with the plane changes")
         self.near = near
 
@@ -60,8 +60,8 @@ class Constraint:
     ``parameter`` : λ, if the equation gives it: then it has that value to the last digit.
     """
 
-    value: Callable[[State], float]
-    gradient: Callable[[State], Floats]
+    value: Callable[[BranchState], float]
+    gradient: Callable[[BranchState], Floats]
     rate: float
     parameter: float | None = None
 
@@ -73,7 +73,7 @@ def fixed_parameter(parameter: float, scale: float) -> Constraint:
     )
 
 
-def fixed_arclength(near: State, row: Floats, rate: float) -> Constraint:
+def fixed_arclength(near: BranchState, row: Floats, rate: float) -> Constraint:
     """⟨row, X - X₀⟩ + rate (λ - λ₀) = 0, pseudo-arclength: across the tangent form at a state."""
     return Constraint(
         lambda at: float((row * (at.X - near.X)).sum()) + rate * (at.parameter - near.parameter),
@@ -103,7 +103,7 @@ class BorderedMatrix:
     changes; ``unit`` brings it to the size of the others.
     """
 
-    def __init__(self, at: State, row: Floats, rate: float) -> None:
+    def __init__(self, at: BranchState, row: Floats, rate: float) -> None:
         self.at, self.row = at, row
         self.rate = rate if at.carried is None else rate + float((row * at.carried).sum())
         try:
@@ -149,7 +149,7 @@ class BorderedMatrix:
         return np.append(change + at.parameter_derivative * z[-1], self.unit * (along + self.rate * z[-1]))
 
 
-def correct(start: State, constraint: Constraint, tolerance: float) -> State:
+def correct(start: BranchState, constraint: Constraint, tolerance: float) -> BranchState:
     """The point of the branch near a state that meets the constraint too; NotOnBranch where there is none."""
     mesh, at, asked = start.mesh, start, constraint.parameter
     if asked is not None and asked != start.parameter:

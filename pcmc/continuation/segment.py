@@ -16,14 +16,14 @@ import numpy as np
 
 from ..forces.functional import patch_volumes
 from .branch_point import BranchPoint, branch_point
-from .state import State
+from .state import BranchState
 
 EVENT_ACCURACY = 2e-5  # arclength to which events are located, and so λ relative to its scale
 FOLD_ACCURACY = 1e-3  # the same for folds, over the segment's length: λ hardly changes with t there
 GOAL_ACCURACY = 1e-12  # arclength to which goals are met
 
 
-def crosses_goal(before: State, after: State, goals: Mapping[str, float]) -> bool:
+def crosses_goal(before: BranchState, after: BranchState, goals: Mapping[str, float]) -> bool:
     """Whether a goal lies between the quantities of two states."""
     return any(
         (getattr(before, name) - goal) * (getattr(after, name) - goal) < 0.0 for name, goal in goals.items()
@@ -40,7 +40,7 @@ class Segment:
     start: BranchPoint
     end: BranchPoint
     length: float
-    solve: Callable[[float], State]
+    solve: Callable[[float], BranchState]
 
     @property
     def same_mesh(self) -> bool:

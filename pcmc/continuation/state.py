@@ -84,7 +84,7 @@ class BranchMesh:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class BranchState:
     """Positions X (n,3) on a mesh, a value of the parameter λ, and the Newton steps that led there.
 
     ``room_changes`` (r,) are the pressures of rooms of prescribed volume, less those of the mesh's surface.
@@ -200,7 +200,7 @@ class State:
 
     def step(
         self, d: Floats, parameter: float, iterations: int = 0, rooms: tuple[float, ...] | None = None
-    ) -> State:
+    ) -> BranchState:
         """The state at X + d (n,3) and λ, its boundary where λ has it, with these ``room_changes``."""
         X = self.moved(d)
         boundary = self.mesh.line.boundary(parameter)
@@ -208,7 +208,7 @@ class State:
             fixed = self.mesh.surface.pinned
             X = self.moved(d + self.mesh.carried(boundary - X[fixed], self.X))
             X[fixed] = boundary
-        return State(self.mesh, X, parameter, iterations, self.room_changes if rooms is None else rooms)
+        return BranchState(self.mesh, X, parameter, iterations, self.room_changes if rooms is None else rooms)
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their junction."""

@@ -35,7 +35,7 @@ from .correction import (
 from .direction import ParameterLine
 from .options import Ending, FollowOptions
 from .segment import EVENT_ACCURACY, Segment, crosses_goal
-from .state import BranchMesh, State
+from .state import BranchMesh, BranchState
 
 START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
 QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
@@ -46,7 +46,7 @@ MAX_BEND = 0.5  # correction over step length above which a step is refused
 MANY_ITERATIONS = 7  # a correction that took more Newton steps may have ended on another branch
 
 
-class Step(NamedTuple):
+class BranchStep(NamedTuple):
     """A step that succeeded: its segment, its correction over its length, and the events on it."""
 
     segment: Segment
@@ -83,7 +83,7 @@ class Tracer:
 
     def first_point(self, mesh: BranchMesh) -> BranchPoint:
         """The surface given, corrected to the tolerance."""
-        start = State(mesh, mesh.surface.vertices, self.line.value)
+        start = BranchState(mesh, mesh.surface.vertices, self.line.value)
         free = start.rest.rigid.shape[1]
         if free:
             message = f"follow: nothing holds the surface against {free} rigid motions"
@@ -144,7 +144,7 @@ class Tracer:
             length = min(longer * length, self.options.largest)
         return Ending.STEPS, difficulty
 
-    def step(self, length: float) -> Step:
+    def step(self, length: float) -> BranchStep:
         """The next point, at this length, or nearer if a goal is."""
         here = self.here.state
         try:
@@ -172,9 +172,9 @@ class Tracer:
                 given = fixed_parameter(asked, self.line.scale)
                 end = branch_point(correct(end.state, given, self.options.tolerance), self.here.tangent)
             segment = replace(segment, end=end, length=goal[0])
-        return Step(segment, bend, goal is not None, self.events_on(segment))
+        return BranchStep(segment, bend, goal is not None, self.events_on(segment))
 
-    def bend(self, there: State, length: float) -> float:
+    def bend(self, there: BranchState, length: float) -> float:
         """Distance of a state from the tangent, over the length of the step."""
         ahead = self.predict(length)
         distance = self.here.tangent.length(there.X - ahead.X, there.parameter - ahead.parameter)
@@ -184,17 +184,17 @@ class Tracer:
             raise NotOnBranch("the branch bends too sharply for the step")
         return distance / length
 
-    def predict(self, t: float) -> State:
+    def predict(self, t: float) -> BranchState:
         """The state on the tangent at arclength t from here."""
         here, tangent = self.here.state, self.here.tangent
         return here.step(t * tangent.direction, here.parameter + t * tangent.slope)
 
-    def solve_at(self, t: float) -> State:
+    def solve_at(self, t: float) -> BranchState:
         """The state on the branch at arclength t from here."""
         ahead = self.predict(t)
         return correct(ahead, self.constraint(t, ahead), self.options.tolerance)
 
-    def constraint(self, t: float, ahead: State) -> Constraint:
+    def constraint(self, t: float, ahead: BranchState) -> Constraint:
         """What the control prescribes at arclength t from here."""
         here, tangent = self.here.state, self.here.tangent
         if self.options.control == "parameter":
@@ -206,7 +206,7 @@ class Tracer:
             return fixed_height(here.mesh, ahead.highest_vertex, ahead.height)
         return fixed_arclength(ahead, tangent.row, tangent.rate)
 
-    def solve_contact(self, near: State) -> State:
+    def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
         surface = near.with_values(near.mesh.surface_in_contact(near.X))
         tolerance, backend = self.options.tolerance, self.options.backend
@@ -216,7 +216,7 @@ class Tracer:
         if not result.converged:
             raise NotOnBranch(f"contact of a wall with the plane changes, and {result.message}")
         mesh = self.mesh(result.surface)
-        return State(mesh, mesh.surface.vertices, near.parameter, result.iterations)
+        return BranchState(mesh, mesh.surface.vertices, near.parameter, result.iterations)
 
     def maintain_mesh(self) -> None:
         """Redistribute the vertices where triangles are poor, or remesh, and return to the branch."""
@@ -231,10 +231,10 @@ class Tracer:
                 mesh = self.mesh(remesh(self.surface_at(here), self.options.remesh))
             except SurfaceError:
                 return
-            start = State(mesh, mesh.surface.vertices, here.parameter)
+            start = BranchState(mesh, mesh.surface.vertices, here.parameter)
             self.continue_from(start, tangent.on(here, start))
 
-    def continue_from(self, start: State, tangent: Tangent) -> None:
+    def continue_from(self, start: BranchState, tangent: Tangent) -> None:
         """Go on from the point of the branch near a state, on the plane across a tangent.
 
         Stay on the old mesh if a goal lies between, or an event unless the mesh is very poor: on the
@@ -281,7 +281,7 @@ class Tracer:
         return [self.event(kind, after.state, length, before.index, after.index) for kind in kinds]
 
     def event(
-        self, kind: str, at: State, t: float, before: int, after: int, along: float = math.nan
+        self, kind: str, at: BranchState, t: float, before: int, after: int, along: float = math.nan
     ) -> dict[str, Any]:
         """A row of the table of events, t from here."""
         return {
@@ -314,7 +314,7 @@ class Tracer:
         if self.callback is not None:
             self.callback(Progress(number, lambda: self.surface_at(here.state), self.rows[-1]))
 
-    def columns(self, at: State) -> dict[str, Any]:
+    def columns(self, at: BranchState) -> dict[str, Any]:
         """The columns of both tables."""
         rooms = zip(at.surface.rooms, room_pressures(at.surface).tolist(), strict=True)
         return {
@@ -324,6 +324,6 @@ class Tracer:
             **{name: getattr(at, name) for name in ("energy", "volume", "height")},
         }
 
-    def surface_at(self, at: State) -> Surface:
+    def surface_at(self, at: BranchState) -> Surface:
         """The whole surface at a state."""
         return at.with_values(at.mesh.full_surface(at.X))

@@ -24,7 +24,7 @@ from ..surface import Surface, expect_surface
 from . import dxf, pdf, views
 from .panel_sheets import flat_panels
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sheet import FORMATS, Line, Sheet, add_frames, table_sheets
+from .sheet import FORMATS, Sheet, SheetLine, add_frames, table_sheets
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
@@ -39,8 +39,8 @@ class DrawingSet:
     surface: Surface
     units: str  # of its lengths
     certificate: Certificate  # of the surface
-    curves: Sequence[Line]  # ridges, rims, wall lines and cables
-    sections: Sequence[Line]  # in which each plane cuts the roof
+    curves: Sequence[SheetLine]  # ridges, rims, wall lines and cables
+    sections: Sequence[SheetLine]  # in which each plane cuts the roof
     points: pd.DataFrame  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable)
     marks: Sequence[tuple[str, Floats]]  # name and place (3,) of each mast or other support of one point
     schedule: Panels | None  # the panels, if a tolerance was given
@@ -204,7 +204,7 @@ def check_suffix(path: Path) -> str:
     return suffix_of(path, SUFFIXES, "a drawing")
 
 
-def _setting_out(curves: Sequence[Line]) -> pd.DataFrame:
+def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
     order: dict[int, tuple[Floats, str]] = {}
     open_ended = [c for c in curves if not (c.closed or c.layer == "PCMC-CABLE")]
@@ -218,7 +218,7 @@ def _setting_out(curves: Sequence[Line]) -> pd.DataFrame:
     return pd.DataFrame({"point": names, "x": at[:, 0], "y": at[:, 1], "z": at[:, 2], "on": where})
 
 
-def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[Line]]]:
+def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[SheetLine]]]:
     """Each height with the lines of its section."""
     low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
     given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
@@ -231,7 +231,7 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
     return [cut for cut in cuts if cut[1]]
 
 
-def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[Line]]]:
+def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
     if lines is None:
         low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..panelling import Panels
 from ..panelling.flat import packed, turned_to_fit
-from .sheet import WIDTH, Line, Sheet, Text, corner, drawing_area, table_sheets
+from .sheet import WIDTH, Sheet, SheetLine, Text, corner, drawing_area, table_sheets
 
 
 def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]:
@@ -61,7 +61,7 @@ def _labels(schedule: Panels) -> list[list[str]]:
 
 
 def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: list[str]) -> None:
-    sheet.lines.append(Line(corners, "PCMC-CUT", True))
+    sheet.lines.append(SheetLine(corners, "PCMC-CUT", True))
     edges = np.roll(corners, 1, axis=0) - np.roll(corners, -1, axis=0)  # edge j is opposite corner j
     lengths = np.linalg.norm(edges, axis=1)
     middle = (lengths[:, None] * corners).sum(axis=0) / lengths.sum()  # of the inscribed circle

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..io.libraries import require
-from .sheet import LAYERS, Line, Sheet, Text
+from .sheet import LAYERS, Sheet, SheetLine, Text
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 CAPITAL = 0.73  # height of a capital in the size of its font
@@ -46,7 +46,7 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
     canvas.save()
 
 
-def paint(canvas: Any, lines: Sequence[Line], texts: Sequence[Text], boxed: bool = False) -> None:
+def paint(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
     """Draw on a canvas of reportlab, from its origin; ``boxed`` texts hide what is behind them."""
     from reportlab.lib.colors import HexColor
     from reportlab.lib.units import mm

@@ -24,7 +24,7 @@ TINY, SMALL, LARGE = 1.8, 2.5, 3.5  # mm: heights of letters
 WIDTH = 0.72  # of a letter, in its height, for what must fit
 
 
-class Layer(NamedTuple):
+class SheetLayer(NamedTuple):
     """A layer of a drawing."""
 
     color: int  # by AutoCAD's index
@@ -33,25 +33,25 @@ class Layer(NamedTuple):
 
 
 LAYERS = {
-    "PCMC-RIDGE": Layer(1, 50, "junctions of the roof: ridges and valleys"),
-    "PCMC-RIM": Layer(7, 50, "rims of the roof"),
-    "PCMC-WALL": Layer(3, 35, "bottoms and ends of walls"),
-    "PCMC-CABLE": Layer(6, 70, "cables"),
-    "PCMC-PANEL": Layer(8, 13, "edges of panels"),
-    "PCMC-SECTION": Layer(5, 50, "sections of the roof"),
-    "PCMC-SECTION-WALL": Layer(3, 35, "sections of walls"),
-    "PCMC-POINT": Layer(6, 18, "setting-out points"),
-    "PCMC-SUPPORT": Layer(5, 50, "masts and other supports of one point"),
-    "PCMC-DIM": Layer(7, 18, "dimensions and levels"),
-    "PCMC-TEXT": Layer(7, 18, "texts, numbers and tables"),
-    "PCMC-FRAME": Layer(7, 35, "frames of sheets"),
-    "PCMC-CUT": Layer(7, 25, "outlines of panels at true size"),
-    "PCMC-LABEL": Layer(5, 13, "labels of panels' edges"),
-    "PCMC-MARK": Layer(1, 35, "what must not be overlooked"),
+    "PCMC-RIDGE": SheetLayer(1, 50, "junctions of the roof: ridges and valleys"),
+    "PCMC-RIM": SheetLayer(7, 50, "rims of the roof"),
+    "PCMC-WALL": SheetLayer(3, 35, "bottoms and ends of walls"),
+    "PCMC-CABLE": SheetLayer(6, 70, "cables"),
+    "PCMC-PANEL": SheetLayer(8, 13, "edges of panels"),
+    "PCMC-SECTION": SheetLayer(5, 50, "sections of the roof"),
+    "PCMC-SECTION-WALL": SheetLayer(3, 35, "sections of walls"),
+    "PCMC-POINT": SheetLayer(6, 18, "setting-out points"),
+    "PCMC-SUPPORT": SheetLayer(5, 50, "masts and other supports of one point"),
+    "PCMC-DIM": SheetLayer(7, 18, "dimensions and levels"),
+    "PCMC-TEXT": SheetLayer(7, 18, "texts, numbers and tables"),
+    "PCMC-FRAME": SheetLayer(7, 35, "frames of sheets"),
+    "PCMC-CUT": SheetLayer(7, 25, "outlines of panels at true size"),
+    "PCMC-LABEL": SheetLayer(5, 13, "labels of panels' edges"),
+    "PCMC-MARK": SheetLayer(1, 35, "what must not be overlooked"),
 }
 
 
-class Line(NamedTuple):
+class SheetLine(NamedTuple):
     """A polyline (k,2), mm; or (k,3) in the model, with its name and the numbers of its vertices."""
 
     points: Floats
@@ -93,7 +93,7 @@ class Dimension(NamedTuple):
         """The distance as it is written."""
         return f"{abs(self.end - self.start)[self.axis] * self.unit:.{self.decimals}f}"
 
-    def drawn(self) -> tuple[list[Line], Text]:
+    def drawn(self) -> tuple[list[SheetLine], Text]:
         """Its lines and its text, for files that have no dimensions of their own."""
         ends, other = np.array([self.start, self.end]), 1 - self.axis
         feet, beside = ends.copy(), np.zeros(2)
@@ -104,7 +104,7 @@ class Dimension(NamedTuple):
         text = Text(
             feet.mean(axis=0) + 0.8 * beside, self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis
         )
-        return [Line(line, "PCMC-DIM") for line in lines], text
+        return [SheetLine(line, "PCMC-DIM") for line in lines], text
 
 
 TICK = np.array([[-0.8, -0.8], [0.8, 0.8]])  # mm
@@ -117,7 +117,7 @@ class Sheet:
     title: str
     format: str
     scale: str = ""
-    lines: list[Line] = field(default_factory=list)
+    lines: list[SheetLine] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
     dimensions: list[Dimension] = field(default_factory=list)
 
@@ -126,7 +126,7 @@ class Sheet:
         """Width and height, mm."""
         return FORMATS[self.format]
 
-    def drawn(self) -> tuple[list[Line], list[Text]]:
+    def drawn(self) -> tuple[list[SheetLine], list[Text]]:
         """All lines and texts, those of dimensions too."""
         parts = [dimension.drawn() for dimension in self.dimensions]
         return self.lines + [line for lines, _ in parts for line in lines], self.texts + [t for _, t in parts]
@@ -190,7 +190,7 @@ def add_frames(sheets: list[Sheet], name: str, units: str, mark: str) -> None:
         low, right, top = MARGIN, width - MARGIN, height - MARGIN
         frame = np.array([[low, low], [right, low], [right, top], [low, top]])
         strip = np.array([[low, low + STRIP], [right, low + STRIP]])
-        sheet.lines += [Line(frame, "PCMC-FRAME", True), Line(strip, "PCMC-FRAME")]
+        sheet.lines += [SheetLine(frame, "PCMC-FRAME", True), SheetLine(strip, "PCMC-FRAME")]
         upper, lower = low + 0.7 * STRIP, low + 0.28 * STRIP
         about = [name, f"scale {sheet.scale}" if sheet.scale else "", f"lengths in {units}"]
         sheet.texts += [
@@ -230,5 +230,5 @@ def table_sheets(
             y = top - (k + 0.5) * step
             sheets[-1].texts += [Text((x, y), text, align="R") for x, text in zip(right, row, strict=True)]
         rule = np.array([[left, top - step], [right[-1], top - step]])
-        sheets[-1].lines.append(Line(rule, "PCMC-FRAME"))
+        sheets[-1].lines.append(SheetLine(rule, "PCMC-FRAME"))
     return sheets

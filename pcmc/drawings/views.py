@@ -20,8 +20,8 @@ from .sheet import (
     SMALL,
     TINY,
     Dimension,
-    Line,
     Sheet,
+    SheetLine,
     Text,
     corner,
     drawing_area,
@@ -46,7 +46,7 @@ class View:
     """What is drawn on two axes, in the surface's unit."""
 
     title: str
-    lines: list[Line] = field(default_factory=list)
+    lines: list[SheetLine] = field(default_factory=list)
     texts: list[tuple[Floats, str, Floats]] = field(default_factory=list)  # at points, in a direction (2,)
     points: list[tuple[Floats, str, str]] = field(default_factory=list)  # marked, with their names and layers
     stations: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # along each axis, to be dimensioned
@@ -59,7 +59,7 @@ class View:
         return every.min(axis=0), every.max(axis=0)
 
 
-def model_curves(surface: Surface) -> list[Line]:
+def model_curves(surface: Surface) -> list[SheetLine]:
     """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone; cables."""
     names = [patch.name for patch in surface.patches]
     found = [
@@ -70,12 +70,12 @@ def model_curves(surface: Surface) -> list[Line]:
     for cable in surface.cables:
         found += [("PCMC-CABLE", c, cable.name) for c in surface.topology.chains(cable.edges, nowhere)]
     return [
-        Line(surface.vertices[c.vertices], layer, c.closed, name, tuple(c.vertices.tolist()))
+        SheetLine(surface.vertices[c.vertices], layer, c.closed, name, tuple(c.vertices.tolist()))
         for layer, c, name in found
     ]
 
 
-def outline(curves: Sequence[Line], axis: Sequence[float]) -> Floats:
+def outline(curves: Sequence[SheetLine], axis: Sequence[float]) -> Floats:
     """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
     places = []
     for curve in curves:
@@ -91,10 +91,10 @@ def outline(curves: Sequence[Line], axis: Sequence[float]) -> Floats:
     return np.concatenate(places) if places else np.empty(0)
 
 
-def cut(surface: Surface, point: Floats, normal: Floats) -> list[Line]:
+def cut(surface: Surface, point: Floats, normal: Floats) -> list[SheetLine]:
     """The lines in which a plane cuts the roof and its walls."""
     return [
-        Line(
+        SheetLine(
             one.points,
             "PCMC-SECTION" if surface.roof[one.patch] else "PCMC-SECTION-WALL",
             one.closed,
@@ -104,14 +104,14 @@ def cut(surface: Surface, point: Floats, normal: Floats) -> list[Line]:
     ]
 
 
-def _seen(title: str, surface: Surface, curves: Sequence[Line], axes: Floats, faces: Bools) -> View:
+def _seen(title: str, surface: Surface, curves: Sequence[SheetLine], axes: Floats, faces: Bools) -> View:
     """The edges of faces and the curves on two axes (2,3)."""
     edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[faces])]
-    lines = [Line(pair, "PCMC-PANEL") for pair in surface.vertices[edges] @ axes.T]
+    lines = [SheetLine(pair, "PCMC-PANEL") for pair in surface.vertices[edges] @ axes.T]
     return View(title, lines + [curve._replace(points=curve.points @ axes.T) for curve in curves])
 
 
-def plan(surface: Surface, curves: Sequence[Line], points: Sequence[tuple[Floats, str, str]]) -> View:
+def plan(surface: Surface, curves: Sequence[SheetLine], points: Sequence[tuple[Floats, str, str]]) -> View:
     """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
@@ -125,7 +125,7 @@ def plan(surface: Surface, curves: Sequence[Line], points: Sequence[tuple[Floats
     return view
 
 
-def elevations(surface: Surface, curves: Sequence[Line]) -> list[View]:
+def elevations(surface: Surface, curves: Sequence[SheetLine]) -> list[View]:
     """From four sides: curves, the edges of the panels that face the viewer, and levels."""
     height, normal = surface.vertices[:, 2], area_vectors(surface.vertices[surface.faces])
     views = []
@@ -139,7 +139,9 @@ def elevations(surface: Surface, curves: Sequence[Line]) -> list[View]:
     return views
 
 
-def contours(surface: Surface, curves: Sequence[Line], cuts: Sequence[tuple[float, list[Line]]]) -> View:
+def contours(
+    surface: Surface, curves: Sequence[SheetLine], cuts: Sequence[tuple[float, list[SheetLine]]]
+) -> View:
     """Sections at heights, seen from above, each with its height."""
     view = plan(surface, curves, ())
     view.title = "sections at heights"
@@ -151,7 +153,7 @@ def contours(surface: Surface, curves: Sequence[Line], cuts: Sequence[tuple[floa
     return view
 
 
-def profile(name: str, start: Floats, along: Floats, lines: Sequence[Line]) -> View:
+def profile(name: str, start: Floats, along: Floats, lines: Sequence[SheetLine]) -> View:
     """A section along a line in the plan: distance from the line's first point, and height.
 
     Its stations and levels are the ends of its lines, where the roof ends or meets a wall, and its top.
@@ -213,7 +215,7 @@ def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -
 def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     """Lines, marked points, and the names that find room: those of supports and cables first."""
     sheet.lines += [
-        Line(factor * line.points + shift, line.layer, line.closed)
+        SheetLine(factor * line.points + shift, line.layer, line.closed)
         for line in sorted(view.lines, key=lambda line: line.layer != "PCMC-PANEL")
     ]
     small: list[Text] = []
@@ -225,10 +227,12 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     for at, name, layer in view.points:
         place = factor * at + shift
         half, height = (0.8, TINY) if layer == "PCMC-POINT" else (1.5, SMALL)
-        sheet.lines += [Line(place + half * np.array([[-1.0, s], [1.0, -s]]), layer) for s in (-1.0, 1.0)]
+        sheet.lines += [
+            SheetLine(place + half * np.array([[-1.0, s], [1.0, -s]]), layer) for s in (-1.0, 1.0)
+        ]
         if layer != "PCMC-POINT":
             square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-            sheet.lines.append(Line(place + half * square, layer, True))
+            sheet.lines.append(SheetLine(place + half * square, layer, True))
             marks.append(Text(place, "##", align="C"))  # kept free of names
         beside = place + np.array([half + 0.3, half + 0.6 * height])
         (small if layer == "PCMC-POINT" else large).append(Text(beside, name, height, layer))
@@ -253,7 +257,7 @@ def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, deci
         x, z = float(high[0]) + 3.0, (y - shift[1]) / factor
         mark = np.array([[x, y], [x + 1.2, y + 2.0], [x - 1.2, y + 2.0]])
         rule = np.array([[x - 2.0, y], [x + 18.0, y]])
-        sheet.lines += [Line(mark, "PCMC-DIM", True), Line(rule, "PCMC-DIM")]
+        sheet.lines += [SheetLine(mark, "PCMC-DIM", True), SheetLine(rule, "PCMC-DIM")]
         text = f"{z:+.{decimals}f}"
         text = text if float(text) else f"±{abs(z):.{decimals}f}"
         sheet.texts.append(Text((x + 2.0, y + 0.7 * SMALL), text, layer="PCMC-DIM"))

@@ -36,7 +36,7 @@ WALLS = (1.0, 0.6)  # of the equal tension: the most that a wall has at the star
 FLAT = 1e-6  # of the size: curves whose middles are nearer to each other are not moved
 
 
-class Start(NamedTuple):
+class HomotopyStart(NamedTuple):
     """An easier surface, and the parameter of the branch from it; ``share`` of what is asked for it has."""
 
     surface: Surface
@@ -55,7 +55,7 @@ class Homotopy:
     way: str
     note: str
     asked: Surface
-    starts: Iterable[Start]
+    starts: Iterable[HomotopyStart]
     unit: float = 1.0
     options: Mapping[str, Any] = field(default_factory=lambda: {"levels": 0, "target": "minimum"})
     steps: int = 80
@@ -238,10 +238,10 @@ def raise_loads(low: Surface) -> Homotopy:
         weights={name: carried * w for name, w in weights.items()},
     )
 
-    def start(share: float) -> Start:
+    def start(share: float) -> HomotopyStart:
         net = none | {name: share * p for name, p in pressures.items()}
         heavy = {name: share * w for name, w in weights.items()}
-        return Start(low.retensioned(None, net, weights=heavy, snows=none), direction, share)
+        return HomotopyStart(low.retensioned(None, net, weights=heavy, snows=none), direction, share)
 
     starts = (start(share * carried) for share in LOADS)
     return Homotopy(load, f"by raising the {load} from {{share:.3g}} of it", low, starts, carried)
@@ -256,11 +256,13 @@ def relax_tensions(low: Surface) -> Homotopy | None:
     strongest = max(asked[name] for name in pressed)
     needed = strongest * max(1.0, STRONGER * load_ratio(low.retensioned(dict.fromkeys(pressed, strongest))))
 
-    def start(raised: float, most: float) -> Start:
+    def start(raised: float, most: float) -> HomotopyStart:
         equal = raised * needed
         given = {name: equal if name in pressed else min(t, most * equal) for name, t in asked.items()}
         change = {name: asked[name] - given[name] for name in asked if asked[name] != given[name]}
-        return Start(low.retensioned(given), Direction(change, relative=True) if change else None, 0.0)
+        return HomotopyStart(
+            low.retensioned(given), Direction(change, relative=True) if change else None, 0.0
+        )
 
     starts = (start(raised, most) for raised, most in product(RAISED, WALLS))
     note = "along the branch from equal tensions"
@@ -274,7 +276,7 @@ def continue_in_distance(surface: Surface) -> Homotopy | None:
         return None
     shapes = [start.vertices for start in (surface, low_start(surface)) if start is not None]
     starts = (
-        Start(scaling.at(share, shape), BoundaryMotion(scaling.boundary, start=share), share)
+        HomotopyStart(scaling.at(share, shape), BoundaryMotion(scaling.boundary, start=share), share)
         for share, shape in product(DISTANCES, shapes)
     )
     return Homotopy("distance", "by moving the held curves apart", surface, starts)

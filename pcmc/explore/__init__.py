@@ -14,7 +14,7 @@ from ..base.units import NO_UNITS, Units, as_units
 from ..surface import Surface
 
 if TYPE_CHECKING:
-    from .roof import Roof
+    from .roof import ShownRoof
     from .server import Explorer, View
 
 __all__ = ["open_and_wait", "serve", "show", "start", "start_roof"]
@@ -67,13 +67,13 @@ def start(
     surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "", units: Units | str = NO_UNITS
 ) -> Explorer:
     """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
-    from .roof import Roof
+    from .roof import ShownRoof
 
-    return start_roof(Roof.of(surface, title, as_units(units)), host, port)
+    return start_roof(ShownRoof.of(surface, title, as_units(units)), host, port)
 
 
 def start_roof(
-    roof: Roof, host: str = "127.0.0.1", port: int = 0, watch: Callable[[], Roof] | None = None
+    roof: ShownRoof, host: str = "127.0.0.1", port: int = 0, watch: Callable[[], ShownRoof] | None = None
 ) -> Explorer:
     """As ``start``, for the roof in a file; with ``watch``, which reads it again, the page follows the file.
 
@@ -95,7 +95,7 @@ def show(surface: Surface, height: int = 680, title: str = "", units: Units | st
     next cell. The browser must run on the machine of the notebook's kernel. ``height`` is in pixels; the rest
     as for ``serve``.
     """
-    from .roof import Roof
+    from .roof import ShownRoof
     from .server import View
 
-    return View(Roof.of(surface, title, as_units(units)), height)
+    return View(ShownRoof.of(surface, title, as_units(units)), height)

@@ -87,7 +87,7 @@ def listen(host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> Liste
         raise OptionError(text, what=what, found=(host, port)) from None
 
 
-class Handler(BaseHTTPRequestHandler):
+class PageHandler(BaseHTTPRequestHandler):
     """A connection of a browser."""
 
     protocol_version = "HTTP/1.1"

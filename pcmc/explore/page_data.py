@@ -27,7 +27,7 @@ from ..project.values import values_of
 from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
-from .session import State, figures_data
+from .session import SessionState, figures_data
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -117,7 +117,7 @@ def centre(surface: Surface) -> Floats:
     return 0.5 * (X.min(axis=0) + X.max(axis=0))
 
 
-def state_data(state: State, origin: Floats, moving: bool = False) -> dict[str, Any]:
+def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dict[str, Any]:
     """A state in words and numbers; while a slider is ``moving``, without the tables of supports."""
     surface, certificate = state.surface, state.certificate
     names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
@@ -171,7 +171,7 @@ def _findings(certificate: Certificate, moving: bool) -> dict[str, Any]:
     return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
 
 
-def fields(state: State, origin: Floats) -> Arrays:
+def fields(state: SessionState, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     shown = surface if whole is None else whole.surface
@@ -191,7 +191,7 @@ def fields(state: State, origin: Floats) -> Arrays:
     return arrays
 
 
-def families_drawn(state: State) -> Floats:
+def families_drawn(state: SessionState) -> Floats:
     """``family_of_face`` of the surface that is drawn. It takes longer than an answer to a slider."""
     return family_of_face(drawn(state.surface))
 

@@ -20,7 +20,7 @@ Signature = tuple[tuple[str, tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Roof:
+class ShownRoof:
     """What a page opens."""
 
     outcome: projects.Outcome  # of a project, of its start shape, or of a surface alone
@@ -28,7 +28,7 @@ class Roof:
     signature: Signature = ()  # of the file and those it refers to, before they were read
 
     @classmethod
-    def of(cls, surface: Surface, title: str = "", units: Units = NO_UNITS) -> Roof:
+    def of(cls, surface: Surface, title: str = "", units: Units = NO_UNITS) -> ShownRoof:
         """A surface from a program.
 
         >>> Roof.of(None, "halls/nave & apse").name, Roof.of(None).name
@@ -89,7 +89,7 @@ def read_roof(
     use_cache: bool = True,
     progress: Callable[[str], None] | None = None,
     report: Callable[[projects.Outcome], None] | None = None,
-) -> Roof:
+) -> ShownRoof:
     """The roof in a file, as ``pcmc.project.opened``: of a project the designed one, its targets met.
 
     ``start_shape`` shows the shape before it is solved; ``progress`` is called with a few words at each step,
@@ -100,7 +100,7 @@ def read_roof(
     outcome = projects.opened(path, progress, start=start_shape, use_cache=use_cache)
     if report is not None and outcome.result is not None:
         report(outcome)
-    return Roof(outcome, path.name, before)
+    return ShownRoof(outcome, path.name, before)
 
 
 def signature(path: Path) -> Signature:
@@ -119,7 +119,9 @@ def signature(path: Path) -> Signature:
 class Watch:
     """A thread that reads a roof again whenever its files change."""
 
-    def __init__(self, path: Path, seen: Signature, read: Callable[[], Roof], show: Callable[[Roof], None]):
+    def __init__(
+        self, path: Path, seen: Signature, read: Callable[[], ShownRoof], show: Callable[[ShownRoof], None]
+    ):
         self.path, self.seen = path, seen
         self._read, self._show = read, show
         self.problem = ""  # why the newest save has no roof, in one line

@@ -17,7 +17,7 @@ from ..project.file import project_of
 from ..project.planning import project_text
 from ..project.values import differences, with_values
 from ..surface import Surface
-from .roof import Roof
+from .roof import ShownRoof
 
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
@@ -26,7 +26,7 @@ Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
 def save(
-    roof: Roof, surface: Surface, name: str, replace: bool, aims: Aims | None = None
+    roof: ShownRoof, surface: Surface, name: str, replace: bool, aims: Aims | None = None
 ) -> tuple[Path, str]:
     """Write a project with the values of a surface into the folder of its file.
 
@@ -73,7 +73,7 @@ def save(
     return path, note
 
 
-def _place(roof: Roof, name: str) -> tuple[Project, Path]:
+def _place(roof: ShownRoof, name: str) -> tuple[Project, Path]:
     """The roof's project, and the path of a file beside its; FileError for one that is elsewhere."""
     if roof.project is None:
         raise FileError("only a project or a drawing can be saved as a project; use Export", what="name")
@@ -94,7 +94,7 @@ def _place(roof: Roof, name: str) -> tuple[Project, Path]:
 
 
 def project_with(
-    roof: Roof, surface: Surface, aims: Aims | None = None, stem: str = ""
+    roof: ShownRoof, surface: Surface, aims: Aims | None = None, stem: str = ""
 ) -> tuple[str, str, set[tuple[str, str]]]:
     """The text of a roof's project with the values of a surface, a note on its targets, and what these find.
 

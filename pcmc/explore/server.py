@@ -21,10 +21,10 @@ from ..project import load, vertex_fields
 from ..surface import Surface
 from . import page_data, saving
 from .following import ProjectFallback, Stop
-from .listening import LOOPBACK, Handler, listen
+from .listening import LOOPBACK, PageHandler, listen
 from .protocol import ACTS, OTHERS, RequestError, checked, pack
-from .roof import Roof, Watch, signature
-from .session import Session, State, solved_start
+from .roof import ShownRoof, Watch, signature
+from .session import Session, SessionState, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
@@ -38,11 +38,13 @@ class Explorer:
 
     acts = (*ACTS, *OTHERS)
 
-    def __init__(self, roof: Roof, host: str, port: int, watch: Callable[[], Roof] | None = None) -> None:
+    def __init__(
+        self, roof: ShownRoof, host: str, port: int, watch: Callable[[], ShownRoof] | None = None
+    ) -> None:
         if not isinstance(roof.surface, Surface):
             found = type(roof.surface).__name__
             raise SurfaceError(f"explore: expected a Surface, found {found}", what="surface", found=found)
-        self._server = listen(host, port, Handler)
+        self._server = listen(host, port, PageHandler)
         self._server.explorer = self
         self.local = host in LOOPBACK
         self.roof, self.origin = roof, page_data.centre(roof.surface)
@@ -61,7 +63,7 @@ class Explorer:
         if watch is not None and roof.path is not None:
             self.watch = Watch(roof.path, roof.signature, watch, self.show)
 
-    def show(self, roof: Roof) -> None:
+    def show(self, roof: ShownRoof) -> None:
         """Show another roof on every page."""
         start = solved_start(roof.surface)
         if start.failure is not None:
@@ -134,7 +136,7 @@ class Explorer:
         about = page_data.state_data(state, self.origin, moving=act == "follow")
         return pack({"superseded": False, **about}, page_data.fields(state, self.origin))
 
-    def _opening(self, name: str, session: Session, state: State) -> bytes:
+    def _opening(self, name: str, session: Session, state: SessionState) -> bytes:
         """A state with what the page learns once: the mesh, the file and what may be asked."""
         roof, origin = self.roof, self.origin
         about, arrays = page_data.outline(state.surface, origin)
@@ -207,7 +209,7 @@ class Explorer:
 class View:
     """The page in a notebook; ``surface`` is the one it shows now."""
 
-    def __init__(self, roof: Roof, height: int) -> None:
+    def __init__(self, roof: ShownRoof, height: int) -> None:
         self.explorer = Explorer(roof, "127.0.0.1", 0)
         self._name, self._session = self.explorer.open()
         self.height = int(height)

@@ -64,7 +64,7 @@ def figures_data(surface: Surface, certificate: Certificate) -> list[dict[str, A
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class SessionState:
     """The surface of a session and all that the page shows about it; each act gives a new one."""
 
     surface: Surface
@@ -98,22 +98,22 @@ class State:
         """The number of steps that were undone."""
         return len(self.steps) - 1 - self.place
 
-    def asking(self, values: Values) -> State:
+    def asking(self, values: Values) -> SessionState:
         """The same surface, with other values asked for."""
         return replace(self, wanted=wanted(self.surface, values))
 
-    def showing(self, surface: Surface, certificate: Certificate | None = None) -> State:
+    def showing(self, surface: Surface, certificate: Certificate | None = None) -> SessionState:
         """Another surface at rest, with the values that it has."""
         certificate = certificate or certify(surface)
         return replace(self, surface=surface, certificate=certificate, wanted=surface, failure=None)
 
-    def following(self, way: Reached, certificate: Certificate | None) -> State:
+    def following(self, way: Reached, certificate: Certificate | None) -> SessionState:
         """The last surface at rest on the way to the values asked for."""
         if way.certificate is None:
             return replace(self, failure=way.failed)
         return replace(self.showing(way.surface, certificate), wanted=self.wanted, failure=way.failed)
 
-    def stepped(self) -> State:
+    def stepped(self) -> SessionState:
         """The surface shown is the newest step."""
         if self.surface is self.steps[self.place]:
             return self
@@ -122,7 +122,7 @@ class State:
         steps = steps if len(steps) <= most else (steps[0], *steps[2:])
         return replace(self, steps=steps, place=len(steps) - 1)
 
-    def at(self, place: int) -> State:
+    def at(self, place: int) -> SessionState:
         """Back or forth to a step."""
         return replace(self.showing(self.steps[place]), place=place)
 
@@ -133,15 +133,17 @@ class State:
         return self.variants[number]
 
 
-def act(moves: bool = False, ends: bool = False) -> Callable[[Callable[..., State]], Callable[..., State]]:
+def act(
+    moves: bool = False, ends: bool = False
+) -> Callable[[Callable[..., SessionState]], Callable[..., SessionState]]:
     """A method of a session that makes a state of the present one, done after the acts before it.
 
     One that ``moves`` or ``ends`` moves ends moves before it: their ``stop`` becomes true.
     """
 
-    def made(method: Callable[..., State]) -> Callable[..., State]:
+    def made(method: Callable[..., SessionState]) -> Callable[..., SessionState]:
         @wraps(method)
-        def run(self: Session, *given: Any, **named: Any) -> State:
+        def run(self: Session, *given: Any, **named: Any) -> SessionState:
             with self.order:
                 mine = self.arrived
                 self.arrived += 1
@@ -170,7 +172,7 @@ def act(moves: bool = False, ends: bool = False) -> Callable[[Callable[..., Stat
     return made
 
 
-def solved_start(surface: Surface) -> State:
+def solved_start(surface: Surface) -> SessionState:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
     certificate = certify(surface)
     failure = None if certificate.verdict in AT_REST else certificate
@@ -180,9 +182,9 @@ def solved_start(surface: Surface) -> State:
         result = solver(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
-            return State(result.surface, ended, result.surface)
+            return SessionState(result.surface, ended, result.surface)
         failure = ended
-    return State(surface, certificate, surface, failure)
+    return SessionState(surface, certificate, surface, failure)
 
 
 @dataclass
@@ -194,7 +196,7 @@ class Session:
     after it.
     """
 
-    start: State
+    start: SessionState
     turn: AbstractContextManager[Any] = field(default_factory=nullcontext)  # held by each move while it works
     units: Units = NO_UNITS
     fallback: ProjectFallback = field(default_factory=ProjectFallback)  # of the project behind the surface
@@ -218,12 +220,12 @@ class Session:
         return self.now.aims
 
     @act()
-    def state(self, state: State, stop: Stop) -> State:
+    def state(self, state: SessionState, stop: Stop) -> SessionState:
         """The present state."""
         return state
 
     @act(moves=True)
-    def follow(self, state: State, stop: Stop, values: Values) -> State:
+    def follow(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
         """Move towards these values while a slider moves: as far as two quick attempts lead."""
         state = state.asking(values)
         end = time.monotonic() + FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000)
@@ -232,7 +234,7 @@ class Session:
         return state if stop() else state.following(replace(way, failed=failed), way.certificate)
 
     @act(moves=True)
-    def settle(self, state: State, stop: Stop, values: Values) -> State:
+    def settle(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
         """Move to these values, or as close as possible, in as many steps as needed.
 
         The surface reached is a step that ``undo`` returns to.
@@ -247,7 +249,7 @@ class Session:
         return (replace(new, wanted=way.surface) if note and way.failed is None else new).stepped()
 
     @act(moves=True)
-    def stabilise(self, state: State, stop: Stop) -> State:
+    def stabilise(self, state: SessionState, stop: Stop) -> SessionState:
         """Move from a saddle to a stable shape, if there is one nearby."""
         end = time.monotonic() + SETTLE_SECONDS
         result = attempt(state.surface, until(stop, end), target="minimum")
@@ -259,7 +261,7 @@ class Session:
         return replace(state.showing(result.surface, certificate), wanted=state.wanted).stepped()
 
     @act(moves=True)
-    def remesh(self, state: State, stop: Stop) -> State:
+    def remesh(self, state: SessionState, stop: Stop) -> SessionState:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
         asked, end = values_of(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
         mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
@@ -277,12 +279,12 @@ class Session:
     @act(moves=True)
     def meet(
         self,
-        state: State,
+        state: SessionState,
         stop: Stop,
         targets: tuple[Target, ...],
         vary: tuple[Parameter, ...],
         gone: Stop = lambda: False,
-    ) -> State:
+    ) -> SessionState:
         """Move to values that meet the targets; if there are none, ``message`` says why.
 
         The search ends when ``gone``: its page was closed.
@@ -308,7 +310,7 @@ class Session:
         return replace(state, message=message)
 
     @act()
-    def keep(self, state: State, stop: Stop, name: str) -> State:
+    def keep(self, state: SessionState, stop: Stop, name: str) -> SessionState:
         """Keep the surface shown as a variant; one of the same name is replaced."""
         kept = {variant.name: variant for variant in state.variants}
         if name not in kept and len(kept) >= MOST_VARIANTS:
@@ -318,7 +320,7 @@ class Session:
         return replace(state, variants=tuple(kept.values()))
 
     @act()
-    def forget(self, state: State, stop: Stop, number: int) -> State:
+    def forget(self, state: SessionState, stop: Stop, number: int) -> SessionState:
         """Remove a variant."""
         gone, compared = state.variant(number), state.compared
         if compared is not None and compared >= number:
@@ -327,12 +329,12 @@ class Session:
         return replace(state, variants=rest, compared=compared)
 
     @act(ends=True)
-    def recall(self, state: State, stop: Stop, number: int) -> State:
+    def recall(self, state: SessionState, stop: Stop, number: int) -> SessionState:
         """Show a variant again, as a new step."""
         return state.showing(state.variant(number).surface).stepped()
 
     @act()
-    def compare(self, state: State, stop: Stop, number: int | None = None) -> State:
+    def compare(self, state: SessionState, stop: Stop, number: int | None = None) -> SessionState:
         """Compare the surface shown with a variant, or with none."""
         if number is not None:
             state.variant(number)
@@ -341,12 +343,12 @@ class Session:
     @act(ends=True)
     def renew(
         self,
-        state: State,
+        state: SessionState,
         stop: Stop,
-        start: State,
+        start: SessionState,
         units: Units = NO_UNITS,
         fallback: ProjectFallback | None = None,
-    ) -> State:
+    ) -> SessionState:
         """Show another start, as a new step: the file behind the page was saved."""
         self.start, self.units = start, units
         self.fallback = (fallback or self.fallback).with_walls(start.surface)
@@ -354,22 +356,22 @@ class Session:
         return replace(state, wanted=start.wanted, failure=start.failure).stepped()
 
     @act(ends=True)
-    def stop(self, state: State, stop: Stop) -> State:
+    def stop(self, state: SessionState, stop: Stop) -> SessionState:
         """End the work under way."""
         return state
 
     @act(ends=True)
-    def undo(self, state: State, stop: Stop) -> State:
+    def undo(self, state: SessionState, stop: Stop) -> SessionState:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""
         return state.at(max(state.undo - 1, 0))
 
     @act(ends=True)
-    def redo(self, state: State, stop: Stop) -> State:
+    def redo(self, state: SessionState, stop: Stop) -> SessionState:
         """Repeat the step that was undone."""
         return state.at(min(state.place + 1, len(state.steps) - 1))
 
     @act(ends=True)
-    def reset(self, state: State, stop: Stop) -> State:
+    def reset(self, state: SessionState, stop: Stop) -> SessionState:
         """Return to the start, as a new step."""
         return state.showing(self.start.surface).stepped()
 

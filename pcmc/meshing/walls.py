@@ -14,7 +14,7 @@ from ..curves import polyline
 from ..curves.pieces import to_space
 from ..surface import HeldCurve, Patch, Plane, Surface
 from ..surface.geometry import bounding_size
-from ..surface.topology import Curve
+from ..surface.topology import EdgeCurve
 from .planar import triangulate
 from .quality import edge_lengths
 
@@ -230,7 +230,7 @@ class _Builder:
 
 
 def _labels(
-    surface: Surface, borders: Sequence[Curve], tension: Mapping[tuple[str, str], float]
+    surface: Surface, borders: Sequence[EdgeCurve], tension: Mapping[tuple[str, str], float]
 ) -> tuple[list[int], list[Patch]]:
     """A label for each border, and the labels' patches: one for each pair of patches.
 

@@ -15,7 +15,7 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
 from ..curves.pieces import point_text
 from ..surface.topology import components
-from .lines import SNAP, Cut, Kind, Line, LineTree, check_holes, check_line, overlap
+from .lines import SNAP, Cut, Kind, LineTree, PlanLine, check_holes, check_line, overlap
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Arrangement:
 
 
 def arrange(
-    lines: Sequence[Line], edge_length: float, required_points: Floats, cut_points: Floats
+    lines: Sequence[PlanLine], edge_length: float, required_points: Floats, cut_points: Floats
 ) -> Arrangement:
     """Cut the lines, the outline first, at corners and where they meet, and divide them into edges.
 
@@ -95,7 +95,7 @@ def arrange(
     return Arrangement(points[used, :2], points[used, 2], tuple(chains), required)
 
 
-def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
+def hole_points(drawn: Arrangement, lines: Sequence[PlanLine]) -> list[tuple[float, float]]:
     """A point inside each hole, as its edges enclose it."""
     holes = [number for number, line in enumerate(lines) if line.kind is Kind.HOLE]
     rims = [np.concatenate([chain.vertices[:-1] for chain in drawn.along(hole)]) for hole in holes]
@@ -123,7 +123,9 @@ def _ends(tree: LineTree, snap: float) -> Iterator[Cut]:
 LineNodes = list[tuple[float, int]]  # parameters and nodes along a line
 
 
-def _nodes(lines: Sequence[Line], cuts: Sequence[Cut], snap: float) -> tuple[Floats, Ints, list[LineNodes]]:
+def _nodes(
+    lines: Sequence[PlanLine], cuts: Sequence[Cut], snap: float
+) -> tuple[Floats, Ints, list[LineNodes]]:
     """The vertices where lines meet, one for those nearer to each other than ``snap``.
 
     Returns their points (k,3) with heights, the vertex of each cut, -1 for one at no line, and the
@@ -162,7 +164,7 @@ def _nodes(lines: Sequence[Line], cuts: Sequence[Cut], snap: float) -> tuple[Flo
 
 
 def _chains(
-    lines: Sequence[Line], nodes: Floats, along_lines: Sequence[LineNodes], edge_length: float
+    lines: Sequence[PlanLine], nodes: Floats, along_lines: Sequence[LineNodes], edge_length: float
 ) -> tuple[list[Chain], Floats]:
     """Each line's chains from node to node; the points (n,3) of the nodes, and of the chains between."""
     chains: list[Chain] = []

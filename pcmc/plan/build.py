@@ -22,7 +22,7 @@ from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
 from .draft import Draft, drafted
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
-from .lines import SNAP, Kind, Line
+from .lines import SNAP, Kind, PlanLine
 from .parts import PatchSpec, PlanData
 from .walls import Roof, rooms_of, upright_planes, walls_of
 
@@ -263,7 +263,7 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
     wall, the vertices along its held bottom.
     """
     curves = []
-    supports = [Line("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
+    supports = [PlanLine("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
     fixed = dict(zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", "held"), strict=True))
     for chain in draft.drawn.chains:
         line = draft.lines[chain.line]

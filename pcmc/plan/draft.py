@@ -18,7 +18,7 @@ from ..surface.geometry import segment_lengths
 from ..surface.topology import components
 from .arrangement import Arrangement, Chain, arrange, hole_points
 from .edges import Boundary, boundary, check_lines
-from .lines import SNAP, Kind, Line, LineTree
+from .lines import SNAP, Kind, LineTree, PlanLine
 from .parts import PlanData, check_count
 
 MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing
@@ -34,13 +34,13 @@ class Draft:
     """A plan with its lines and its plane mesh."""
 
     plan: PlanData
-    lines: Sequence[Line]  # the outline, then the holes, the dividers, and the supports off the boundary
+    lines: Sequence[PlanLine]  # the outline, then the holes, the dividers, and the supports off the boundary
     supports_on_edge: Sequence[Curve]
     drawn: Arrangement
     mesh: PlanarMesh  # in the coordinates of Π; its first points are those of ``drawn``
     edges: Boundary
 
-    def divider(self, number: int) -> tuple[Line, Sequence[Chain]]:
+    def divider(self, number: int) -> tuple[PlanLine, Sequence[Chain]]:
         """The line of a divider, and its chains."""
         line = 1 + len(self.plan.holes) + number
         return self.lines[line], self.drawn.along(line)
@@ -99,13 +99,13 @@ def _part_count(plan: PlanData, drawn: Arrangement) -> int:
     return len(ends) - len(used) + 1 + int(pieces.max()) - len(plan.holes)
 
 
-def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
+def _arranged(plan: PlanData) -> tuple[list[PlanLine], list[Curve], Arrangement]:
     """The lines in the coordinates of Π, the supports on the boundary, and the lines cut where they meet."""
-    lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
-    lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
-    lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
+    lines = [PlanLine("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
+    lines += [PlanLine(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
+    lines += [PlanLine(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
     curves = [(k, support) for k, support in enumerate(plan.supports, 1) if isinstance(support, Curve)]
-    supports = [Line(f"support {k}", Kind.SUPPORT, curve.local(plan.plane)) for k, curve in curves]
+    supports = [PlanLine(f"support {k}", Kind.SUPPORT, curve.local(plan.plane)) for k, curve in curves]
     _check_size(plan, [*lines, *supports])
     tree, on_edge = LineTree([line for line in lines if line.bounds]), []
     for line in supports:
@@ -125,7 +125,7 @@ def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
     return lines, on_edge, replace(drawn, required=drawn.required[: len(points)])
 
 
-def _check_size(plan: PlanData, lines: Sequence[Line]) -> None:
+def _check_size(plan: PlanData, lines: Sequence[PlanLine]) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
     points = sum(
         len(curve.dense) for curve in (*(c.curve for c in plan.cables), *(one.curve for one in lines))

@@ -19,7 +19,7 @@ from ..base.units import conversion_note, size_note
 from ..curves.curves import Curve, polyline
 from ..curves.pieces import Piece, point_text, two_digits
 from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
-from .lines import Kind, Line, LineTree, check_line
+from .lines import Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
 from .strokes import Stroke, Strokes, read_strokes
@@ -146,7 +146,7 @@ class _Reader:
         lines = {"the outline": outline} | {hole_label(name): curve for name, curve in holes.items()}
         for name, curve in (lines | {f"divider {n!r}": curve for n, curve in dividers.items()}).items():
             try:  # a line that crosses itself, before what is inside it is looked for
-                check_line(Line(name, Kind.DIVIDER, curve))
+                check_line(PlanLine(name, Kind.DIVIDER, curve))
             except PlanError as error:
                 text = f"{error} ({self.layers[name]})"
                 raise PlanError(text, what=name, where=error.where, found=error.found) from None
@@ -277,7 +277,7 @@ class _Reader:
         self._add("cable", "cable {!r}".format, "cable", cables)
         free = self._add("free", "cable {!r}".format, "free", cables)
         check_count("cables", len(cables))
-        tree = LineTree([Line("an edge", Kind.OUTLINE, edge) for edge in edges])
+        tree = LineTree([PlanLine("an edge", Kind.OUTLINE, edge) for edge in edges])
         along = {
             name: all(tree.at(curve.samples(ALONG * self.size)[:, :2], self.gap))
             for name, curve in cables.items()
@@ -316,7 +316,7 @@ class _Reader:
 
     def _loose(self, outline: Curve, supports: Sequence[Any], masts: Sequence[Any], cables: bool) -> bool:
         """Whether masts and raised supports hold the outline, and nothing between them."""
-        rim = Line("the outline", Kind.OUTLINE, outline)
+        rim = PlanLine("the outline", Kind.OUTLINE, outline)
 
         def above(support: Any) -> float:
             """How far a support is above the outline; NaN away from it."""

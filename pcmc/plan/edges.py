@@ -17,7 +17,7 @@ from ..curves.pieces import point_text, to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
-from .lines import SNAP, Kind, Line, LineTree
+from .lines import SNAP, Kind, LineTree, PlanLine
 from .parts import PlanData, cable_label
 
 ON_MIRROR = 1e-9  # of the plan's size: a boundary this near to a mirror is on it
@@ -45,7 +45,9 @@ class Boundary:
         return np.unique(self.ends[self.among(*states)])
 
 
-def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], drawn: Arrangement) -> Boundary:
+def boundary(
+    plan: PlanData, lines: Sequence[PlanLine], on_edge: Sequence[Curve], drawn: Arrangement
+) -> Boundary:
     """The boundary of a plan cut into edges; those along the supports ``on_edge`` are fixed.
 
     PlanError for a mirror that is no straight edge of the outline, and a cable away from the boundary.
@@ -82,7 +84,7 @@ def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], dr
 
 def _along(curve: Curve, points: Floats, ends: Ints, snap: float) -> Bools:
     """(e,) the edges that run along a curve: both ends are on it, and the middle is near."""
-    strip, on = Line("cable", Kind.SUPPORT, curve), np.zeros(len(points), dtype=bool)
+    strip, on = PlanLine("cable", Kind.SUPPORT, curve), np.zeros(len(points), dtype=bool)
     rim = np.unique(ends)
     on[rim] = strip.nearest(points[rim])[1] <= snap
     half = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1) / 2.0
@@ -90,7 +92,7 @@ def _along(curve: Curve, points: Floats, ends: Ints, snap: float) -> Bools:
     return np.asarray(on[ends].all(axis=1) & (away <= 0.5 * half))  # an arc of 45° rises by 0.2 of it
 
 
-def check_lines(plan: PlanData, lines: Sequence[Line]) -> None:
+def check_lines(plan: PlanData, lines: Sequence[PlanLine]) -> None:
     """Refuse a cable that leaves the boundary, and a mirror that the plan crosses."""
     edges = LineTree([line for line in lines if line.bounds])
     for number, part in enumerate(plan.cables, start=1):
@@ -173,7 +175,7 @@ def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bo
     required = iter(drawn.required.tolist())
     for support in plan.supports:
         if isinstance(support, Curve):
-            strip = Line("support", Kind.SUPPORT, support.local(plan.plane))
+            strip = PlanLine("support", Kind.SUPPORT, support.local(plan.plane))
             t, away = strip.nearest(drawn.points[rim])
             on = away <= SNAP * plan.edge_length
             vertices, given = rim[on], strip.curve.at(t[on])[:, 2]

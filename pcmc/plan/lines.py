@@ -36,7 +36,7 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class PlanLine:
     """A named curve of a plan, in the coordinates of Π: two in the plane, and the height."""
 
     name: str
@@ -104,7 +104,7 @@ class Line:
 class LineTree:
     """Which lines pass near points, and where lines cross: a tree of the chords of all lines."""
 
-    def __init__(self, lines: Sequence[Line]) -> None:
+    def __init__(self, lines: Sequence[PlanLine]) -> None:
         self.lines = lines
         count = [len(line.chords) for line in lines]
         self.owner = np.repeat(np.arange(len(lines)), count)
@@ -170,12 +170,12 @@ class LineTree:
         return places
 
 
-def overlap(one: Line, other: Line, where: str) -> PlanError:
+def overlap(one: PlanLine, other: PlanLine, where: str) -> PlanError:
     """The error for two lines that coincide along some length."""
     return one.error(f"runs along {other.name} {where}; leave that part out", where, other.name)
 
 
-def check_line(one: Line) -> None:
+def check_line(one: PlanLine) -> None:
     """Boundaries are closed, and no line crosses itself."""
     if one.bounds and not one.curve.closed:
         gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
@@ -197,7 +197,7 @@ def check_line(one: Line) -> None:
     raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
 
 
-def check_holes(lines: Sequence[Line]) -> None:
+def check_holes(lines: Sequence[PlanLine]) -> None:
     """Holes lie inside the outline and apart from each other."""
     outline = shapely.Polygon(lines[0].xy)
     shapely.prepare(outline)
@@ -212,7 +212,7 @@ def check_holes(lines: Sequence[Line]) -> None:
         raise holes[first].error(problem, found=holes[second].name)
 
 
-def crossing(one: Line, s: float, two: Line, t: float) -> tuple[float, float]:
+def crossing(one: PlanLine, s: float, two: PlanLine, t: float) -> tuple[float, float]:
     """The parameters at which two curves cross, by Newton's method from initial guesses."""
 
     def apart(s: float, t: float) -> Floats:

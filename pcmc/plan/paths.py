@@ -15,7 +15,7 @@ from ..curves.curves import Curve, arc
 from ..curves.pieces import Piece
 from ..surface.topology import components
 from .layers import listed
-from .lines import Kind, Line, LineTree
+from .lines import Kind, LineTree, PlanLine
 from .strokes import Stroke
 
 EXACT = 1e-9  # of the tolerance: ends nearer than this meet already
@@ -169,7 +169,7 @@ def meet_lines(
     result = dict(curves)
     for others in ((), tuple(curves)):  # onto the edges first, then onto each other
         named = [name for name in others if _extent(result[name])]
-        lines = [*rims, *(Line("a line", Kind.DIVIDER, result[name]) for name in named)]
+        lines = [*rims, *(PlanLine("a line", Kind.DIVIDER, result[name]) for name in named)]
         owners = [None] * len(rims) + named
         for number, passing in enumerate(LineTree(lines).at(place, tolerance) if lines else ()):
             own = {names[k // 2] for k in members[number] if k < len(drawn)}
@@ -216,9 +216,9 @@ def meet_edges(
     return result, _note(steps, "point{s} of supports", "the edges that they just miss")
 
 
-def _rims(edges: Sequence[Curve]) -> tuple[list[Line], Floats]:
+def _rims(edges: Sequence[Curve]) -> tuple[list[PlanLine], Floats]:
     """The edges that have a length in plan, and (c,2) their corners."""
-    rims = [Line("an edge", Kind.OUTLINE, edge) for edge in edges if _extent(edge)]
+    rims = [PlanLine("an edge", Kind.OUTLINE, edge) for edge in edges if _extent(edge)]
     return rims, np.concatenate([np.zeros((0, 2)), *(rim.curve.at(rim.curve.corners)[:, :2] for rim in rims)])
 
 

@@ -17,7 +17,7 @@ from ..surface.values import balanced_wall
 from .drawing import Drawing
 from .edges import cable_for
 from .layers import Label
-from .lines import Kind, Line
+from .lines import Kind, PlanLine
 from .parts import CableLine, Divider, Hole, PatchSpec, PlanData, check_count, check_keys
 from .walls import most_in_corners
 
@@ -130,7 +130,7 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
         spec.setdefault(key, value)
     tensions = [spec["tension"] for spec in specs]
     edge_length = values.setdefault("edge_length", _edge_length(parts, drawing))
-    outline = Line("the outline", Kind.OUTLINE, drawing.outline)
+    outline = PlanLine("the outline", Kind.OUTLINE, drawing.outline)
     tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
     cable = cable_for(drawing.outline, max(tensions))

@@ -20,7 +20,7 @@ from ..surface import Patch, Plane, Room
 from ..surface.values import balanced_wall
 from .draft import Draft
 from .edges import NONE
-from .lines import SNAP, Line
+from .lines import SNAP, PlanLine
 from .parts import BALANCED, PlanData
 
 SHARE = 0.6  # of p R, R of the smallest part beside a wall: more would pull a flat roof down
@@ -116,7 +116,7 @@ def _balanced(draft: Draft, roof: Roof, number: int, beside: Sequence[Ints]) -> 
     return balanced_wall(tensions, min(most, SHARE * pressure * width) or np.inf)
 
 
-def most_in_corners(curve: Curve, outline: Line, edge_length: float, pressure: float = 1.0) -> float:
+def most_in_corners(curve: Curve, outline: PlanLine, edge_length: float, pressure: float = 1.0) -> float:
     """The most by which a wall may exceed the difference of its neighbours, where it runs into a corner.
 
     There the sheets on both sides get narrow, and carry the wall only as long as its tension is less than

@@ -13,13 +13,13 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra
 from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL, Image
-from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Drawing
+from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Rendering
 
 IN_A_LINE = 6
 ALIKE = 0.03  # difference of two colours' directions up to which one may be the other in a shade
 SHADES = (0.5, 1.06)  # brightness of a sheet, lit or not, of its colour's
 
-Picture = tuple[Drawing, bool, Image]  # with whether its supports are dots, and (h,w,3) as painted
+Picture = tuple[Rendering, bool, Image]  # with whether its supports are dots, and (h,w,3) as painted
 
 
 @dataclass(frozen=True)

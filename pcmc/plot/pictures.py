@@ -22,7 +22,7 @@ from ..surface.geometry import area_vectors
 from .colors import add_legend, color_scale
 from .figure import INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
 from .raster import paint
-from .scene import Drawing, View, mean_edge, scene, view_of
+from .scene import Camera, Rendering, mean_edge, scene, view_of
 
 if TYPE_CHECKING:
     from ..panelling import Panels
@@ -106,7 +106,7 @@ def panel(
 
 
 def compose(
-    drawings: Sequence[Drawing],
+    drawings: Sequence[Rendering],
     path: Path | None,
     columns: int,
     width: int,
@@ -237,7 +237,7 @@ def vectors(
                 place, text = (2 * k + 1) / (2 * len(fields)), f"{rounded:g} {unit}"
                 axes.quiverkey(quiver, place, middle, rounded * stretch, text, coordinates="figure", **look)
 
-    drawing, foot = Drawing(surface, seen, title, None, None, None), " " if label or points_label else ""
+    drawing, foot = Rendering(surface, seen, title, None, None, None), " " if label or points_label else ""
     return compose([drawing], path, 1, width, around=tips, foot=foot, overlay=add_arrows, **options)
 
 
@@ -263,7 +263,7 @@ def reactions(
 
 def _drawings(
     surfaces: Sequence[Surface], views: Any, titles: Any, scalars: Any, numbers: Any, patches: Any
-) -> list[Drawing]:
+) -> list[Rendering]:
     """One for each surface, from the arguments of ``panel``."""
     count = len(surfaces)
     if not count:
@@ -288,7 +288,7 @@ def _drawings(
         for (name, allowed), array in zip(shapes.items(), values, strict=True):
             if array is not None and array.shape not in allowed:
                 validate.refuse(name, array.shape, f"shape {' or '.join(map(str, allowed))}")
-        drawings.append(Drawing(surface, view_of(surface, view), title, values[0], values[1], names))
+        drawings.append(Rendering(surface, view_of(surface, view), title, values[0], values[1], names))
     return drawings
 
 
@@ -330,7 +330,7 @@ def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: boo
     return frames
 
 
-def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, form: str) -> None:
+def _print_numbers(axes: Any, surface: Surface, view: Camera, numbers: Floats, form: str) -> None:
     """Numbers at the vertices whose sheet turns its upper side, along the normal of Π, to the viewer."""
     from matplotlib.patheffects import withStroke
 

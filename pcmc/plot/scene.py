@@ -28,7 +28,7 @@ LIFT = 2e-3  # of the size: lines and dots stand this much before the surface th
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class Camera:
     """The direction of view: unit vectors right, up and towards the viewer, as rows of (3,3)."""
 
     axes: Floats
@@ -42,7 +42,7 @@ class View:
         return points @ self.axes[2]
 
 
-def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
+def view_of(surface: Surface, view: str | tuple[float, float]) -> Camera:
     """From a name or (azimuth, elevation) in degrees; the normal of Π is up.
 
     Azimuth turns about the normal, from the first of x, y, z that is not along it; -90 looks along
@@ -59,15 +59,15 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
     away = math.cos(azimuth) * first + math.sin(azimuth) * second
     towards = math.cos(elevation) * away + math.sin(elevation) * up
     right = np.cross(up, away)
-    return View(np.stack([right, np.cross(towards, right), towards]))
+    return Camera(np.stack([right, np.cross(towards, right), towards]))
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class Rendering:
     """One surface of a picture: where it is seen from and what is shown on it."""
 
     surface: Surface
-    view: View
+    view: Camera
     title: str
     values: Floats | None  # (n,) or (m,), shown as colours
     numbers: Floats | None  # (n,), printed at the vertices
@@ -95,7 +95,7 @@ class Scene:
     as its middle, what lies on triangles as near as the nearest of them.
     """
 
-    view: View
+    view: Camera
     corners: Floats  # (t,3,3) triangles
     colors: Floats  # (t,3,3) RGB of their corners, 0..1
     segments: Floats  # (s,2,3)
@@ -108,7 +108,7 @@ class Scene:
 
 def scene(
     surface: Surface,
-    view: View,
+    view: Camera,
     values: Floats | None,
     *,
     supports: bool,
@@ -166,7 +166,7 @@ def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
     return result
 
 
-def _light(surface: Surface, shown: Bools, view: View, strength: float, smooth: bool) -> Floats:
+def _light(surface: Surface, shown: Bools, view: Camera, strength: float, smooth: bool) -> Floats:
     """(t,3) brightness at the corners of a matt sheet seen from either side, lit from above the left.
 
     The normals are the faces', or if ``smooth`` their means at each vertex in its patch.

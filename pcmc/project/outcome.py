@@ -43,7 +43,7 @@ def ignore(step: str) -> None:
     """An ``OnStep`` that shows nothing."""
 
 
-class Whole(NamedTuple):
+class WholeRoof(NamedTuple):
     """A surface with its certificate."""
 
     surface: Surface
@@ -120,18 +120,18 @@ class Outcome:
         return certify(self.surface) if self.result is None else self.result.certificate
 
     @cached_property
-    def whole(self) -> Whole | None:
+    def whole(self) -> WholeRoof | None:
         """The whole roof with its certificate, which counts motions that are not symmetric, too; None unless
         ``unfold``."""
         if not self.unfold:
             return None
         whole = mirrored(self.surface)
-        return Whole(whole, certify(whole))
+        return WholeRoof(whole, certify(whole))
 
     @property
-    def shown(self) -> Whole:
+    def shown(self) -> WholeRoof:
         """What is written, drawn and listed: the whole roof if it is asked for, with its certificate."""
-        return self.whole or Whole(self.surface, self.certificate)
+        return self.whole or WholeRoof(self.surface, self.certificate)
 
     @cached_property
     def figures(self) -> list[Figure]:

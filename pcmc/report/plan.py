@@ -9,7 +9,7 @@ import numpy as np
 from ..base.units import Units, length_factor
 from ..certificate import Certificate
 from ..drawings import views
-from ..drawings.sheet import Line, Text, box, place_labels
+from ..drawings.sheet import SheetLine, Text, box, place_labels
 from ..surface import Surface
 
 FORMAT = "A4"
@@ -22,7 +22,7 @@ class PaperPlan:
     """A plan on paper; lines and texts in mm from the lower left corner."""
 
     scale: str  # such as "1:200"
-    lines: list[Line]
+    lines: list[SheetLine]
     texts: list[Text]
     size: tuple[float, float]  # width and height, mm
 

@@ -16,7 +16,7 @@ from ..stability.equilibrium import SecondVariation
 from ..stability.modes import clear_of_zero
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped
-from .state import State
+from .state import SolverState
 from .steps import Stepper
 
 TARGETS = ("minimum", "stationary")
@@ -91,7 +91,7 @@ class NewtonRun:
     ) -> None:
         self.options, self.log, self.level, self.rows = options, log, level, list(before)
         self.held = held
-        self.state = State(surface, options.min_quality, held, options.backend)
+        self.state = SolverState(surface, options.min_quality, held, options.backend)
         self.stepper = Stepper(self.state, options.target == "minimum")
         self.status, self.note = Status.ITERATION_LIMIT, ""  # the note goes into the result's message
         self.first_quality = self.state.quality

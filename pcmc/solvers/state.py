@@ -43,7 +43,7 @@ VOLUME_LEFT = 1e-10  # of a volume: corrected up to here
 RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 
 
-class State:
+class SolverState:
     """One mesh with the positions reached, and how it may move.
 
     ``full`` is the whole surface when its walls were last pinched or lifted, ``at`` its standing part at the

@@ -16,7 +16,7 @@ from ..stability.modes import lowest
 from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
-from .state import State
+from .state import SolverState
 
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
 LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
@@ -29,7 +29,7 @@ ROUNDING = 1e3 * float(np.finfo(float).eps)
 class Stepper:
     """Takes steps on a State, and reuses factorisations while they contract."""
 
-    def __init__(self, state: State, minimum: bool) -> None:
+    def __init__(self, state: SolverState, minimum: bool) -> None:
         self.state, self.minimum = state, minimum
         self.kind = "start"  # or the last step: newton, shifted, contact, descent, saddle, release
         self.factorisations = 0

@@ -16,7 +16,7 @@ from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
 from ..surface.geometry import area_vectors
 from .model import StructuralModel
-from .tables import Block, read
+from .tables import ResultBlock, read
 
 TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
 FAR = 1e-4  # of the size: a node farther from its vertex belongs to another surface
@@ -91,7 +91,7 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     return tuple(_results(model, k, blocks) for k, blocks in enumerate(steps))
 
 
-def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepResults:
+def _results(model: StructuralModel, k: int, blocks: dict[str, ResultBlock]) -> StepResults:
     """The arrays of step k on the surface's vertices and faces, of which the standing ones are elements."""
     step, surface, stress = model.steps[k], model.standing, blocks["stresses"]
     displacements, reactions = np.full((surface.n, 3), np.nan), np.zeros((surface.n, 3))
@@ -116,7 +116,7 @@ def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepRe
     return StepResults(step.name, model, displacements, reactions, stresses, tensions)
 
 
-def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
+def _check(steps: list[dict[str, ResultBlock]], model: StructuralModel) -> None:
     """Refuse results with other nodes, elements or steps than the model's."""
     nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
     cables = [number for *_, numbers, _ in model.cable_edges() for number in numbers]

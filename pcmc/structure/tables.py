@@ -26,7 +26,7 @@ KEY, NUMBER = 13, 12  # characters of a row of an .frd file: " -1" and the node;
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class ResultBlock:
     """One quantity of one step, by ascending numbers of nodes or elements."""
 
     kind: str  # displacements, forces, stresses, or cables: the stresses of these
@@ -44,14 +44,14 @@ class Block:
         return np.stack(sums, axis=1) / np.bincount(place, minlength=len(elements))[:, None]
 
 
-def read(text: str, suffix: str) -> list[dict[str, Block]]:
+def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
     """The tables of each step, whose times are 1, 2, ...; of several in a step the last counts.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
     >>> read(text, ".dat")[0]["displacements"].values.tolist()
     [[0.5, 0.0, -0.001]]
     """
-    steps: list[dict[str, Block]] = []
+    steps: list[dict[str, ResultBlock]] = []
     for block in (_of_dat if suffix == ".dat" else _of_frd)(text):
         number = round(block.time)
         if abs(block.time - number) <= 1e-6 and number >= 1:  # else a part of a step
@@ -60,7 +60,7 @@ def read(text: str, suffix: str) -> list[dict[str, Block]]:
     return steps
 
 
-def _of_dat(text: str) -> Iterator[Block]:
+def _of_dat(text: str) -> Iterator[ResultBlock]:
     heads = list(DAT_HEAD.finditer(text))
     if not heads:
         raise FileError("has no results; is it a .dat file of ccx, and has its analysis run?")
@@ -74,10 +74,10 @@ def _of_dat(text: str) -> Iterator[Block]:
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         time = float(_numbers([head[4]], 1, "time", line)[0, 0])
         kind = "cables" if head[3] == "CABLES" else kind
-        yield Block(kind, time, rows[:, 0].astype(int), rows[:, keys:], keys == 1)
+        yield ResultBlock(kind, time, rows[:, 0].astype(int), rows[:, keys:], keys == 1)
 
 
-def _of_frd(text: str) -> Iterator[Block]:
+def _of_frd(text: str) -> Iterator[ResultBlock]:
     if not text.startswith("    1C") or "\n  100C" not in text:
         raise FileError("has no results; is it an .frd file of ccx in ASCII, and has its analysis run?")
     if not text.rstrip().endswith("9999"):
@@ -94,7 +94,7 @@ def _of_frd(text: str) -> Iterator[Block]:
             values = values[:, FRD_STRESSES] if kind == "stresses" else values
             time = float(_numbers([head[0][12:24]], 1, "time", line)[0, 0])
             known = np.isin(ids, nodes).all() and len(nodes) == len(ids)
-            yield Block(kind, time, ids, values, True, places if known else None)
+            yield ResultBlock(kind, time, ids, values, True, places if known else None)
 
 
 def _frd_rows(body: str, columns: int, what: str, line: int) -> tuple[Ints, Floats]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from .surface import Surface
-from .topology import Curve, joined
+from .topology import EdgeCurve, joined
 
 RIDGE, RIM, WALL = "RIDGE", "RIM", "WALL"  # the kinds of curves
 
@@ -68,7 +68,7 @@ def without_repeats(points: Floats, closed: bool) -> Floats:
     return points[new]
 
 
-def curves_by_kind(surface: Surface) -> Iterator[tuple[str, Curve]]:
+def curves_by_kind(surface: Surface) -> Iterator[tuple[str, EdgeCurve]]:
     """Each curve with its kind, by the sheets at it that are no walls: two or more, one, or none.
 
     >>> from pcmc import Patch

@@ -22,7 +22,7 @@ FEW = 32  # sides in a bucket up to which sorting by insertion is fastest
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class EdgeCurve:
     """A chain of curve edges between two points, or a closed loop."""
 
     vertices: Ints  # (k,) in order along the curve; the first is not repeated when closed
@@ -124,16 +124,16 @@ class Topology:
         return ~(self.on_boundary | self.on_junction)
 
     @cached_property
-    def junctions(self) -> tuple[Curve, ...]:
+    def junctions(self) -> tuple[EdgeCurve, ...]:
         """Junction curves and seams, cut at the points where they meet, end or touch a boundary."""
         return self._curves(self.junction_edge | self.seam_edge, self.vertex_kind == POINT)
 
     @cached_property
-    def boundary_loops(self) -> tuple[Curve, ...]:
+    def boundary_loops(self) -> tuple[EdgeCurve, ...]:
         """Boundary curves of each patch's outline, cut where more than two boundary edges meet."""
         return self.curves_among(self.boundary_edge)
 
-    def curves_among(self, chosen: Bools) -> tuple[Curve, ...]:
+    def curves_among(self, chosen: Bools) -> tuple[EdgeCurve, ...]:
         """The curves of the chosen edges (e,), cut where other than two of them meet."""
         return self._curves(chosen, vertex_kind(self.edges[chosen], self.vertex_count) == POINT)
 
@@ -141,7 +141,7 @@ class Topology:
         """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
         return edge_places(ends, self.edges)
 
-    def chains(self, ends: Ints, stop: Bools) -> tuple[Curve, ...]:
+    def chains(self, ends: Ints, stop: Bools) -> tuple[EdgeCurve, ...]:
         """The curves that edges (k,2) form, cut where they branch and at the vertices ``stop`` (n,)."""
         mask = np.zeros(len(self.edges), dtype=bool)
         mask[self.edge_numbers(ends)] = True
@@ -152,12 +152,12 @@ class Topology:
         """(n,) int: label of the connected part that each vertex belongs to."""
         return components(self.edges, self.vertex_count)
 
-    def _curves(self, mask: Bools, stop: Bools) -> tuple[Curve, ...]:
+    def _curves(self, mask: Bools, stop: Bools) -> tuple[EdgeCurve, ...]:
         sides = np.flatnonzero(mask[self.edge_of_face.ravel()])
         sides = sides[np.argsort(self.edge_of_face.ravel()[sides], kind="stable")]
         parts = np.split(self.patch_of_face[sides // 3], np.cumsum(self.valence[mask])[:-1])
         return tuple(
-            Curve(vertices, closed, tuple(sorted(parts[edge].tolist())))
+            EdgeCurve(vertices, closed, tuple(sorted(parts[edge].tolist())))
             for vertices, closed, edge in joined(self.edges[mask], stop, self.vertex_count)
         )
 

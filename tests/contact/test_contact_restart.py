@@ -18,7 +18,7 @@ from pcmc.contact.pinching import (
 )
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
-from pcmc.solvers.state import State
+from pcmc.solvers.state import SolverState
 from pcmc.solvers.steps import Stepper
 from pcmc.stability.factorisation import SingularMatrix, available
 
@@ -70,7 +70,7 @@ def test_a_step_without_a_matrix_is_a_step_that_failed(kind, monkeypatch):
     def singular(*_):
         raise SingularMatrix("a pivot is zero")
 
-    state = State(two_squares(4), min_quality=0.45)
+    state = SolverState(two_squares(4), min_quality=0.45)
     stepper = Stepper(state, minimum=False)
     X = state.at.X.copy()
     if kind == "descent":

@@ -13,7 +13,7 @@ from pcmc.continuation import Ending, FollowOptions
 from pcmc.continuation.correction import NotOnBranch, correct, fixed_parameter
 from pcmc.continuation.options import CONTROLS
 from pcmc.continuation.segment import root
-from pcmc.continuation.state import QUANTITIES, BranchMesh, State
+from pcmc.continuation.state import QUANTITIES, BranchMesh, BranchState
 from pcmc.continuation.tracing import Tracer
 
 
@@ -251,4 +251,4 @@ def test_a_correction_that_leaves_the_tensions_allowed_is_lost_not_a_contact(mon
     mesh = BranchMesh(surface, Direction({"wall": 1.0}).line(surface))
     monkeypatch.setattr(BranchMesh, "reaches_plane", lambda self, X: np.ones(len(X), dtype=bool))
     with pytest.raises(NotOnBranch, match="a tension would reach 0"):
-        correct(State(mesh, surface.vertices, 1.0), fixed_parameter(-5.0, 1.0), 1e-10)
+        correct(BranchState(mesh, surface.vertices, 1.0), fixed_parameter(-5.0, 1.0), 1e-10)

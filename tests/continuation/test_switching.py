@@ -20,7 +20,7 @@ from generators import (
 from pcmc import BoundaryMotion, certify, follow, solve
 from pcmc.base.errors import OptionError
 from pcmc.continuation import Branch, Ending
-from pcmc.continuation.state import BranchMesh, State
+from pcmc.continuation.state import BranchMesh, BranchState
 
 
 def orders(errors):
@@ -83,7 +83,7 @@ def moving_state(edge=0.4):
     mesh = BranchMesh(surface, line)
     X = surface.vertices.copy()
     X[surface.free] += 0.01 * np.random.default_rng(3).standard_normal((surface.free.sum(), 3))
-    return State(mesh, X, 0.8)
+    return BranchState(mesh, X, 0.8)
 
 
 def test_forces_change_with_the_boundary_as_their_derivative_says():

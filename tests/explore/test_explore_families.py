@@ -7,7 +7,7 @@ import numpy as np
 import pcmc
 from generators import two_squares
 from pcmc.explore.page_data import families_drawn, fields
-from pcmc.explore.session import State
+from pcmc.explore.session import SessionState
 from pcmc.panelling.families import ALIKE, family_of_face
 from pcmc.surface.geometry import edge_vectors
 
@@ -34,6 +34,6 @@ def test_a_sail_is_a_roof_and_declared_walls_are_not():
 
 def test_families_are_sorted_when_they_are_asked_for():
     surface = pcmc.solve(two_squares(4)).surface
-    state = State(surface, pcmc.certify(surface), surface)
+    state = SessionState(surface, pcmc.certify(surface), surface)
     assert "family" not in fields(state, np.zeros(3))
     assert np.array_equal(families_drawn(state), family_of_face(surface), equal_nan=True)

@@ -15,7 +15,7 @@ from pcmc import explore
 from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
-from pcmc.explore.roof import Roof, read_roof
+from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, figures_data
 from pcmc.panelling.distance import difference
 
@@ -221,4 +221,4 @@ def test_a_wall_nearby_does_not_hide_a_difference(hall_roof):
 
 
 def test_names_of_downloads_are_those_of_files():
-    assert Roof.of(CAP, "a/b", Units("m")).name == "a-b"
+    assert ShownRoof.of(CAP, "a/b", Units("m")).name == "a-b"

@@ -21,7 +21,7 @@ from pcmc.base.errors import FileError, OptionError
 from pcmc.design import Parameter, Target
 from pcmc.explore import saving
 from pcmc.explore.protocol import RequestError
-from pcmc.explore.roof import Roof, read_roof
+from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.panelling.distance import difference
 
@@ -176,7 +176,7 @@ def test_a_save_that_waits_saves_what_was_shown_when_it_was_asked_for(hall_roof,
 
 def test_surfaces_without_a_project_are_not_saved(tmp_path):
     with pytest.raises(FileError, match="use Export"):
-        saving.save(Roof.of(CAP), CAP, "cap", False)
+        saving.save(ShownRoof.of(CAP), CAP, "cap", False)
 
 
 def test_on_the_network_nothing_is_saved(hall_roof, hall_folder):

@@ -18,7 +18,7 @@ from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
 from pcmc.plan import Divider, Plan, arc, bezier, circle, ellipse, join, polyline
-from pcmc.plan.lines import Kind, Line
+from pcmc.plan.lines import Kind, PlanLine
 from pcmc.project import load, run_project
 from pcmc.project.cache import _pieces
 from pcmc.surface import HeldCurve
@@ -64,7 +64,7 @@ WAYS = {
 def away(points, curve):
     """The largest distance of points (k,3) from a curve."""
     curve = curve.local(Plane())
-    t, _ = Line("it", Kind.OUTLINE, curve).nearest(points[:, :2])
+    t, _ = PlanLine("it", Kind.OUTLINE, curve).nearest(points[:, :2])
     for _ in range(3):
         low, high = np.maximum(t - 1e-6, 0.0), np.minimum(t + 1e-6, len(curve.pieces))
         along = (curve.at(high) - curve.at(low)) / (high - low)[:, None]

@@ -15,7 +15,7 @@ from generators import double_bubble, two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
-from pcmc.explore.session import State
+from pcmc.explore.session import SessionState
 from pcmc.plot import colors, pictures, raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 from pcmc.project import paint
@@ -271,7 +271,7 @@ def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path
         pictures, "vectors", lambda s, field, *_, **__: drawn.append(field) or vectors(s, field)
     )
     paint(surface, tmp_path / "a.png", ["diagonal"], "reactions")
-    shown = page_fields(State(surface, found, surface), np.zeros(3))["reactions"]
+    shown = page_fields(SessionState(surface, found, surface), np.zeros(3))["reactions"]
     np.testing.assert_allclose(drawn[0], np.nan_to_num(shown), atol=1e-12)
     most = np.linalg.norm(drawn[0], axis=1).max()
     assert most == pytest.approx(found.boundaries["per_length_max"].max(), rel=1e-12)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pcmc import explore
-from pcmc.explore.roof import Roof, read_roof
+from pcmc.explore.roof import ShownRoof, read_roof
 
 HALL_TOML = """# the hall
 units = "m"
@@ -29,7 +29,7 @@ vary = ["west", "east"]
 """
 
 
-def designed_hall(folder: Path) -> Roof:
+def designed_hall(folder: Path) -> ShownRoof:
     """The roof of the project, which is written to the folder as hall.toml."""
     (folder / "hall.toml").write_text(HALL_TOML)
     return read_roof(folder / "hall.toml", use_cache=False)
