@@ -28,6 +28,7 @@ from .session import Session, SessionState, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
+POLL = 0.1  # seconds after which the server sees that it shall end
 
 
 class Explorer:
@@ -57,7 +58,7 @@ class Explorer:
         self.port = int(self._server.server_address[1])
         named = "127.0.0.1" if host in ("", "0.0.0.0") else f"[{host}]" if ":" in host else host
         self.url = f"http://{named}:{self.port}/?token={self.token}"
-        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(POLL,), daemon=True)
         self._thread.start()
         self.watch: Watch | None = None
         if watch is not None and roof.path is not None:

@@ -328,6 +328,7 @@ def test_shallow_corners_of_a_plan_stay_corners(hall):
     assert 0.01 < abs(rounded.limit + 3.0) <= rounded.limit_error
 
 
+@pytest.mark.nightly
 def test_sweeps_have_columns_of_the_check(hall):
     case = solve_case("generators:spherical_cap", mesh_check=True, edge_length=0.25)
     assert case["mesh_verdict"] == "persists"

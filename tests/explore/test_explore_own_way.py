@@ -132,6 +132,7 @@ def test_new_triangles_for_the_surface_shown():
     assert session.undo().surface is start.surface
 
 
+@pytest.mark.nightly
 @needs_browser
 def test_the_page_offers_new_triangles_and_shows_walls_that_follow(driver, path):
     running = explore.start(poor_cap())

@@ -22,7 +22,7 @@ from pcmc.panelling.distance import difference
 CAP = spherical_cap(edge_length=0.25)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def explorer(hall_roof):
     running = explore.start_roof(hall_roof)
     yield running

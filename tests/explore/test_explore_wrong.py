@@ -180,6 +180,7 @@ def test_a_request_that_trickles_is_closed(explorer, monkeypatch):
     pytest.fail("it is still open")
 
 
+@pytest.mark.nightly
 def test_a_long_computation_is_not_cut_off(explorer, monkeypatch):
     monkeypatch.setattr(listening, "REQUEST_SECONDS", 0.5)
     real = server.Explorer.open

@@ -100,6 +100,7 @@ def test_an_unknown_name_is_refused_before_solving(roof, capsys):
     assert "roof.toml: line 9: unknown what 'presure'; did you mean 'pressure'?" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_a_sweep_has_a_column(roof):
     table = sweep(project_sweep(roof, {"roof.tension": [2.0, 3.0]}), workers=1)
     margins = table["pressure.margin"].to_numpy()

@@ -52,6 +52,7 @@ def test_a_roof_at_rest_keeps_its_shape_when_remeshed():
     assert again.certificate.verdict is Verdict.STABLE
 
 
+@pytest.mark.nightly
 def test_a_collapse_is_told_with_its_cause():
     """Seen away from the corners, where the mesh has no fixed vertex."""
     start = platform(15, 5, 60, (23, 43), alpha=3.0, wall=2.4, h=2.5, turn=8.0)

@@ -92,6 +92,7 @@ def test_an_l_with_a_courtyard_and_three_walls_at_120_degrees(h):
     assert np.mean(lengths) == pytest.approx(h, rel=0.2)
 
 
+@pytest.mark.nightly
 def test_the_names_of_patches_need_no_mesh(monkeypatch):
     chords = [[[x, -1], [y, 13]] for x, y in ((2, 9), (4, 3), (8, 14), (13, 6), (16, 18))]
     across = [{"curve": [[-1, y], [21, y]], "cable": 1.0, "wall": None} for y in (3.1, 7.7)]

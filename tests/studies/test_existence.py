@@ -12,6 +12,7 @@ from studies.study import perform
 KEPT = Path(__file__).resolve().parents[2] / "results" / "existence"
 
 
+@pytest.mark.nightly
 def test_short_run_writes_tables_and_figures(tmp_path):
     perform(STUDY, tmp_path, short=True)
     folder = tmp_path / "existence"

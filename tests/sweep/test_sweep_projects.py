@@ -366,6 +366,7 @@ def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_a_target_that_is_missed_is_1(roof):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 9}]\nvary = ["west"]\n'
     roof.write_text(TEXT + aim, encoding="utf-8")
