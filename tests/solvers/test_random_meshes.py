@@ -75,7 +75,7 @@ def test_random_forces_end_in_a_verdict_or_a_named_error(seeds):
     assert None not in refusals
     assert "pressure" not in refusals  # a pressure that is no number: a volume that nothing changes
     assert built > 0.85 * len(seeds)
-    assert solved > 0.35 * len(seeds)  # 77 of the last 200, whose supports exclude more
+    assert solved > 0.35 * len(seeds)  # 77 of the last 200
 
 
 @pytest.mark.parametrize("suffix", [".pcmc", ".fe"])
