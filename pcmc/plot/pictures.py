@@ -76,9 +76,16 @@ def draw(
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
     """
-    options |= {"scalars": None if scalars is None else [scalars], "titles": [title] if title else ()}
-    options["numbers"] = None if numbers is None else [numbers]
-    return panel([surface], path, views=[view], width=width, **options)
+    return panel(
+        [surface],
+        path,
+        views=[view],
+        scalars=None if scalars is None else [scalars],
+        numbers=None if numbers is None else [numbers],
+        titles=[title] if title else (),
+        width=width,
+        **options,
+    )
 
 
 def panel(

@@ -397,3 +397,8 @@ def test_powers_of_ten_at_an_axis_stay_short():
     ink = (picture < 128).any(axis=2)
     frame = int(ink[: len(ink) // 2].sum(axis=0).argmax())  # the vertical axis
     assert frame < 0.15 * picture.shape[1]
+
+
+def test_a_picture_of_one_surface_takes_no_titles():
+    with pytest.raises(TypeError, match="multiple values for keyword argument 'titles'"):
+        plot.draw(tent(), titles=["east"])
