@@ -31,7 +31,7 @@ class ShownRoof:
     def of(cls, surface: Surface, title: str = "", units: Units = NO_UNITS) -> ShownRoof:
         """A surface from a program.
 
-        >>> Roof.of(None, "halls/nave & apse").name, Roof.of(None).name
+        >>> ShownRoof.of(None, "halls/nave & apse").name, ShownRoof.of(None).name
         ('halls-nave & apse', 'surface')
         """
         return cls(projects.Outcome(None, start=surface, units=units), title)
