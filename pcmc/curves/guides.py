@@ -18,6 +18,7 @@ ALIKE = 1e-9  # two unit vectors this near are the same
 Placed = TypeVar("Placed", bound="_Placed")
 
 
+@dataclass(frozen=True)
 class _Placed:
     """A point and a unit vector, in the two fields that ``KEYS`` names."""
 
@@ -53,7 +54,7 @@ class _Placed:
         """Where the isometry x → R x + t takes it."""
         places: tuple[Floats, Floats] = self._origin @ R.T + t, R @ self._axis
         moved: dict[str, Any] = {k: tuple(p.tolist()) for k, p in zip(self.KEYS, places, strict=True)}
-        return replace(self, **moved)  # type: ignore[type-var]
+        return replace(self, **moved)
 
     def same_as(self, other: object, near: float) -> bool:
         """Whether the other one is the same set of points, up to the length ``near``."""

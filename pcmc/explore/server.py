@@ -99,7 +99,7 @@ class Explorer:
             return self.sessions[name]
 
     def answer(self, name: str, act: str, asked: dict[str, Any], gone: Stop) -> bytes:
-        """The answer to a request of the session ``name``; ``gone`` tells that nobody waits for it."""
+        """Answer a request of the session ``name``; ``gone`` is true once the browser has hung up."""
         if act == "open":
             known = checked(OTHERS[act], asked).get("session")
             name, session = (known, self.session(known)) if known else self.open()

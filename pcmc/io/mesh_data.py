@@ -217,7 +217,7 @@ def to_surface(
 
 
 def scaled(value: Any, factor: float) -> Any:
-    """A part of a surface, or a tuple of parts, in a unit of which ``factor`` make one of the old unit.
+    """A part of a surface, or a tuple of parts, in a new unit; ``factor`` new units are one old unit.
 
     >>> scaled(Patch("roof", tension=2.0, pressure=3.0), 10.0)
     Patch(name='roof', tension=0.2, pressure=0.03)
@@ -245,7 +245,7 @@ def _point(point: Vector, factor: float) -> Vector:
 
 
 def scaled_surface(surface: Surface, factor: float) -> Surface:
-    """The surface in a unit of which ``factor`` make one of the old unit."""
+    """The surface in a new unit; ``factor`` new units are one old unit."""
     if factor == 1.0:
         return surface
     parts = {f.name: scaled(getattr(surface, f.name), factor) for f in fields(surface) if f.init}

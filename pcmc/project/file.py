@@ -38,7 +38,7 @@ DEEP = re.compile(rf"(?<![\w\"'-])(?:{_PART}[ \t]*\.[ \t]*){{30}}")  # TOML's re
 
 @dataclass(frozen=True, eq=False)
 class Project:
-    """The contents of a project file: its specification, of which nothing is meshed yet."""
+    """The contents of a project file: its specification, before anything is meshed."""
 
     path: Path
     plan: Plan | None = None  # None where a mesh is given

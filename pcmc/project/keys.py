@@ -29,7 +29,7 @@ MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME
 PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
 VARIED = "what may change; a name is a patch whose tension may, a list of names several with one tension"
 REQUIRED = MISSING  # the default of a key that must be given
-OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand
+OR_CURVE = ("plan.dividers", "plan.holes")  # a curve may replace these sections
 
 Schema = dict[str, Any]  # in the terms of JSON Schema
 WALL = 'a number, "balanced" or false'

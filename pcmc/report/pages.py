@@ -48,7 +48,7 @@ def pdf(blocks: Sequence[Block], title: str, foot: str, mark: str) -> bytes:
     """The pages as a file, each with its number and that of all; with a mark on each. No date is written."""
     pages: list[dict[str, Any]] = []
 
-    class Numbered(Canvas):  # type: ignore[misc]
+    class Numbered(Canvas):
         """A canvas that draws the frames of its pages when it knows how many they are."""
 
         def showPage(self) -> None:
@@ -110,7 +110,7 @@ def _flowables(block: Block) -> list[Any]:
     return [KeepTogether([*title, image])]
 
 
-class _Plan(Flowable):  # type: ignore[misc]
+class _Plan(Flowable):
     """A plan to scale, in the middle between the margins."""
 
     hAlign = "CENTER"

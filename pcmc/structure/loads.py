@@ -145,7 +145,7 @@ def load_steps(
 
 def acting_together(entry: Load | Sequence[Load]) -> tuple[Load, ...]:
     """The loads of one step: those of a tuple, or a single one."""
-    return entry if isinstance(entry, tuple) else (entry,)  # type: ignore[return-value]
+    return entry if isinstance(entry, tuple) else (entry,)
 
 
 def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:

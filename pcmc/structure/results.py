@@ -92,7 +92,7 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
 
 
 def _results(model: StructuralModel, k: int, blocks: dict[str, ResultBlock]) -> StepResults:
-    """The arrays of step k on the surface's vertices and faces, of which the standing ones are elements."""
+    """The arrays of step k on the surface's vertices and faces; only the standing faces are elements."""
     step, surface, stress = model.steps[k], model.standing, blocks["stresses"]
     displacements, reactions = np.full((surface.n, 3), np.nan), np.zeros((surface.n, 3))
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values

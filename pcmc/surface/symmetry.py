@@ -141,7 +141,7 @@ class Whole:
 
 
 def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> Surface:
-    """The whole surface of which this one is the piece between its mirror planes.
+    """The whole surface; this one is its piece between the mirror planes.
 
     The vertices in mirror planes are shared by the images; the faces of reflected images are turned over, so
     that each patch keeps its positive side. A patch continues under its name in its images, unless more than

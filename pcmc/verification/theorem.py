@@ -41,7 +41,7 @@ from .lipschitz import lipschitz
 from .system import System, system
 
 STEPS = 5  # of inverse iteration for the least eigenvalue: then mostly within a few percent
-SHARE = 0.8  # σ is first this share of that estimate, and half of it after each failure
+SHARE = 0.8  # of that estimate: the first σ; each failure halves it
 TRIES = 5
 REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
 LEVEL = 1e-9  # of a unit motion along Π: a part across it that is rounding

@@ -21,7 +21,7 @@ METHODS = (
 )
 
 
-@pytest.mark.parametrize("seeds", [range(30), *at_night(range(30, 200), range(200, 400))])
+@pytest.mark.parametrize("seeds", [range(30), *at_night(range(100), range(100, 200))])
 def test_random_meshes_end_in_a_verdict_or_a_named_error(seeds):
     solved, refusals = 0, []
     for seed in seeds:
@@ -48,7 +48,7 @@ def test_random_meshes_end_in_a_verdict_or_a_named_error(seeds):
     assert None not in refusals
 
 
-@pytest.mark.parametrize("seeds", [range(30), *at_night(range(30, 200), range(200, 400))])
+@pytest.mark.parametrize("seeds", [range(30), *at_night(range(100), range(100, 200))])
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 def test_random_forces_end_in_a_verdict_or_a_named_error(seeds):
     built, solved, refusals = 0, 0, []
@@ -75,7 +75,7 @@ def test_random_forces_end_in_a_verdict_or_a_named_error(seeds):
     assert None not in refusals
     assert "pressure" not in refusals  # a pressure that is no number: a volume that nothing changes
     assert built > 0.85 * len(seeds)
-    assert solved > 0.35 * len(seeds)  # 77 of the last 200
+    assert solved > 0.4 * len(seeds)
 
 
 @pytest.mark.parametrize("suffix", [".pcmc", ".fe"])
