@@ -4,12 +4,11 @@ The subpackages, from the ground up; each imports only from those above it in th
 
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
-curves surface             lines, arcs, Béziers and planes as objects; what a surface is
+surface                    lines, arcs, Béziers and planes as objects; what a surface is
 forces                     E with its derivatives, and its curvature
 contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
-stability certificate      lowest modes and Morse index; the verdict on a finished surface, its figures
-verification               a theorem for a surface at rest, proved in floating point
+stability certificate      lowest modes, Morse index; the verdict on a finished surface, a proof, its figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
 design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from . import explore
     from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
+    from .certificate.theorem import Theorem, verify
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .existence import solve
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from .panelling import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
-    from .verification import Theorem, verify
 
 __all__ = [
     "BoundaryMotion",
@@ -132,7 +131,7 @@ _NAMES = {
     "margins": ("Margin", "margin"),
     "panelling": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
-    "verification": ("Theorem", "verify"),
+    "certificate.theorem": ("Theorem", "verify"),
 }
 
 

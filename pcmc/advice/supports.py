@@ -14,10 +14,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
-from ..curves.curves import Curve
 from ..plan import Divider, Hole, Plan
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
+from ..surface.curves import Curve
 from .rises import Rise
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried

@@ -1,4 +1,4 @@
-"""The certificate of a surface: residual, balance, reactions, collapse, verdict.
+"""The certificate of a surface: residual, balance, reactions, collapse, verdict; a theorem by ``verify``.
 
 Gives ``certify`` to the solvers' callers. Imports ``stability``, ``meshing``, ``contact`` and below.
 """

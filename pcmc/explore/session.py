@@ -21,6 +21,7 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..certificate.quantities import figures
+from ..certificate.theorem import Theorem, verify
 from ..design import Parameter, Target, meet
 from ..margins import Margin, margin
 from ..meshing.remeshing import remesh
@@ -29,7 +30,6 @@ from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from ..verification import Theorem, verify
 from .following import AT_REST, ProjectFallback, Reached, Stop, Values, attempt, reach, until, wanted
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves

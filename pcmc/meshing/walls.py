@@ -10,10 +10,10 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
-from ..curves import polyline
-from ..curves.pieces import to_space
 from ..surface import HeldCurve, Patch, Plane, Surface
+from ..surface.curves import polyline
 from ..surface.geometry import bounding_size
+from ..surface.pieces import to_space
 from ..surface.topology import EdgeCurve
 from .planar import triangulate
 from .quality import edge_lengths

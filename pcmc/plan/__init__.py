@@ -1,15 +1,15 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
 ``plan`` holds Plan, ``parts`` dividers, holes, patches and cables; ``build`` makes the Surface from the
-``draft`` (``lines``, their ``arrangement``, ``edges``) and its ``walls``, by ``curves`` and ``meshing``.
+``draft`` (``lines``, their ``arrangement``, ``edges``) and its ``walls``, by ``surface`` and ``meshing``.
 ``drawing`` reads CAD files (``strokes`` on ``layers``, joined to ``paths``), ``proposal`` chooses what they
 do not say. May import ``io`` and the rooms below it.
 """
 
-from ..curves.curve_data import curve
-from ..curves.curves import Curve, arc, bezier, circle, ellipse, join, polyline
 from ..meshing.labelled import surface_from_labels
 from ..meshing.walls import add_walls
+from ..surface.curve_data import curve
+from ..surface.curves import Curve, arc, bezier, circle, ellipse, join, polyline
 from .parts import CableLine, Divider, Hole, PatchSpec
 from .plan import Plan, patch_names, plan_from
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
-from ..curves.pieces import point_text
+from ..surface.pieces import point_text
 from ..surface.topology import components
 from .lines import SNAP, Cut, Kind, LineTree, PlanLine, check_holes, check_line, overlap
 

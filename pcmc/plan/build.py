@@ -14,12 +14,12 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
-from ..curves.curves import Curve, polyline
-from ..curves.pieces import Piece, to_space
 from ..forces.rooms import check_rooms
 from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
+from ..surface.curves import Curve, polyline
+from ..surface.pieces import Piece, to_space
 from .draft import Draft, drafted
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
 from .lines import SNAP, Kind, PlanLine

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import PlanError, SurfaceError
-from ..curves.curves import Curve
-from ..curves.pieces import point_text, to_local, two_digits
 from ..meshing.planar import SIDES, PlanarMesh, signed_areas, triangulate
+from ..surface.curves import Curve
 from ..surface.geometry import segment_lengths
+from ..surface.pieces import point_text, to_local, two_digits
 from ..surface.topology import components
 from .arrangement import Arrangement, Chain, arrange, hole_points
 from .edges import Boundary, boundary, check_lines

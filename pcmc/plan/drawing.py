@@ -16,8 +16,8 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.units import conversion_note, size_note
-from ..curves.curves import Curve, polyline
-from ..curves.pieces import Piece, point_text, two_digits
+from ..surface.curves import Curve, polyline
+from ..surface.pieces import Piece, point_text, two_digits
 from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
 from .lines import Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label

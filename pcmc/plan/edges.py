@@ -12,10 +12,10 @@ import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
-from ..curves.curves import Curve
-from ..curves.pieces import point_text, to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
+from ..surface.curves import Curve
+from ..surface.pieces import point_text, to_local, to_space
 from .arrangement import Arrangement
 from .lines import SNAP, Kind, LineTree, PlanLine
 from .parts import PlanData, cable_label

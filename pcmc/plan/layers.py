@@ -13,7 +13,7 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.units import MICROMETRES, length_factor
 from ..base.validate import checked_name
-from ..curves.pieces import point_text
+from ..surface.pieces import point_text
 from .strokes import Stroke
 
 MEANINGS = {

@@ -13,9 +13,9 @@ import shapely
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
-from ..curves.curves import Curve
-from ..curves.pieces import point_text
+from ..surface.curves import Curve
 from ..surface.geometry import cross_2d
+from ..surface.pieces import point_text
 
 SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
 SAG = 1e-3  # of a curve's length: no curve is farther from the chords between its dense points

@@ -11,10 +11,10 @@ import numpy as np
 from ..base import validate
 from ..base.errors import OptionError, PcmcError, PlanError, unknown
 from ..base.validate import checked_name
-from ..curves.curve_data import CURVES, curve
-from ..curves.curves import Curve
 from ..meshing.walls import EDGES
 from ..surface import Plane
+from ..surface.curve_data import CURVES, curve
+from ..surface.curves import Curve
 
 BOTTOMS = ("sliding", "held", "sloped")
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours

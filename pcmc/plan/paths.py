@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..curves.curves import Curve, arc
-from ..curves.pieces import Piece
+from ..surface.curves import Curve, arc
+from ..surface.pieces import Piece
 from ..surface.topology import components
 from .layers import listed
 from .lines import Kind, LineTree, PlanLine
@@ -47,7 +47,7 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
     Paths end where one stroke ends or more than two meet. Where a gap is closed, an arc keeps its place and a
     line moves; of two alike each moves half of the way. Strokes drawn twice count once.
 
-    >>> from ..curves.curves import polyline
+    >>> from ..surface.curves import polyline
     >>> lines = [[[0, 0, 0], [4, 0, 0]], [[0, 3, 0], [0, 0.001, 0]], [[4, 0, 0], [0, 3, 0]]]
     >>> strokes = [Stroke("outline", f"LINE {k}", polyline(points)) for k, points in enumerate(lines)]
     >>> (path,), notes = join_strokes(strokes, 0.01)

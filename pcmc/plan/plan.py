@@ -14,10 +14,10 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..base.validate import checked_name
-from ..curves.curves import Curve
-from ..curves.pieces import to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
+from ..surface.curves import Curve
+from ..surface.pieces import to_local, to_space
 from ..surface.summary import listed
 from . import parts
 from .parts import Divider, PatchSpec, PlanData, check_keys

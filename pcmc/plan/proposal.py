@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
-from ..curves.curves import Curve
+from ..surface.curves import Curve
 from ..surface.values import balanced_wall
 from .drawing import Drawing
 from .edges import cable_for

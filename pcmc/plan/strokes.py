@@ -19,9 +19,9 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, MissingExtra, unknown
 from ..base.files import check_regular, system_error
 from ..base.units import length_factor, unit_in_file
-from ..curves.curves import Curve
-from ..curves.pieces import Piece
 from ..io.libraries import read_arrays
+from ..surface.curves import Curve
+from ..surface.pieces import Piece
 
 LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
 """The suffixes of drawings, and the libraries that read them."""

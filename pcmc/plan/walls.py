@@ -13,10 +13,10 @@ import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
-from ..curves.curves import Curve
-from ..curves.pieces import to_space
 from ..meshing.walls import UpperEdge, WallMesh, build_walls
 from ..surface import Patch, Plane, Room
+from ..surface.curves import Curve
+from ..surface.pieces import to_space
 from ..surface.values import balanced_wall
 from .draft import Draft
 from .edges import NONE

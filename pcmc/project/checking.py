@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import FileError, PcmcError, unknown
-from ..curves.curve_data import CURVES
+from ..surface.curve_data import CURVES
 from .keys import KINDS, OR_CURVE, REQUIRED, Section, fits, main_sections, solve_section, target_sections
 
 LONGEST = 1023  # bits of a float's exponent

@@ -14,7 +14,6 @@ from ..accuracy.adaptive import ACCURACY_OF
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
-from ..curves.curve_data import CURVES
 from ..drawings import FORMATS
 from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
@@ -22,6 +21,7 @@ from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
 from ..structure.model import Structure
 from ..surface import Plane
+from ..surface.curve_data import CURVES
 from .settings import COLOURS, PATCH_KEYS, WHEN, AccuracyWanted, MeshFile, Output, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"

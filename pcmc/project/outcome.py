@@ -21,6 +21,7 @@ from .settings import Output
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..certificate.quantities import Figure
+    from ..certificate.theorem import Theorem
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from ..panelling import Panels
     from ..report import RoofReport
     from ..structure.model import StructuralModel, Structure
-    from ..verification import Theorem
     from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
@@ -143,7 +143,7 @@ class Outcome:
     @cached_property
     def theorem(self) -> Theorem:
         """What ``pcmc.verify`` proves of what is shown."""
-        from ..verification import verify
+        from ..certificate.theorem import verify
 
         return verify(self.shown.surface)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError
 from ..base.files import PathLike
-from ..curves.curves import Curve
 from ..plan import plan_from
+from ..surface.curves import Curve
 from .drawn import FALLBACK, LENGTHS, height_targets, read
 from .file import Project
 from .start import surface_of
@@ -143,7 +143,7 @@ def _curve(curve: Any, closed: bool = False) -> str:
 
     Where every curve is ``closed``, a polyline need not say it.
     """
-    from ..curves.curve_data import curve_data
+    from ..surface.curve_data import curve_data
 
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]
     if closed and isinstance(data, Mapping) and data.get("closed"):

@@ -28,8 +28,8 @@ from .words import ERROR_BARS, LEGEND, about_forces, panel_text, verdict_sentenc
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..certificate.theorem import Theorem
     from ..margins import Margin
-    from ..verification import Theorem
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture

@@ -12,7 +12,7 @@ from .tables import MOST_FAMILIES, one, small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-    from ..verification import Theorem
+    from ..certificate.theorem import Theorem
 
 VERDICTS = {
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"

@@ -1,10 +1,10 @@
-"""The surface itself: patches, supports, cables, rooms, mesh, their checks, topology, and triangle geometry.
+"""The surface itself: patches, supports, cables, rooms, mesh, checks, topology, triangle geometry, curves.
 
-Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Cable``, ``Room``, ``Surface``, ``cut`` and
-``mirrored`` to all other rooms. Imports ``curves`` and ``base``.
+Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Curve``, ``Cable``, ``Room``, ``Surface``, ``cut`` and
+``mirrored`` to all other subpackages. Imports only ``base``.
 """
 
-from ..curves.guides import Circle, Guide, Line, Plane
+from .guides import Circle, Guide, Line, Plane
 from .held_curve import HeldCurve
 from .parts import Cable, Patch, Room
 from .surface import Surface, expect_surface

@@ -8,8 +8,8 @@ from typing import Any
 from ..base import validate
 from ..base.arrays import read_only
 from ..base.errors import SurfaceError
-from ..curves.guides import Plane
 from . import checks
+from .guides import Plane
 from .held_curve import checked_curves
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes

@@ -16,8 +16,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, read_only
 from ..base.errors import CurveWarning, SurfaceError
-from ..curves.curve_data import exact_curve, exact_data
-from ..curves.curves import Curve
+from .curve_data import exact_curve, exact_data
+from .curves import Curve
 from .topology import Topology
 
 NEAR = 1e-8  # of the size: a vertex this near to its curve is on it
@@ -28,7 +28,7 @@ SPAN = 1e-9  # of the size of a curve: points this near to a plane or line span 
 class HeldCurve:
     """A drawn curve in space, and the vertices that are held on it.
 
-    >>> from ..curves import polyline
+    >>> from .curves import polyline
     >>> ridge = HeldCurve(polyline([[0, 0, 1], [4, 0, 1]]), np.array([7, 3, 9]), np.array([0.0, 0.5, 1.0]))
     >>> ridge.edges.tolist()
     [[7, 3], [3, 9]]

@@ -12,9 +12,9 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
-from ..curves.guides import Circle, Guide, Line, Plane
 from . import checks
 from .geometry import accumulate, bounding_size, dot, point, scaled
+from .guides import Circle, Guide, Line, Plane
 from .topology import Topology
 
 FLAT = 1e-9  # sine of an angle up to which two directions count as parallel

@@ -12,7 +12,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
-from ..curves.guides import ALIKE, Guide, Plane
+from .guides import ALIKE, Guide, Plane
 from .held_curve import HeldCurve
 from .parts import Cable, Room
 from .supports import NEAR, refuse_in_mirror

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 import pcmc
 from pcmc.base.errors import CurveWarning, FileError, SurfaceError
-from pcmc.curves.guides import Plane
 from pcmc.meshing.held_curves import doubted_midpoints
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
@@ -22,6 +21,7 @@ from pcmc.plan.lines import Kind, PlanLine
 from pcmc.project import load, run_project
 from pcmc.project.cache import _pieces
 from pcmc.surface import HeldCurve
+from pcmc.surface.guides import Plane
 
 ROOT = math.sqrt(0.5)
 BASE = polyline([[-2, 0], [2, 0]])

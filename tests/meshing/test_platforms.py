@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pcmc import Verdict, solve
-from pcmc.curves.curves import arc, join, polyline
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.remeshing import remesh
 from pcmc.plan import Divider, Plan
+from pcmc.surface.curves import arc, join, polyline
 
 
 def at(radius, degrees):

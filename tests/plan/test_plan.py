@@ -7,14 +7,14 @@ import pytest
 
 from pcmc import Plane, Surface, Verdict, solve
 from pcmc.base.errors import PlanWarning
-from pcmc.curves.curves import arc, bezier, circle, join, polyline
-from pcmc.curves.pieces import to_local
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Divider, Hole, PatchSpec, Plan, draft, patch_names, plan_from
 from pcmc.plan.build import dome, harmonic_heights
 from pcmc.plan.draft import drafted
+from pcmc.surface.curves import arc, bezier, circle, join, polyline
+from pcmc.surface.pieces import to_local
 from pcmc.surface.topology import POINT
 
 BOX = [[0, 0], [20, 0], [20, 12], [0, 12]]

@@ -15,11 +15,11 @@ from refusals import refused
 import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError
-from pcmc.curves.curve_data import curve_data
 from pcmc.io.libraries import read_arrays
 from pcmc.plan import plan_from
 from pcmc.plan.drawing import read_drawing
 from pcmc.plan.proposal import ABOVE_LEAST, least_tension, proposed
+from pcmc.surface.curve_data import curve_data
 
 rhino3dm = pytest.importorskip("rhino3dm")
 shapely = pytest.importorskip("shapely")

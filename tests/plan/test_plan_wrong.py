@@ -10,9 +10,9 @@ import pytest
 from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
-from pcmc.curves.curve_data import curve
-from pcmc.curves.curves import circle, polyline
 from pcmc.plan import PatchSpec, Plan, patch_names, plan_from
+from pcmc.surface.curve_data import curve
+from pcmc.surface.curves import circle, polyline
 from tests.plan.test_plan import BOX, vertices_of
 
 COURT = {"curve": circle([17, 5], 2)}

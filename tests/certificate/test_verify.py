@@ -12,15 +12,15 @@ from motion_cases import SURFACES
 import generators
 import pcmc
 from pcmc import Patch, Surface, solve, verify
+from pcmc.certificate import balls, enclosures, theorem
+from pcmc.certificate.lipschitz import lipschitz
+from pcmc.certificate.system import system
 from pcmc.contact.pinching import standing_part
 from pcmc.contact.pull import pull_and_capacity
 from pcmc.forces.motion_space import motion_space
 from pcmc.forces.pattern import hessian_pattern
 from pcmc.forces.second_variation import assemble
 from pcmc.stability.equilibrium import Equilibrium
-from pcmc.verification import balls, enclosures, theorem
-from pcmc.verification.lipschitz import lipschitz
-from pcmc.verification.system import system
 from studies.forces.cases import hanging_barrel
 from tests.contact.test_contact_held import example
 from tests.surface import test_lines

@@ -6,9 +6,9 @@ from refusals import refused
 
 from pcmc import Plane
 from pcmc.base.errors import OptionError
-from pcmc.curves.curve_data import curve
-from pcmc.curves.curves import arc, bezier, circle, join, polyline
-from pcmc.curves.pieces import to_local, to_space
+from pcmc.surface.curve_data import curve
+from pcmc.surface.curves import arc, bezier, circle, join, polyline
+from pcmc.surface.pieces import to_local, to_space
 
 
 def test_lengths_in_closed_form():

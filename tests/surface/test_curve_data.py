@@ -7,10 +7,10 @@ import pytest
 from refusals import refused
 
 from pcmc.base.errors import OptionError
-from pcmc.curves.curve_data import curve_data
-from pcmc.curves.curves import arc
 from pcmc.plan import bezier, circle, curve, ellipse, join, polyline
 from pcmc.plan.strokes import bezier_spans
+from pcmc.surface.curve_data import curve_data
+from pcmc.surface.curves import arc
 
 
 def test_spans_of_a_nurbs_circle_are_on_the_circle():

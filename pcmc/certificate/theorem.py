@@ -28,7 +28,6 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.units import NO_UNITS, Units
-from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart
 from ..contact.pull import pull_and_capacity
 from ..forces.motion_space import MotionSpace
@@ -37,6 +36,7 @@ from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
 from ..surface import Surface, expect_surface
 from .balls import SAFE, U
+from .certificate import TOLERANCE
 from .lipschitz import lipschitz
 from .system import System, system
 
