@@ -5,8 +5,8 @@ The subpackages, from the ground up; each imports only from those above it in th
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
 surface                    lines, arcs, Béziers and planes as objects; what a surface is
-forces                     E with its derivatives, and its curvature
-contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
+forces                     E with its derivatives, its curvature, and walls that pinch
+meshing                    triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes, Morse index; the verdict on a finished surface, a proof, its figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver

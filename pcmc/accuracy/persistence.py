@@ -13,7 +13,7 @@ from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.balance import overload
 from ..certificate.tables import names_of
-from ..contact.pinching import standing_part
+from ..forces.pinching import standing_part
 from ..meshing.quality import triangle_quality
 from ..solvers.result import Result, Status
 from ..stability.equilibrium import Equilibrium

@@ -17,8 +17,8 @@ from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
 from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
-from ..contact.pinching import standing_part
 from ..existence import solve
+from ..forces.pinching import standing_part
 from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
 from ..solvers.result import Result, Status

@@ -1,6 +1,6 @@
 """The certificate of a surface: residual, balance, reactions, collapse, verdict; a theorem by ``verify``.
 
-Gives ``certify`` to the solvers' callers. Imports ``stability``, ``meshing``, ``contact`` and below.
+Gives ``certify`` to the solvers' callers. Imports ``stability``, ``meshing`` and below.
 """
 
 from .certificate import Certificate, certify

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import standing_part
 from ..forces import triangles
 from ..forces.functional import add_cables_and_weights
+from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums

@@ -25,10 +25,10 @@ import numpy as np
 from scipy.sparse import block_array, csr_array
 
 from ..base.arrays import Floats
-from ..contact.pinching import StandingPart
 from ..forces.flat_pieces import flat_pieces
 from ..forces.motion_space import MotionSpace
 from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.pinching import StandingPart
 from ..forces.rooms import closing_volumes, prescribed_volumes
 from .balls import SAFE, U
 from .enclosures import Elements, coordinates, elements, forces, second_variation, volume

@@ -28,9 +28,9 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.units import NO_UNITS, Units
-from ..contact.pinching import StandingPart
-from ..contact.pull import pull_and_capacity
 from ..forces.motion_space import MotionSpace
+from ..forces.pinching import StandingPart
+from ..forces.pull import pull_and_capacity
 from ..stability.backward_error import backward_error
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser

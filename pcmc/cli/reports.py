@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from ..accuracy import MeshCheck
 from ..certificate.balance import strained_junction
 from ..certificate.tables import lean_texts
-from ..contact.pinching import standing_part
 from ..design.outcome import values_text
+from ..forces.pinching import standing_part
 from ..project import MOST_CHECKED, Outcome
 from .progress import working
 

@@ -16,8 +16,8 @@ import numpy as np
 from ..base import validate
 from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
-from ..contact.pinching import standing_part
 from ..forces.curvature import mean_curvature
+from ..forces.pinching import standing_part
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..forces.motion_space import MotionSpace
+from ..forces.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
 from ..forces.rooms import with_room_pressures
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality

@@ -26,8 +26,8 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import place_wall_rows
 from ..forces.parameters import gradient_by
+from ..forces.pinching import place_wall_rows
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..surface import Surface

@@ -20,7 +20,7 @@ from ..certificate.cables import weak_cable
 from ..certificate.certificate import TOLERANCE
 from ..certificate.neck import pinched_neck
 from ..certificate.proof import Attempt, Proof
-from ..contact.pinching import standing_part
+from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .homotopy import (

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
 from ..certificate.balance import load
-from ..contact.pinching import find_walls, place_wall_rows
+from ..forces.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import cross_2d

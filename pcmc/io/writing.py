@@ -17,7 +17,7 @@ from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import as_path, atomic_write, check_name, writing
 from ..base.units import Units, as_units, length_factor
 from ..base.validate import checked_name, choice, refuse
-from ..contact.pinching import standing_part
+from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .formats import FORMATS, Content, format_of
 from .mesh_data import scaled_surface

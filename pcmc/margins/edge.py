@@ -22,8 +22,8 @@ from ..certificate import Certificate, certify
 from ..certificate.balance import pressures_left_over
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
-from ..contact.pinching import standing_part
 from ..continuation.segment import EVENT_ACCURACY
+from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Ints
 from ..base.errors import OptionError
-from ..contact.pinching import Walls, lift, standing_part
+from ..forces.pinching import Walls, lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import edge_places

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
-from ..contact.pinching import StandingPart, place_wall_rows
 from ..forces.motion_space import motion_space
+from ..forces.pinching import StandingPart, place_wall_rows
 from ..surface import Surface
 from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
 from ..surface.supports import apply_supports, onto_circles

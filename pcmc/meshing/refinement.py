@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..contact.pinching import midpoints
+from ..forces.pinching import midpoints
 from ..surface import Surface, expect_surface
 
 CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner

@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..contact.pinching import lift, standing_part
 from ..forces.curvature import mean_curvature
+from ..forces.pinching import lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
 from ..surface.topology import SIDES, edge_places

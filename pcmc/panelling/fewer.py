@@ -18,8 +18,8 @@ from scipy.sparse.linalg import splu
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import place_wall_rows, standing_part
 from ..forces.motion_space import motion_space, perpendicular
+from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import compare, worst_quality
 from ..solvers import solve
 from ..surface import Surface

@@ -12,8 +12,8 @@ from .. import solvers
 from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..certificate.balance import unbalanced
-from ..contact.pinching import standing_part
 from ..existence import solve
+from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..meshing.remeshing import remesh, size_note
 from ..plan import Plan

@@ -19,8 +19,8 @@ import numpy as np
 
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
-from ..contact.pinching import find_walls
 from ..forces.functional import energy
+from ..forces.pinching import find_walls
 from ..forces.rooms import check_rooms, room_pressures
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..contact.pinching import (
+from ..forces.functional import energy_at
+from ..forces.loose_parts import rounding_left
+from ..forces.pinching import (
     StandingPart,
     Walls,
     coming_down,
@@ -22,9 +24,7 @@ from ..contact.pinching import (
     standing_part,
     top_spacing,
 )
-from ..contact.pull import pull_directions
-from ..forces.functional import energy_at
-from ..forces.loose_parts import rounding_left
+from ..forces.pull import pull_directions
 from ..forces.rooms import closing_volumes, volume_gradients_at, volumes_at, with_room_pressures
 from ..meshing.quality import compare, redistribute, worst_quality
 from ..stability.equilibrium import Equilibrium

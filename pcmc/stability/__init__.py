@@ -1,4 +1,4 @@
 """Stability: sparse factorisation with inertia, lowest modes, Morse index.
 
-Gives these to the certificate and the solvers. Imports ``contact`` and the rooms below it.
+Gives these to the certificate and the solvers. Imports ``forces`` and the rooms below it.
 """

@@ -15,13 +15,13 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..base.arrays import Floats
-from ..contact.pinching import StandingPart, standing_part
-from ..contact.pull import excess_pull
 from ..forces.functional import energy_and_gradient
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.loose_parts import relative_forces
 from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..forces.pattern import Pattern, hessian_pattern
+from ..forces.pinching import StandingPart, standing_part
+from ..forces.pull import excess_pull
 from ..forces.rigid_motions import rigid_modes, rigid_motions
 from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
 from ..forces.second_variation import assemble

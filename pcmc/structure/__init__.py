@@ -1,7 +1,7 @@
 """Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer.
 
 Gives ``StructuralModel``, ``Material``, the loads, ``write_structure`` and ``read_results``. Imports
-``solvers``, ``certificate``, ``contact`` and the rooms below.
+``solvers``, ``certificate`` and the rooms below.
 """
 
 from .inp import write_structure

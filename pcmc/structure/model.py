@@ -15,8 +15,8 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate import Certificate
 from ..certificate.certificate import certified
-from ..contact.pinching import standing_faces, standing_part
 from ..forces.cables import directions
+from ..forces.pinching import standing_faces, standing_part
 from ..forces.triangles import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface

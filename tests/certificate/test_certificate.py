@@ -12,8 +12,8 @@ from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mea
 from pcmc.certificate import Verdict
 from pcmc.certificate.reactions import support_forces
 from pcmc.certificate.tables import conormal_sum
-from pcmc.contact.pinching import standing_part
 from pcmc.forces.functional import patch_areas, volume
+from pcmc.forces.pinching import standing_part
 from pcmc.meshing.quality import triangle_quality
 from pcmc.plan import Divider, Plan
 from pcmc.stability.equilibrium import Equilibrium
@@ -205,7 +205,7 @@ def test_the_standing_part_is_computed_once_for_each_surface():
     surface = solve(two_squares(6, alpha_aux=3.0)).surface
     part = standing_part(surface)
     assert part.surface.m < surface.m
-    with mock.patch("pcmc.contact.pinching.find_walls", side_effect=AssertionError):
+    with mock.patch("pcmc.forces.pinching.find_walls", side_effect=AssertionError):
         certify(surface)
         support_forces(surface)
         assert standing_part(surface) is part

@@ -12,8 +12,8 @@ from generators import spherical_cap, two_squares
 from pcmc import Plane, Target, cut, plot
 from pcmc.base.units import Units
 from pcmc.certificate.quantities import figures
-from pcmc.contact.pinching import standing_part
 from pcmc.design.targets import measure
+from pcmc.forces.pinching import standing_part
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
 from pcmc.plot import pictures

@@ -15,14 +15,14 @@ from pcmc import Patch, Surface, solve, verify
 from pcmc.certificate import balls, enclosures, theorem
 from pcmc.certificate.lipschitz import lipschitz
 from pcmc.certificate.system import system
-from pcmc.contact.pinching import standing_part
-from pcmc.contact.pull import pull_and_capacity
 from pcmc.forces.motion_space import motion_space
 from pcmc.forces.pattern import hessian_pattern
+from pcmc.forces.pinching import standing_part
+from pcmc.forces.pull import pull_and_capacity
 from pcmc.forces.second_variation import assemble
 from pcmc.stability.equilibrium import Equilibrium
 from studies.forces.cases import hanging_barrel
-from tests.contact.test_contact_held import example
+from tests.forces.test_contact_held import example
 from tests.surface import test_lines
 
 CASES = {

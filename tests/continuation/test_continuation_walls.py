@@ -6,9 +6,9 @@ from branches import tension_of_height
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
-from pcmc.contact.pinching import standing_part
-from pcmc.contact.pull import pull_and_capacity
 from pcmc.continuation import Ending
+from pcmc.forces.pinching import standing_part
+from pcmc.forces.pull import pull_and_capacity
 from pcmc.plan import Divider, Plan
 
 

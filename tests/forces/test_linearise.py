@@ -7,10 +7,10 @@ from shapes import octahedron, rotation, shaken
 from starts import two_squares
 
 from pcmc import Plane, Surface, solve
-from pcmc.contact.pinching import standing_part
 from pcmc.forces.functional import energy_and_gradient
 from pcmc.forces.jacobian import linearise
 from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pinching import standing_part
 from pcmc.surface.topology import SHEET
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")

@@ -7,9 +7,9 @@ from shapes import disc, placed, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
-from pcmc.contact.pinching import resting_links, standing_part
 from pcmc.forces.functional import energy_and_gradient
 from pcmc.forces.motion_space import MotionSpace, force_scale, motion_space, vertex_classes
+from pcmc.forces.pinching import resting_links, standing_part
 from pcmc.surface.topology import CURVE, POINT, SHEET
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")

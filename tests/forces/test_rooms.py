@@ -6,9 +6,9 @@ import pytest
 import pcmc
 from generators import double_bubble, two_squares
 from pcmc import Parameter, Target, cli, meet
-from pcmc.contact.pinching import standing_part
 from pcmc.design import sensitivities
 from pcmc.design.targets import measure
+from pcmc.forces.pinching import standing_part
 from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.surface.values import wall_changes
 

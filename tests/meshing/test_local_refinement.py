@@ -7,8 +7,8 @@ from refusals import refused
 import pcmc
 from generators import four_fans, spherical_cap, three_patches, two_caps, two_squares
 from pcmc.base.errors import OptionError
-from pcmc.contact.pinching import find_walls, standing_part
 from pcmc.forces.functional import patch_areas, patch_volumes
+from pcmc.forces.pinching import find_walls, standing_part
 from pcmc.meshing.local_refinement import refine_faces, refine_near
 from pcmc.meshing.quality import edge_lengths
 from pcmc.meshing.refinement import refine

@@ -11,9 +11,9 @@ from itertools import product
 from flint import arb, arb_mat, ctx
 
 from pcmc import Surface
-from pcmc.contact.pinching import standing_part
 from pcmc.forces.flat_pieces import flat_pieces
 from pcmc.forces.motion_space import motion_space
+from pcmc.forces.pinching import standing_part
 from pcmc.forces.rigid_motions import rigid_modes, rigid_motions
 from pcmc.forces.rooms import closing_volumes
 

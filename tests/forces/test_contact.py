@@ -6,7 +6,8 @@ from shapes import placed, rotation, shaken
 from starts import double_bubble, four_fans, two_caps, two_squares
 
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
-from pcmc.contact.pinching import (
+from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pinching import (
     beside_resting,
     find_walls,
     lift,
@@ -17,8 +18,7 @@ from pcmc.contact.pinching import (
     resting_vertices,
     top_spacing,
 )
-from pcmc.contact.pull import pull_and_capacity
-from pcmc.forces.motion_space import motion_space, vertex_classes
+from pcmc.forces.pull import pull_and_capacity
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.state import SolverState
 

@@ -14,7 +14,7 @@ from starts import stationary, two_squares
 import pcmc
 from pcmc import certify
 from pcmc.base.errors import FileError, FileWarning, SurfaceError
-from pcmc.contact.pinching import find_walls, resting_vertices
+from pcmc.forces.pinching import find_walls, resting_vertices
 from pcmc.io import load
 from pcmc.io.patch_meshes import WALLS as KEY
 

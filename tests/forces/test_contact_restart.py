@@ -9,7 +9,7 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.contact.pinching import (
+from pcmc.forces.pinching import (
     find_walls,
     place_wall_rows,
     remove_pinched_walls,

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..forces.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.supports import apply_supports
 from ..surface.topology import topology
+from .motion_space import MotionSpace, VertexClasses, vertex_classes
 from .wall_rows import WallRows, held_walls, join_rows, wall_rows
 
 

@@ -9,7 +9,7 @@ from starts import four_fans, stationary, two_squares
 
 import pcmc
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
-from pcmc.contact.pinching import (
+from pcmc.forces.pinching import (
     coming_down,
     find_walls,
     lift,
@@ -17,7 +17,7 @@ from pcmc.contact.pinching import (
     remove_pinched_walls,
     resting_vertices,
 )
-from pcmc.contact.pull import pull_and_capacity, pull_directions
+from pcmc.forces.pull import pull_and_capacity, pull_directions
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.newton import newton

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..forces.functional import energy_and_gradient
 from ..surface import Surface
+from .functional import energy_and_gradient
 from .pinching import Walls
 
 SLACK = 1e-9  # of the capacity: an excess below is rounding

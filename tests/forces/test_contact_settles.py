@@ -3,7 +3,7 @@
 import numpy as np
 
 from pcmc import Verdict, solve
-from pcmc.contact.pinching import standing_part
+from pcmc.forces.pinching import standing_part
 from pcmc.meshing.remeshing import remesh
 from tests.meshing.test_platforms import platform
 
