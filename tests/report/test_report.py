@@ -91,6 +91,12 @@ def test_it_has_every_number_of_the_certificate(pages, caps):
     for patch in caps.patches:
         assert re.search(rf"^ *{patch.name} +(roof|wall) ", text, re.M)
     assert f"{pcmc.certify(caps).volume:.1f} m³" in text
+    lifted, held = (
+        float(re.search(rf"^ *{label}, upwards +(\S+) kN", text, re.M)[1])
+        for label in ("pressure, snow and weight", "all reactions")
+    )
+    assert lifted > 0.0  # the pressure lifts the roof, and its supports hold it down
+    assert held == pytest.approx(-lifted, rel=2e-3)
     for part in ("Mesh check", "Panels", "families", "caps.3dm", "reportlab", "kN/m²"):
         assert part in text
 
