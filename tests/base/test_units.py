@@ -15,7 +15,7 @@ import pcmc
 from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning, LostWarning, OptionError
-from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor
+from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor, size_note
 from pcmc.io.mesh_data import scaled, scaled_surface
 from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
@@ -280,3 +280,19 @@ def test_wrong_units_of_a_project_are_refused(tmp_path, lines, what, line):
     (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
     with refused(FileError, what=what, where=line):
         load(tmp_path / "roof.toml")
+
+
+@pytest.mark.parametrize(
+    ("size", "drawn", "note"),
+    [
+        (0.005, "", "the plan is 5 mm long; check its unit, which is m"),
+        (0.005, "mm", "the plan is 5 mm long; is the drawing in m? Its unit is mm: set it to m in CAD"),
+        (1200.0, "mm", "the plan is 1.2 km long; check its unit, which is mm"),
+        (1.0, "", ""),
+        (1000.0, "", ""),
+    ],
+)
+def test_an_unlikely_size_is_named_with_the_unit_that_would_explain_it(size, drawn, note):
+    found = size_note(size, "m", drawn)
+    assert found.startswith(note)
+    assert bool(found) == bool(note)
