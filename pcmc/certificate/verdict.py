@@ -15,8 +15,7 @@ from ..stability.modes import NEAR, NEUTRAL, Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
-from .diagnosis import describe_saddle, held_wall_down, where_collapsed
-from .neck import Neck, pinched_neck
+from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
 NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
