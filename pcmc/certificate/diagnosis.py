@@ -152,7 +152,7 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     from its own end, where only the mesh holds it; or it comes down on the held bottom of its wall,
     which cannot pinch (``find_walls``).
     """
-    face, quality = _worst_face(surface, pinchable)
+    face, quality = worst_face(surface, pinchable)
     place = surface.vertices[surface.faces[face]].mean(axis=0)
     worst = (
         f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
@@ -177,7 +177,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
 
     Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
     """
-    X, patch = surface.vertices, int(surface.patch_of_face[_worst_face(surface, pinchable)[0]])
+    X, patch = surface.vertices, int(surface.patch_of_face[worst_face(surface, pinchable)[0]])
     used = np.zeros(surface.n, dtype=bool)
     used[surface.faces[surface.patch_of_face == patch]] = True
     top = used & surface.topology.on_junction
@@ -188,10 +188,10 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     return height < LOW * float(np.median(edge_lengths(surface)))
 
 
-def _worst_face(surface: Surface, pinchable: Bools) -> tuple[int, float]:
-    """The worst triangle outside walls that can pinch, and its quality."""
+def worst_face(surface: Surface, left_out: Bools) -> tuple[int, float]:
+    """The worst triangle outside the patches (k,) that are left out, and its quality."""
     quality = triangle_quality(surface.vertices, surface.faces)
-    outer = np.where(pinchable[surface.patch_of_face], np.inf, quality)
+    outer = np.where(left_out[surface.patch_of_face], np.inf, quality)
     return int(outer.argmin()), float(outer.min())
 
 

@@ -9,7 +9,6 @@ from ..accuracy import MeshCheck
 from ..certificate.balance import strained_junction
 from ..certificate.tables import lean_texts
 from ..design.outcome import values_text
-from ..forces.pinching import standing_part
 from ..project import MOST_CHECKED, Outcome
 from .progress import working
 
@@ -22,7 +21,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     surface, certificate, design, units = outcome.surface, outcome.certificate, outcome.design, outcome.units
     message, detail = outcome.solved.message, certificate.detail
     if outcome.advice:  # it has the remedy for a strained junction that was tried
-        strained = strained_junction(surface, standing_part(surface).walls.pinchable)
+        strained = strained_junction(surface)
         if strained is not None:
             message, detail = (text.replace(strained.hint, "") for text in (message, detail))
     if verdict and detail:

@@ -25,7 +25,7 @@ from ..certificate.balance import coarseness, overload
 from ..certificate.measures import vertices_up
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from .outcome import Design, DesignStatus, NoStart
 from .sensitivity import slopes
 from .steps import StepPlan, Trial
@@ -91,8 +91,7 @@ def meet(
     >>> design.met, round(design.surface.patches[0].tension, 6)
     (True, 0.555556)
     """
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     aims, parameters = as_targets(targets), as_parameters(vary)
     for target in aims:
         if not target.limits:

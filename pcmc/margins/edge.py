@@ -21,6 +21,7 @@ from ..base.errors import PcmcError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict, certify
 from ..certificate.balance import pressures_left_over
+from ..certificate.diagnosis import worst_face
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
 from ..continuation import Branch, Ending, follow
@@ -28,7 +29,6 @@ from ..continuation.branch_point import ALONG
 from ..continuation.segment import EVENT_ACCURACY
 from ..forces.pinching import standing_part
 from ..forces.triangles import compressed, effective_tensions
-from ..meshing.quality import triangle_quality
 from ..solvers import solve
 from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
@@ -136,8 +136,7 @@ def _follow(
 
 def _worst_place(surface: Surface) -> str:
     """Where the worst triangle of the roof is, walls left out as their triangles may vanish."""
-    faces = surface.faces[surface.roof[surface.patch_of_face]]
-    worst = faces[triangle_quality(surface.vertices, faces).argmin()]
+    worst = surface.faces[worst_face(surface, ~surface.roof)[0]]
     return f"({', '.join(f'{x:.3g}' for x in surface.vertices[worst].mean(axis=0))})"
 
 
