@@ -15,11 +15,9 @@ COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 
 
 
 def register_fonts() -> None:
-    """Make matplotlib's letters known to reportlab: they have Greek, Cyrillic and the signs of units.
+    """Make matplotlib's letters, which have Greek, Cyrillic and the signs of units, known to reportlab.
 
-    Raises
-    ------
-    MissingExtra : reportlab or matplotlib is not installed.
+    MissingExtra if one of the two is not installed.
     """
     require("reportlab", extra="report")
     require("matplotlib", extra="plot")

@@ -93,13 +93,9 @@ def outline(curves: Sequence[SheetLine], axis: Sequence[float]) -> Floats:
 
 def cut(surface: Surface, point: Floats, normal: Floats) -> list[SheetLine]:
     """The lines in which a plane cuts the roof and its walls."""
+    layers = ["PCMC-SECTION" if roof else "PCMC-SECTION-WALL" for roof in surface.roof]
     return [
-        SheetLine(
-            one.points,
-            "PCMC-SECTION" if surface.roof[one.patch] else "PCMC-SECTION-WALL",
-            one.closed,
-            surface.patches[one.patch].name,
-        )
+        SheetLine(one.points, layers[one.patch], one.closed, surface.patches[one.patch].name)
         for one in section(surface, point, normal)
     ]
 
@@ -173,9 +169,7 @@ def placed(
 ) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 
-    Raises
-    ------
-    OptionError : they do not fit at the scale given; the message names the smallest format that holds them.
+    OptionError if they do not fit at the scale given, with the smallest format that holds them.
     """
     boxes = [view.box for view in views]
     extent = np.max([high - low for low, high in boxes], axis=0)
@@ -227,12 +221,10 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     for at, name, layer in view.points:
         place = factor * at + shift
         half, height = (0.8, TINY) if layer == "PCMC-POINT" else (1.5, SMALL)
-        sheet.lines += [
-            SheetLine(place + half * np.array([[-1.0, s], [1.0, -s]]), layer) for s in (-1.0, 1.0)
-        ]
+        square = place + half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        sheet.lines += [SheetLine(square[::2], layer), SheetLine(square[[3, 1]], layer)]
         if layer != "PCMC-POINT":
-            square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-            sheet.lines.append(SheetLine(place + half * square, layer, True))
+            sheet.lines.append(SheetLine(square, layer, True))
             marks.append(Text(place, "##", align="C"))  # kept free of names
         beside = place + np.array([half + 0.3, half + 0.6 * height])
         (small if layer == "PCMC-POINT" else large).append(Text(beside, name, height, layer))

@@ -136,9 +136,8 @@ class ProjectFallback:
     ) -> tuple[Reached, str, ProjectFallback]:
         """Follow to ``asked``; else with the project's walls, in small steps, and from its start shape.
 
-        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, empty where
-        following led to the values, else what did, or why the project does not; and the fallback for the next
-        time.
+        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, unless
+        following led there: what did, or why the project does not; and the fallback for the next time.
         """
         late = until(stop, end)
         way = reach(here, asked, late, attempts=FIRST_ATTEMPTS if self.data else 100, **options)

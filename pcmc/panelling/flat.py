@@ -138,8 +138,7 @@ def turned_to_fit(corners: Floats, wide: float, high: float) -> Floats | None:
     if (np.ptp(corners, axis=0) <= np.array([wide, high]) + ROUNDING).all():
         return corners
     cosine, sine = np.cos(TURNS), np.sin(TURNS)
-    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
-    turned = corners @ turn.transpose(0, 2, 1)
+    turned = corners @ np.array([[cosine, sine], [-sine, cosine]]).transpose(2, 0, 1)
     sizes = np.ptp(turned, axis=1)
     fit = np.flatnonzero((sizes <= np.array([wide, high]) + ROUNDING).all(axis=1))
     return turned[fit[sizes[fit, 1].argmin()]] if len(fit) else None

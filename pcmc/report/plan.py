@@ -30,9 +30,7 @@ class PaperPlan:
 def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> PaperPlan:
     """Panels, ridges, rims, bottoms of walls and cables from above, with the numbers of the tables.
 
-    Raises
-    ------
-    OptionError : the plan does not fit a page at the smallest usual scale.
+    OptionError if it does not fit a page at the smallest usual scale.
     """
     view = views.plan(surface, views.model_curves(surface), ())
     sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None)

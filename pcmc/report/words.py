@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
@@ -12,7 +12,14 @@ from .tables import MOST_FAMILIES, one, small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-    from ..certificate.theorem import Theorem
+
+
+class Finding(Protocol):
+    """A theorem, a margin: what is said about a roof in one sentence."""
+
+    def text(self, units: Units) -> str:
+        """The sentence."""
+
 
 VERDICTS = {
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
@@ -43,7 +50,7 @@ ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes
 def verdict_sentences(
     certificate: Certificate,
     check: MeshCheck | None = None,
-    theorem: Theorem | None = None,
+    theorem: Finding | None = None,
     units: Units = NO_UNITS,
 ) -> list[str]:
     """The verdict, its reason, and how exactly the roof keeps what it promises.

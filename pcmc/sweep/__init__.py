@@ -15,17 +15,5 @@ from .solving import solve_case
 from .store import Record, read_store
 from .tables import draw_sweep, provenance, short_table, table, write_table
 
-__all__ = [
-    "Progress",
-    "Record",
-    "Sweep",
-    "checked",
-    "draw_sweep",
-    "provenance",
-    "read_store",
-    "run",
-    "short_table",
-    "solve_case",
-    "table",
-    "write_table",
-]
+__all__ = ["Progress", "Record", "Sweep", "checked", "draw_sweep", "provenance", "read_store", "run"]
+__all__ += ["short_table", "solve_case", "table", "write_table"]

@@ -1,10 +1,7 @@
 """Run a case in a process of its own, so that its caller survives whatever the case does.
 
-Every executor runs the same task, ``run_case``, which gives the case to a process and waits. A case that
-hangs or dies ends its own process and nothing else: its caller is a thread of the sweep, a worker of a
-process pool, or a Dask worker on another machine. Python's process pool cannot do this: it breaks as a whole
-when a worker dies, and it cannot stop a task that hangs.
-
+Every executor runs ``run_case``, in a thread of the sweep, a process pool or a Dask worker: it gives the case
+to a process and waits. Python's own pool breaks when a worker dies, and cannot stop a task that hangs.
 Processes are kept between the cases of one sweep, so that a case is imported and compiled once.
 """
 
@@ -49,11 +46,11 @@ def _cause(code: int) -> str:
 
 
 class Team:
-    """The processes that one sweep has started from this process."""
+    """The processes that one sweep has started from this process, the ``busy`` and the ``idle`` ones."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.all: list[ChildProcess] = []
+        self.busy: set[ChildProcess] = set()
         self.idle: list[ChildProcess] = []
         self.closed = False
 
@@ -62,51 +59,45 @@ class Team:
         """An idle process, or a new one; it is kept for the next case while it is alive."""
         with self.lock:
             while self.idle and not self.idle[-1].alive:
-                self._drop(self.idle.pop())
-            if new := not self.idle:
-                if self.closed:
-                    raise SweepError("the sweep has ended")
-                self.all.append(ChildProcess(ONE_THREAD))
-            process = self.all[-1] if new else self.idle.pop()
+                self.idle.pop().close()
+            new = not self.idle
+            if new and self.closed:
+                raise SweepError("the sweep has ended")
+            process = ChildProcess(ONE_THREAD) if new else self.idle.pop()
+            self.busy.add(process)
         try:
             if new:
-                self._load(process, case)
+                process.call(SCRIPT, "load", case)
             yield process
+        except ChildError as error:  # of the load: a case that fails is an answer
+            process.close()
+            problem = f"a worker on {platform.node()} cannot load the case {case!r};"
+            problem += f" install its package where the workers run:\n{error.output.strip()}"
+            raise SweepError(problem, what=case, where=platform.node()) from None
         except BaseException:  # Ctrl-C in a process pool: the next case must not get this one's answer
             process.close()
             raise
         finally:
             with self.lock:
+                self.busy.remove(process)
                 if process.alive and not self.closed:
                     self.idle.append(process)
                 else:
-                    self._drop(process)
-
-    def _load(self, process: ChildProcess, case: str) -> None:
-        try:
-            process.call(SCRIPT, "load", case)
-        except ChildError as error:
-            problem = f"a worker on {platform.node()} cannot load the case {case!r};"
-            problem += f" install its package where the workers run:\n{error.output.strip()}"
-            raise SweepError(problem, what=case, where=platform.node()) from None
+                    process.close()
 
     def close_idle(self) -> None:
         """End the processes that run no case."""
         with self.lock:
             while self.idle:
-                self._drop(self.idle.pop())
+                self.idle.pop().close()
 
     def close(self) -> None:
         """End all processes. The threads that wait for a case free its process."""
         self.close_idle()
         with self.lock:
             self.closed = True
-            for process in self.all:
+            for process in self.busy:
                 process.kill()
-
-    def _drop(self, process: ChildProcess) -> None:
-        process.close()
-        self.all.remove(process)
 
 
 # Here and not in an object: an executor's task is a function with plain arguments, and must find its team.
@@ -115,9 +106,9 @@ _lock = threading.Lock()
 
 
 def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
-    """Run one case in a process of ``team``, a name that belongs to one sweep.
+    """The fields of a Record, from ``status`` on, of a case run in a process of ``team``, a sweep's own name.
 
-    Returns the fields of a Record from ``status`` on. SweepError if the function cannot be imported here.
+    SweepError if the function cannot be imported here.
     """
     with _lock:
         if team not in _teams:
@@ -127,7 +118,7 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
         mine = _teams[team]
     limit = None if time_limit is None else time_limit + GRACE  # for a process that cannot end itself
     with mine.process(case) as process:
-        started = datetime.now(UTC)
+        started = datetime.now(UTC).isoformat(timespec="milliseconds")
         try:
             outcome: dict[str, Any] = process.call(SCRIPT, "run", case, parameters, time_limit, limit=limit)
             return outcome
@@ -136,8 +127,7 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
             if time_limit is not None and death.seconds >= time_limit:
                 status, message = "timed out", f"stopped at its time limit of {time_limit:g} s"
             about = {"output": death.output, "host": platform.node(), "pid": process.process.pid}
-            about |= {"started": started.isoformat(timespec="milliseconds")}
-            return failed_outcome(status, message, death.seconds, about)
+            return failed_outcome(status, message, death.seconds, about | {"started": started})
 
 
 def retire(team: str) -> None:
