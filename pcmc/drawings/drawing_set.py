@@ -138,14 +138,13 @@ def drawing_set(
     if scale is not None:
         validate.integer("scale", scale, least=1)
     validate.flag("panel_sheets", panel_sheets)
-    if schedule is not None and (
-        schedule.surface is not surface or tolerance not in (None, schedule.tolerance)
-    ):
+    if schedule is None:
+        if panel_sheets and tolerance is None:
+            text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
+            raise OptionError(text, what="tolerance", expected="a length")
+    elif schedule.surface is not surface or tolerance not in (None, schedule.tolerance):
         text = "schedule: belongs to another surface or tolerance; pass panels(surface, tolerance)"
         raise OptionError(text, what="schedule", found=schedule.tolerance, expected=tolerance)
-    if panel_sheets and tolerance is None and schedule is None:
-        text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
-        raise OptionError(text, what="tolerance", expected="a length")
     certificate = certified(surface, anyway, certificate)
     if tolerance is not None and schedule is None:
         options: dict[str, Any] = {"anyway": anyway, "certificate": certificate}

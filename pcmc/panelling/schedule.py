@@ -206,16 +206,11 @@ def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:
     pairs = joints(surface.vertices, surface.faces[faces], topo.edge_of_face[faces])
     edge = pairs["edge"].to_numpy()
     junction, boundary = (topo.junction_edge | topo.seam_edge)[edge], topo.boundary_edge[edge]
-    return pd.DataFrame(
-        {
-            "edge": edge,
-            "kind": np.where(junction, "junction", np.where(boundary, "boundary", "inside")),
-            "length": segment_lengths(surface.vertices, topo.edges[edge]),
-            "panel": pairs["first"] + 1,
-            "neighbour": pairs["second"] + 1,
-            "dihedral": pairs["dihedral"],
-        }
+    table = pairs[["edge"]].assign(
+        kind=np.where(junction, "junction", np.where(boundary, "boundary", "inside")),
+        length=segment_lengths(surface.vertices, topo.edges[edge]),
     )
+    return table.assign(panel=pairs["first"] + 1, neighbour=pairs["second"] + 1, dihedral=pairs["dihedral"])
 
 
 def _described(panel: pd.Series) -> str:

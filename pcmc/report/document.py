@@ -24,7 +24,7 @@ from ..surface import Surface, expect_surface
 from . import tables
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .words import ERROR_BARS, LEGEND, Finding, about_forces, panel_text, verdict_sentences
+from .words import ERROR_BARS, LEGEND, Finding, about_forces, panel_text, sentence, verdict_sentences
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -98,10 +98,9 @@ class RoofReport:
         yield from tables.line_tables(certificate, units)
         yield from tables.cable_tables(certificate, units)
         if self.mesh_check is not None:
-            sentences = (self.mesh_check.verdict.value, self.mesh_check.detail, self.mesh_check.advice)
-            text = "; ".join(filter(None, sentences))
+            parts = (self.mesh_check.verdict.value, self.mesh_check.detail, self.mesh_check.advice)
             yield Heading("Mesh check")
-            yield f"{text[:1].upper()}{text[1:]}. {ERROR_BARS}"
+            yield f"{sentence('; '.join(filter(None, parts)))} {ERROR_BARS}"
             yield tables.mesh_table(self.mesh_check, units)
         elif self.mesh_failure:
             yield Heading("Mesh check")

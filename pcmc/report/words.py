@@ -74,13 +74,11 @@ def verdict_sentences(
         share = f"{100.0 * certificate.load_ratio:.0f} %"
         sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
     if len(certificate.supports):
-        balance = balance_sentence(certificate.balance, certificate.symmetric_in)
-        sentences.append(f"{balance[:1].upper()}{balance[1:]}.")
+        sentences.append(sentence(balance_sentence(certificate.balance, certificate.symmetric_in)))
     if check is not None:
         sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
     if theorem is not None:
-        words = theorem.text(units)
-        sentences.append(f"{words[:1].upper()}{words[1:]}.")
+        sentences.append(sentence(theorem.text(units)))
     if certificate.symmetric_in:
         planes = ", ".join(certificate.symmetric_in)
         sentences.append(
@@ -90,6 +88,11 @@ def verdict_sentences(
     if len(certificate.pinched):
         sentences.append(f"The ridge rests on the plane at {len(certificate.pinched)} vertices.")
     return sentences
+
+
+def sentence(text: str) -> str:
+    """A text with a capital and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def about_forces(units: Units) -> str:

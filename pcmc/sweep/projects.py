@@ -82,10 +82,10 @@ def solve_project(
     ``project_digest`` is ``pcmc.project.digest`` of the file when the sweep was declared, as a case and its
     store belong to one state of the project: FileError if it has changed. The rest as of ``project_sweep``.
 
-    Returns numbers as ``solve_case``, but none of a shape that is not at rest; for each name in the project's
-    ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and ``targets_met``, if
-    there are targets. With mirror planes they are those of the whole roof if the project has ``whole = true``,
-    otherwise of the part between them; ``extent`` says which.
+    Returns numbers as ``solve_case``, but none of a shape that is not at rest; for each name in the
+    project's ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and
+    ``targets_met``, if there are targets. With mirror planes they are those of the whole roof if the project
+    has ``whole = true``, otherwise of the part between them; ``extent`` says which.
     """
     digest = projects.digest(project)
     if digest != project_digest:

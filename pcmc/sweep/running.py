@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any
 from ..base import validate
 from ..base.errors import OptionError, SweepError
 from ..base.interrupts import interrupts_handled, stop_requested
-from .case_process import failed_outcome
 from .grid import Sweep
 from .store import Record, open_store
 from .tables import table
-from .workers import OWN_VERSION, Submit, open_workers
+from .workers import OWN_VERSION, Submit, failed_outcome, open_workers
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -151,8 +151,7 @@ def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
 def _lock(path: Path, database: sqlite3.Connection) -> None:
     """Begin a transaction that keeps a second sweep off the store.
 
-    A sweep releases the lock for some microseconds between two transactions. If the lock is free three
-    times, moments apart, no sweep is running.
+    A sweep frees the lock for microseconds between transactions: free three times, no sweep is running.
     """
     try:
         database.execute("PRAGMA busy_timeout = 0")

@@ -13,6 +13,7 @@ import numpy as np
 from ..base.errors import MissingExtra, OptionError
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units
+from .case_script import WORDS
 from .store import Record
 
 if TYPE_CHECKING:
@@ -35,10 +36,7 @@ def table(records: Iterable[Record]) -> pd.DataFrame:
     from run to run, are in ``provenance``. A number that a case did not return is missing.
     """
     return _frame(
-        {"case": r.case}
-        | r.parameters
-        | {"status": r.status, "verdict": r.verdict, "message": r.message}
-        | r.numbers
+        {"case": r.case, **r.parameters} | {word: getattr(r, word) for word in WORDS} | r.numbers
         for r in records
     )
 
@@ -153,9 +151,8 @@ def draw_sweep(
     varied = [name for name in parameters if table[name].nunique() > 1]
     if len(varied) not in (1, 2) or not all(table[name].dtype.kind in "if" for name in varied):
         text = f"a sweep is drawn over one or two varied numbers, and {len(varied)} vary here"
-        raise OptionError(
-            f"{text}: {', '.join(varied) or 'none'}; fix the others", what="plot", found=len(varied)
-        )
+        text += f": {', '.join(varied) or 'none'}; fix the others"
+        raise OptionError(text, what="plot", found=len(varied))
     names, good = labels or {}, table["verdict"].isin(GOOD)
     quantity = show or ("apex" if len(varied) == 1 else "rise")
     columns = [c for c in columns_of(table, quantity, parameters) if table[c].notna().any()]
