@@ -157,8 +157,8 @@ def drawing_set(
     setting_out = zip(points["point"], points[[*"xyz"]].to_numpy(), strict=True)
     named += [(at, name, "PCMC-POINT") for name, at in setting_out]
     levels, profiles = _levels(surface, heights), _profiles(surface, lines)
-    drawn: dict[str, list[views.View]] = {
-        "Plan": [views.plan(surface, curves, named)],
+    drawn: dict[str, list[views.DrawnView]] = {
+        "Plan": [views.plan_view(surface, curves, named)],
         "Elevations": views.elevations(surface, curves),
         "Sections at heights": [views.contours(surface, curves, levels)] if levels else [],
         "Sections along lines": [view for view, _ in profiles],
@@ -209,7 +209,7 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
     low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
     given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
     chosen = [validate.number("heights", height) for height in given]
-    cuts = [(h, views.cut(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
+    cuts = [(h, views.cut_lines(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
     for h, found in cuts:
         if not found and heights is not None:
             text = f"heights: z = {h:g} misses the roof, which lies between {low:g} and {high:g}"
@@ -217,7 +217,9 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
     return [cut for cut in cuts if cut[1]]
 
 
-def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[SheetLine]]]:
+def _profiles(
+    surface: Surface, lines: Sequence[Ends] | None
+) -> list[tuple[views.DrawnView, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
     if lines is None:
         low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
@@ -231,7 +233,7 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
         if not (np.isfinite(ends).all() and length > 0.0):
             validate.refuse("lines", line, "two different points (x, y)")
         along /= length
-        found = views.cut(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
+        found = views.cut_lines(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
         if not found:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)

@@ -39,12 +39,12 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
     canvas = Canvas(str(path), invariant=1)
     for sheet in sheets:
         canvas.setPageSize([side * mm for side in sheet.size])
-        paint(canvas, *sheet.drawn())
+        paint_sheet(canvas, *sheet.drawn())
         canvas.showPage()
     canvas.save()
 
 
-def paint(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
+def paint_sheet(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
     """Draw on a canvas of reportlab, from its origin; ``boxed`` texts hide what is behind them."""
     from reportlab.lib.colors import HexColor
     from reportlab.lib.units import mm

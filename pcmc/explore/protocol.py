@@ -36,10 +36,10 @@ class RequestError(Exception):
         self.status = status
 
 
-def checked(keys: Mapping[str, Check], asked: Mapping[str, Any], where: str = "") -> dict[str, Any]:
+def check_request(keys: Mapping[str, Check], asked: Mapping[str, Any], where: str = "") -> dict[str, Any]:
     """The values in a request; a key that is not in the table is refused, one ending in ? may be missing.
 
-    >>> checked({"number": whole, "name?": name}, {"number": 3})
+    >>> check_request({"number": whole, "name?": name}, {"number": 3})
     {'number': 3}
     """
     known = {key.removesuffix("?"): check for key, check in keys.items()}
@@ -76,7 +76,7 @@ def name(what: str, value: Any) -> str:
     return str(value)
 
 
-def number(what: str, value: Any) -> float:
+def as_float(what: str, value: Any) -> float:
     """A float."""
     try:
         return float(real(what, value))
@@ -88,7 +88,7 @@ def place(what: str, value: Any, words: str = "a point [x, y, z]", size: int = 3
     """A point."""
     if not isinstance(value, list) or len(value) != size:
         raise RequestError(f"{what}: expected {words}, found {value!r:.60}")
-    return [number(what, x) for x in value]
+    return [as_float(what, x) for x in value]
 
 
 def variant_name(what: str, value: Any) -> str:
@@ -116,7 +116,7 @@ def patches(what: str, value: Any) -> str | tuple[str, ...]:
     return tuple(name(what, one) for one in value) if isinstance(value, list) else name(what, value)
 
 
-def by_name(check: Check) -> Check:
+def values_by_name(check: Check) -> Check:
     """Values by name."""
 
     def values(kind: str, listed: Any) -> dict[str, Any]:
@@ -138,13 +138,13 @@ def entries(keys: Mapping[str, Check], made: Callable[..., Any]) -> Check:
             raise RequestError(f"{what}: {len(listed)} are too many; at most {MOST_AIMS}")
         if not all(first in entry for entry in listed):
             raise RequestError(f"{what}: each needs a {first}")
-        return tuple(made(**checked(keys, entry, f"{what}: ")) for entry in listed)
+        return tuple(made(**check_request(keys, entry, f"{what}: ")) for entry in listed)
 
     return objects
 
 
-LIMIT = or_null(number)
-VALUES = {f"{kind}?": by_name(number) for kind in KINDS} | {"points?": by_name(place)}
+LIMIT = or_null(as_float)
+VALUES = {f"{kind}?": values_by_name(as_float) for kind in KINDS} | {"points?": values_by_name(place)}
 LIMITS = dict.fromkeys(("value?", "at_most?", "at_least?"), LIMIT)
 TARGET = {"quantity": name, "of?": or_null(owner), **LIMITS, "name?": name}
 PARAMETER = {"patch": patches, "kind?": name, "low?": LIMIT, "high?": LIMIT}

@@ -22,7 +22,7 @@ from ..surface import Surface
 from . import page_data, saving
 from .following import ProjectFallback, Stop
 from .listening import LOOPBACK, PageHandler, listen
-from .protocol import ACTS, REQUESTS, RequestError, checked, pack
+from .protocol import ACTS, REQUESTS, RequestError, check_request, pack
 from .roof import ShownRoof, Watch, signature
 from .session import Session, SessionState, solved_start
 
@@ -97,10 +97,10 @@ class Explorer:
     def answer(self, name: str, act: str, asked: dict[str, Any], gone: Stop) -> bytes:
         """Answer a request of the session ``name``; ``gone`` is true once the browser has hung up."""
         if act == "open":
-            name = checked(REQUESTS[act], asked).get("session") or self.open()[0]
+            name = check_request(REQUESTS[act], asked).get("session") or self.open()[0]
             return pack(*self._opening(name, self.session(name).state()))
         session = self.session(name)
-        given = checked(REQUESTS[act], asked)
+        given = check_request(REQUESTS[act], asked)
         answer = self._act if act in ACTS else self._question
         return pack(*(answer(session, act, given, gone) or ({"superseded": True},)))
 

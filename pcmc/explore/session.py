@@ -30,7 +30,7 @@ from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from .following import AT_REST, ProjectFallback, Reached, Stop, Values, attempt, reach, until, wanted
+from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
@@ -248,7 +248,7 @@ class Session:
     def stabilise(self, state: SessionState, stop: Stop) -> SessionState:
         """Move from a saddle to a stable shape, if there is one nearby."""
         end = time.monotonic() + SETTLE_SECONDS
-        result = attempt(state.surface, until(stop, end), target="minimum")
+        result = solve_until(state.surface, until(stop, end), target="minimum")
         certificate = result.certify()
         if stop():
             return state
@@ -261,7 +261,7 @@ class Session:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
         asked, end = values_of(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
         mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
-        result = attempt(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
+        result = solve_until(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
         if stop():
             return state
         if result.certificate.verdict not in AT_REST:

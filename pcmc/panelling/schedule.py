@@ -15,7 +15,7 @@ from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from .families import families
-from .flat import joints, unfolded
+from .flat import joints, laid_flat
 
 MIRROR_IMAGES = ("alike", "apart")
 SHOWN = 12  # families that ``print`` shows
@@ -166,7 +166,7 @@ def panels(
     parts = families(lengths, tolerance, mirror_images == "apart")
     table = _panel_table(surface, faces, lengths, parts.family, parts.order)
     tables = _family_table(table), table, _edge_table(surface, faces)
-    return Panels(surface, tolerance, mirror_images, certificate, *tables, unfolded(corners), parts.at_least)
+    return Panels(surface, tolerance, mirror_images, certificate, *tables, laid_flat(corners), parts.at_least)
 
 
 def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints) -> pd.DataFrame:

@@ -24,7 +24,7 @@ from ..surface import Surface, expect_surface
 from . import tables
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .words import ERROR_BARS, LEGEND, Finding, about_forces, panel_text, sentence, verdict_sentences
+from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -47,9 +47,9 @@ class RoofReport:
     date: str = ""  # in their foot
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
-    theorem: Finding | None = None
+    theorem: Statement | None = None
     targets: pd.DataFrame | None = None
-    margins: Sequence[Finding] = ()
+    margins: Sequence[Statement] = ()
     files: Mapping[str, str] = field(default_factory=dict)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -94,7 +94,7 @@ class RoofReport:
         yield about_forces(units)
         if self.targets is not None:
             yield tables.target_table(self.targets, units)
-        yield tables.patch_table(surface, certificate, units)
+        yield tables.table_of_patches(surface, certificate, units)
         yield from tables.line_tables(certificate, units)
         yield from tables.cable_tables(certificate, units)
         if self.mesh_check is not None:

@@ -97,7 +97,7 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
     return Table("Key figures", [], rows)
 
 
-def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
+def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
     pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]

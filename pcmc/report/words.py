@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..accuracy import MeshCheck
 
 
-class Finding(Protocol):
+class Statement(Protocol):
     """A theorem, a margin: what is said about a roof in one sentence."""
 
     def text(self, units: Units) -> str:
@@ -50,7 +50,7 @@ ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes
 def verdict_sentences(
     certificate: Certificate,
     check: MeshCheck | None = None,
-    theorem: Finding | None = None,
+    theorem: Statement | None = None,
     units: Units = NO_UNITS,
 ) -> list[str]:
     """The verdict, its reason, and how exactly the roof keeps what it promises.

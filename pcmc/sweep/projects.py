@@ -14,7 +14,7 @@ from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
-from .solving import mesh_columns, row
+from .solving import case_row, mesh_columns
 from .tables import with_units
 
 
@@ -98,7 +98,7 @@ def solve_project(
     outcome = projects.solve_project(replace(design, search=search), start)
     outcome = replace(outcome, project=design, unfold=design.output.whole)
     names = ("project", "project_digest", "method", "mesh_check", "search", *values)
-    answer = row(outcome.solved, names, outcome)
+    answer = case_row(outcome.solved, names, outcome)
     if mesh_check or design.mesh_check:
         answer |= mesh_columns(outcome)
     for what in design.margin if outcome.certificate.index is not None else ():

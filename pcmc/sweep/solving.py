@@ -86,7 +86,7 @@ def solve_case(
     build, shape, solver = _split(generator, method, arguments)
     solve = existence.solve if search else solvers.solve
     result = solve(build(**shape), method, **solver)
-    answer = row(result, arguments)
+    answer = case_row(result, arguments)
     if mesh_check:
         from ..project import Outcome  # takes long to import
 
@@ -94,7 +94,7 @@ def solve_case(
     return answer
 
 
-def row(result: Result, names: Container[str], outcome: Outcome | None = None) -> dict[str, Any]:
+def case_row(result: Result, names: Container[str], outcome: Outcome | None = None) -> dict[str, Any]:
     """The answer of a case: see ``solve_case``. ``names`` are the names of its parameters.
 
     With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between
