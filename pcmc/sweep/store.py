@@ -29,6 +29,7 @@ from .grid import Sweep
 
 FORMAT = 2  # 1 was lines of JSON
 COLUMNS = ["parameters", "record", "crc"]  # of the table of cases
+FIELDS = (*WORDS, "numbers", "wall_time", "provenance")  # of a Record, in the second of them
 SQLITE, LINES = b"SQLite format 3\0", b'{"pcmc sweep"'  # how files of the two formats begin
 READERS = 60.0  # seconds that a commit waits for programs that read the store
 FAILED = ("raised", "timed out", "killed")  # statuses that ``run`` gives; a case gives all others
@@ -69,10 +70,7 @@ class Store:
         new = {record.case: record for record in records}
         rows = []
         for record in new.values():
-            fields = {
-                name: value for name, value in vars(record).items() if name not in ("case", "parameters")
-            }
-            key, text = _key(record.parameters), json.dumps(fields)
+            key, text = _key(record.parameters), json.dumps({name: getattr(record, name) for name in FIELDS})
             rows.append((key, text, zlib.crc32((key + text).encode())))  # SQLite has no checksums
         try:
             self.database.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?, ?)", rows)
