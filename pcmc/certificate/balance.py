@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools
+from ..base.arrays import Bools, Floats
+from ..forces.cables import cable_pulls
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.supports import common_point, uncancelled_pressures
@@ -22,18 +23,25 @@ FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force",
 
 def load_name(surface: Surface) -> str:
     """What sentences call the load: "pressure", "net pressure" less snow, "weight", or "load" for several."""
-    if surface.weights.any():
+    if surface.heavy:
         return "load" if surface.net_pressures.any() else "weight"
     return "net pressure" if surface.snows.any() else "pressure"
 
 
 def load(surface: Surface) -> float:
-    """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
+    """Σ (p - s) A_T ν_T · n - Σ w A_T - Σ g ℓ: the force of pressure, snow and weights along Π's normal n."""
     vector = area_vectors(surface.vertices[surface.faces])
     pressed = surface.net_pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
-    if not surface.weights.any():
+    if not surface.heavy:
         return float(pressed)
-    return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
+    of_sheets = surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1)
+    return float(pressed - of_sheets - _cable_weights(surface).sum())
+
+
+def _cable_weights(surface: Surface) -> Floats:
+    """(c,) g ℓ of each edge of a cable, force."""
+    ends, _, weight = surface.cable_edges
+    return np.asarray(weight * segment_lengths(surface.vertices, ends))
 
 
 def load_ratio(surface: Surface) -> float:
@@ -92,7 +100,7 @@ def load_is_given(surface: Surface) -> bool:
     topo, pinned = surface.topology, surface.pinned
     pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
     normals = [np.dot(plane.normal, surface.plane.normal) for plane, _ in surface.on_planes]
-    varies = surface.rooms or surface.weights.any() or surface.given_supports.on_line
+    varies = surface.rooms or surface.heavy or surface.given_supports.on_line
     if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > 1e-9 for up in normals):
         return False
     alone = pinned.copy()
@@ -123,8 +131,8 @@ def _capacity(surface: Surface, carrying: Bools) -> float:
     if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
         capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
-    ends, tension = surface.cable_edges
-    return capacity + float(tension[supports[ends].sum(axis=1) == 1].sum())
+    pulls = np.abs(cable_pulls(surface, X))
+    return capacity + float(pulls[supports[surface.cable_edges.ends].sum(axis=1) == 1].sum())
 
 
 def coarseness(surface: Surface) -> float:
@@ -150,9 +158,9 @@ def coarseness(surface: Surface) -> float:
 def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     """Force and moment of the loads, of the supports, and what remains of both: a row each.
 
-    The loads are Σ p A_T ν_T - Σ w A_T n, the supports the rows of their table. What remains are the forces
-    at vertices that nothing holds: a mesh at rest balances along its normals; along the sheets forces are
-    left, smaller ones on finer meshes.
+    The loads are Σ p A_T ν_T - Σ w A_T n - Σ g ℓ n, the supports the rows of their table. What remains are
+    the forces at vertices that nothing holds: a mesh at rest balances along its normals; along the sheets
+    forces are left, smaller ones on finer meshes.
 
     Columns: ``of``; ``force_x``, …, and ``moment_x``, …, about the middle of the surface's bounding box at
     ``x``, ``y``, ``z``; ``force_share``, ``moment_share``, the largest component over the sum of the loads'
@@ -162,10 +170,13 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     corners, patch = X[surface.faces], surface.patch_of_face
     vector = area_vectors(corners)
     force = surface.net_pressures[patch, None] * vector
-    if surface.weights.any():
+    middles = corners.mean(axis=1)
+    if surface.heavy:
         force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
+        force = np.concatenate([force, -_cable_weights(surface)[:, None] * n])
+        middles = np.concatenate([middles, X[surface.cable_edges.ends].mean(axis=1)])
     about = 0.5 * (X.min(axis=0) + X.max(axis=0))
-    arm = corners.mean(axis=1) - about
+    arm = middles - about
     products = arm.T @ force
     moment = [products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)]  # Σ arm × force
     loads = np.array([force.sum(axis=0), moment])
@@ -272,8 +283,10 @@ def unheld(surface: Surface) -> Unheld | None:
     parts, patch = surface.topology.components, surface.patch_of_face
     resting = surface.held.copy()
     resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
-    falling = np.setdiff1d(parts[surface.faces[surface.weights[patch] > 0.0, 0]], parts[resting])
-    if len(falling) and not (surface.weights < 0.0).any():
+    ends, _, weight = surface.cable_edges
+    heavy = np.append(surface.faces[surface.weights[patch] > 0.0, 0], ends[weight > 0.0, 0])
+    falling = np.setdiff1d(parts[heavy], parts[resting])
+    if len(falling) and not ((surface.weights < 0.0).any() or (weight < 0.0).any()):
         return Unheld(int(np.flatnonzero(parts == falling[0])[0]), falls=True)
     for part, pressed in _scaled(surface):
         if not pressed and surface.tensions[patch[parts[surface.faces[:, 0]] == part]].any():
@@ -312,6 +325,7 @@ def _scaled(surface: Surface) -> list[tuple[int, bool]]:
         held |= along
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
+    held[surface.cable_edges.ends[surface.cable_edges.weight != 0.0]] = True
     loose = []
     for part in np.setdiff1d(parts[used], parts[held]):
         planes = [(surface.plane, given.on_plane), *surface.on_planes]

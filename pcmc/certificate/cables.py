@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..forces.cables import directions
+from ..forces.cables import directions, pull_along
 from ..surface import Surface
 from ..surface.geometry import cross_2d, segment_lengths
 from ..surface.parts import Cable
@@ -30,9 +30,10 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
     their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in
     the mean over a cable's edges up to what the mesh leaves.
 
-    Columns: ``cable``, ``tension`` (its force) and ``length``; the middle of the part; ``sheet_pull``, the
-    mean of |Σ α n| and ``cable_pull``, that of τ |κ|, force/length; ``force_left`` per length in the motion
-    space, of ``left`` (n,3).
+    Columns: ``cable``, ``tension`` (its force, the largest where a weight g lets it vary) and ``length``; the
+    middle of the part; ``sheet_pull``, the mean of |Σ α n|, with the weight across the cable, and
+    ``cable_pull``, that of (τ + g z) |κ|, force/length; ``force_left`` per length in the motion space, of
+    ``left`` (n,3).
     """
     rows = []
     for cable, curve in _parts(surface):
@@ -40,17 +41,22 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
         total = float(lengths.sum())
         turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if curve.closed else np.diff(t, axis=0), axis=1)
         weight = 0.5 * (lengths + np.roll(lengths, 1)) if curve.closed else 0.5 * (lengths[1:] + lengths[:-1])
-        sheets = np.linalg.norm(conormal_sum(surface, surface.topology.edge_numbers(curve.pairs)), axis=1)
+        pulls = conormal_sum(surface, surface.topology.edge_numbers(curve.pairs))
+        if cable.weight:  # along the cable its tension takes up the weight
+            load = -cable.weight * np.array(surface.plane.normal)
+            pulls = pulls + load - (t @ load)[:, None] * t
+        sheets = np.linalg.norm(pulls, axis=1)
         inner = curve.vertices if curve.closed else curve.vertices[1:-1]
+        along = pull_along(surface, cable, inner)
         most = float(np.linalg.norm(left[inner], axis=1).max(initial=0.0))
         rows.append(
             {
                 "cable": cable.name,
-                "tension": cable.tension,
+                "tension": float(pull_along(surface, cable, curve.vertices).max()),
                 "length": total,
                 **middle(surface, curve),
                 "sheet_pull": float(sheets @ lengths) / (total or 1.0),
-                "cable_pull": cable.tension * float(turns.sum()) / (float(weight.sum()) or 1.0),
+                "cable_pull": float(along @ turns) / (float(weight.sum()) or 1.0),
                 "force_left": most / (float(lengths.mean()) or 1.0),
             }
         )
@@ -60,7 +66,7 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
 def cable_end_table(surface: Surface) -> pd.DataFrame:
     """A row per end of each part of a cable: where it is, whether a support holds it, and the force.
 
-    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -τ t, with t the
+    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -(τ + g z) t, t the
     direction from the end along the cable. Where several cables end, their support carries the sum.
     """
     rows = [
@@ -72,9 +78,9 @@ def cable_end_table(surface: Surface) -> pd.DataFrame:
 
 
 def cable_ends(surface: Surface) -> list[tuple[Cable, int, Floats]]:
-    """Each end of a part of a cable: the cable, the vertex, and -τ t (3,), the force that holds it there."""
+    """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it."""
     return [
-        (cable, int(pair[0]), -cable.tension * _tangents(surface, pair[None])[0])
+        (cable, int(pair[0]), -pull_along(surface, cable, pair[:1]) * _tangents(surface, pair[None])[0])
         for cable, curve in _parts(surface)
         if not curve.closed
         for pair in (curve.vertices[:2], curve.vertices[:-3:-1])
@@ -106,7 +112,7 @@ def too_long(surface: Surface) -> str:
     In a plane no arc is as wide, so a flat sheet is not at rest there; another one hardly.
     """
     for cable, curve in _parts(surface):
-        if curve.closed or len(curve.sheets) != 1:
+        if curve.closed or len(curve.sheets) != 1 or cable.weight:
             continue
         chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
         tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
@@ -180,7 +186,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
 def _plane_of_sail(surface: Surface) -> Floats | None:
     """(3,2) directions of the plane in which a sail of one tension lies at rest; None if there is none."""
     topo, X = surface.topology, surface.vertices[surface.fixed]
-    loads = surface.net_pressures.any() or surface.weights.any() or bool(surface.rooms)
+    loads = surface.net_pressures.any() or surface.heavy or bool(surface.rooms)
     slides = surface.on_plane.any() or bool(surface.on_planes or surface.given_supports.on_line)
     tensions = surface.tensions[surface.patch_of_face]
     outer = topo.boundary_edge[topo.edge_numbers(surface.cable_edges.ends)]

@@ -18,7 +18,8 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..forces import triangles
-from ..forces.functional import add_cables_and_weights
+from ..forces.elements import add_values
+from ..forces.functional import LINE_FORCES
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.checks import lying
@@ -42,7 +43,8 @@ def reactions(surface: Surface) -> Floats:
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
     forces = triangles.measure(triangles.energy_mesh(surface, pressure=zero), X)[2]
-    add_cables_and_weights(surface, X, forces)
+    add_values((each for force in LINE_FORCES for each in force(surface, X)), forces)
+    triangles.add_weights(surface, X, forces)
     third = area_vectors(X[F]) / 3.0
     forces -= vertex_sums(third * surface.net_pressures[surface.patch_of_face, None], F, surface.n)
     return forces - apply_supports(surface, forces.copy())
