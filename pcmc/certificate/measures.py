@@ -264,6 +264,9 @@ def _length(surface: Surface, of: str) -> Measurement:
 
 def _force(surface: Surface, of: str) -> Measurement:
     """τ, the force in a cable: the same all along it."""
+    if surface.cables[surface.cable_index(of)].weight:
+        message = f"force of {of}: with a weight it differs along the cable; it has no single value"
+        raise OptionError(message, what="of", found=of)
     one = np.zeros(len(surface.cables))
     one[surface.cable_index(of)] = 1.0
     tension = surface.cables[surface.cable_index(of)].tension
