@@ -18,7 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..forces.cables import add_cables, directions
+from ..forces import cable_weights, cables
+from ..forces.cables import directions, pull_along
+from ..forces.elements import add_values
 from ..forces.pinching import standing_part
 from ..forces.triangles import add_weights, energy_mesh, measure
 from ..surface import Surface
@@ -33,13 +35,23 @@ SPAN = 1e-9  # of the largest force: what planes leave of the forces that they c
 
 
 def loads(surface: Surface) -> Floats:
-    """(m,3) the force on each triangle: (p - s) A ν of pressure and snow, -w A n of weight."""
+    """(m + c,3) the force on each triangle, (p - s) A ν of pressure and snow, -w A n of weight; and -g ℓ n on
+    each edge of cables."""
     patch, vector = surface.patch_of_face, area_vectors(surface.vertices[surface.faces])
     found = surface.net_pressures[patch, None] * vector
-    if surface.weights.any():
-        weight = surface.weights[patch] * np.linalg.norm(vector, axis=1)
-        found -= weight[:, None] * np.array(surface.plane.normal)
-    return found
+    ends, _, weight = surface.cable_edges
+    heavy = np.append(
+        surface.weights[patch] * np.linalg.norm(vector, axis=1),
+        weight * segment_lengths(surface.vertices, ends),
+    )
+    found = np.concatenate([found, np.zeros((len(ends), 3))])
+    return found - heavy[:, None] * np.array(surface.plane.normal) if surface.heavy else found
+
+
+def load_places(surface: Surface) -> Floats:
+    """(m + c,3) where the forces of ``loads`` act: the middles of the triangles and of the cables' edges."""
+    X = surface.vertices
+    return np.concatenate([X[surface.faces].mean(axis=1), X[surface.cable_edges.ends].mean(axis=1)])
 
 
 def load(surface: Surface) -> float:
@@ -61,7 +73,8 @@ def by_cause(surface: Surface) -> dict[str, Floats]:
     X = surface.vertices
     tension = measure(energy_mesh(surface, pressure=np.zeros(len(surface.patches))), X)[2]
     cable, weight = np.zeros((2, *X.shape))
-    add_cables(surface, X, cable)
+    add_values(cables.elements(surface, X), cable)
+    add_values(cable_weights.elements(surface, X), weight)
     add_weights(surface, X, weight)
     third = area_vectors(X[surface.faces]) / 3.0 * surface.net_pressures[surface.patch_of_face, None]
     pressure = vertex_sums(third, surface.faces, surface.n)
@@ -84,7 +97,7 @@ class Forces:
 
     surface: Surface
     standing: Surface  # the part of it that stands, which the supports hold
-    loads: Floats  # (m,3) on its triangles
+    loads: Floats  # (m + c,3) on its triangles and cable edges
     reactions: Floats  # (n,3) of all supports
     along: Floats  # (n,3) the reactions on lines and sheets
     points: Floats  # (n,3) at single points, and of the cables that end on a line
@@ -205,7 +218,7 @@ def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
     it is zero, of triangles only in the limit.
     """
     side, total = Sides.at(surface, ends), np.zeros((len(ends), 3))
-    np.add.at(total, side.edge, side.tension * side.normal)
+    np.add.at(total, side.edge, side.tension / np.where(side.height > 0.0, side.height, 1.0) * side.out)
     return total
 
 
@@ -218,8 +231,8 @@ class Sides(NamedTuple):
     length: Floats  # (s,1)
     tangent: Floats  # (s,3) from a to b
     foot: Floats  # (s,1) how far from a to b the foot of c is, length
-    height: Floats  # (s,1) of c over the side
-    normal: Floats  # (s,3) the outward co-normal
+    out: Floats  # (s,3) from c to its foot; outward, along the co-normal
+    height: Floats  # (s,1) the length of ``out``
     z: Floats  # (s,1) height over Π of the middle
     tension: Floats  # (s,1) α + w z there
 
@@ -233,18 +246,14 @@ class Sides(NamedTuple):
         face, corner = np.nonzero(edge >= 0)
         corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
         c, a, b = surface.vertices[corners].transpose(1, 0, 2)
-        length, tangent = _split(b - a)
+        length = np.linalg.norm(b - a, axis=1)[:, None]
+        tangent = (b - a) / np.where(length > 0.0, length, 1.0)
         foot = np.einsum("ij,ij->i", c - a, tangent)[:, None]
-        height, normal = _split(a - c + foot * tangent)
+        out = a - c + foot * tangent
+        height = np.linalg.norm(out, axis=1)[:, None]
         k, z = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
         tension = (surface.tensions[k] + surface.weights[k] * z)[:, None]
-        return cls(edge[face, corner], k, corners, length, tangent, foot, height, normal, z[:, None], tension)
-
-
-def _split(vectors: Floats) -> tuple[Floats, Floats]:
-    """The lengths (s,1) and the directions of vectors (s,3); zero of a vector without length."""
-    length = np.linalg.norm(vectors, axis=1)[:, None]
-    return length, vectors / np.where(length > 0.0, length, 1.0)
+        return cls(edge[face, corner], k, corners, length, tangent, foot, out, height, z[:, None], tension)
 
 
 def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
@@ -263,9 +272,13 @@ def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
 
 
 def cable_ends(surface: Surface) -> list[CableEnd]:
-    """Each end of a part of a cable: the cable, the vertex, and -τ t (3,), the force that holds it there."""
+    """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it."""
     return [
-        (cable, int(pair[0]), -cable.tension * directions(surface.vertices, pair[None])[0][0])
+        (
+            cable,
+            int(pair[0]),
+            -pull_along(surface, cable, pair[:1]) * directions(surface.vertices, pair[None])[0][0],
+        )
         for cable, curve in cable_parts(surface)
         if not curve.closed
         for pair in (curve.vertices[:2], curve.vertices[:-3:-1])

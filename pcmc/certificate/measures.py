@@ -174,13 +174,14 @@ def largest_pull(acting: Forces, edges: Bools) -> Measurement:
     def branches(near: Ints) -> Branches:
         s = Sides.at(surface, acting.surface.topology.edges[numbers[near]])
         pull = (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][s.edge]
-        turn, tilt = s.tension * _dot(pull, s.tangent) / s.length * s.normal, np.cross(s.tangent, s.normal)
+        normal = s.out / s.height
+        turn, tilt = s.tension * _dot(pull, s.tangent) / s.length * normal, np.cross(s.tangent, normal)
         tilt = s.tension * _dot(pull, tilt) / s.height * tilt
-        rise, foot = 0.5 * surface.weights[s.patch, None] * _dot(pull, s.normal) * up, s.foot / s.length
+        rise, foot = 0.5 * surface.weights[s.patch, None] * _dot(pull, normal) * up, s.foot / s.length
         slopes = np.stack([-tilt, turn + (1.0 - foot) * tilt + rise, foot * tilt - turn + rise], axis=1)
         sheet, one = Branches.of(s.corners, slopes, surface.n).by_position, np.arange(len(pull))
         together = csr_array((np.ones(len(pull)), (s.edge, one)), shape=(len(near), len(pull)))
-        along = csr_array((_dot(pull, s.normal)[:, 0], (one, s.patch)), shape=(len(pull), patches))
+        along = csr_array((_dot(pull, normal)[:, 0], (one, s.patch)), shape=(len(pull), patches))
         raised = csr_array(along.multiply(s.z))
         by = {kind: (together @ m).toarray() for kind, m in (("tensions", along), ("weights", raised))}
         return Branches(csr_array(together @ sheet), by)
@@ -254,6 +255,9 @@ def _length(surface: Surface, of: str) -> Measurement:
 def _force(surface: Surface, of: str) -> Measurement:
     """τ, the force in a cable: the same all along it."""
     cable, one = _chosen_cable(surface, of)
+    if cable.weight:
+        message = f"force of {of}: with a weight it differs along the cable; it has no single value"
+        raise OptionError(message, what="of", found=of)
     return Measurement(cable.tension, np.zeros_like(surface.vertices), {"cables": one})
 
 
