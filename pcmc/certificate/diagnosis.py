@@ -10,13 +10,13 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, maxi
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import PINCHED
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from .forces import held_boundary
 from .tables import names_of
 
-PINCHED = 0.1  # of the held curves' length: a neck shorter than this has pinched off
 UNITS = 500_000_000  # of the length of all edges: the flow counts in whole numbers
 
 

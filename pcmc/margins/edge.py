@@ -18,6 +18,7 @@ from ..accuracy.mesh_check import with_bar
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PcmcError, SurfaceError
+from ..base.tolerances import EVENT_ACCURACY
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict, certify
 from ..certificate.balance import pressures_left_over
@@ -26,7 +27,6 @@ from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
 from ..continuation import Branch, Ending, follow
 from ..continuation.branch_point import ALONG
-from ..continuation.segment import EVENT_ACCURACY
 from ..forces.pinching import standing_part
 from ..forces.triangles import compressed, effective_tensions
 from ..solvers import solve
