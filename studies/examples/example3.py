@@ -57,6 +57,9 @@ def table(folder: Folder) -> dict[str, float]:
         "radius": float(np.linalg.norm(start.vertices[:, :2], axis=1).max().round(DECIMALS - 1)),
         "height": float(start.vertices[:, 2].max()),
         "t0": T0,
+        "rings": _rings(start),
+        "rings_coarse": _rings(coarse["initial"]),
+        "iterations_on": records.iterations["on"],
         "axis_offset": _axis_offset(stages["final"]),
         "axis_offset_coarse": _axis_offset(coarse["final"]),
         "ellipse_misfit": _misfit(ridges, "main"),
@@ -81,6 +84,12 @@ def _axis_offset(surface: Surface) -> float:
     axis = surface.vertices[on == len(walls)]
     radius = np.linalg.norm(surface.vertices[:, :2], axis=1).max()
     return float(np.linalg.norm(axis[:, :2], axis=1).max() / radius)
+
+
+def _rings(surface: Surface) -> int:
+    """Of vertices around the axis: as many as edges of a junction from the axis to the rim."""
+    junction = surface.vertices[surface.topology.on_junction, :2]
+    return len(np.unique(np.linalg.norm(junction, axis=1).round(DECIMALS))) - 1
 
 
 def _ridges(surface: Surface, mesh: str) -> pd.DataFrame:

@@ -99,7 +99,8 @@ def table(folder: Folder) -> dict[str, float]:
     return {
         **measured,
         "before_over_least": float(worst),
-        "certified_after": float((rest["verdict_after"] == rest["verdict_before"]).mean()),
+        "same_verdict_after": float((rest["verdict_after"] == rest["verdict_before"]).mean()),
+        "stable_after": float((rest["verdict_after"] == "stable").mean()),
         "below_least_before": float((rest["after"] < rest["least_before"]).mean()),
         "loose_left": float(loose["left"].median()),
         "loose_curvature_error": float(loose["curvature_error_after"].max()),
