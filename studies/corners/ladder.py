@@ -173,7 +173,8 @@ def climb(
 
 def _slid(before: Surface, now: Surface, vertices: int) -> float:
     """The largest distance between the places of the first ``vertices`` vertices."""
-    return float(np.linalg.norm((now.vertices - before.vertices[: now.n])[:vertices], axis=1).max())
+    moved = now.vertices[:vertices] - before.vertices[:vertices]
+    return float(np.linalg.norm(moved, axis=1).max())
 
 
 def halved(
