@@ -225,13 +225,10 @@ def _saddles(results: Path) -> str:
 def _worse(results: Path) -> str:
     """The error bars for which adaptive meshes need more triangles than uniform ones."""
     savings = Folder(results / "accuracy").read_table("savings")
-    return listed(
-        [
-            f"the {row.quantity} of `{row.family}`, {row.bar_of}, {1.0 / row.saving:.2f} times as many"
-            for row in savings[savings.saving < 1.0].itertuples()
-        ]
-        or ["none"]
-    )
+    worse = savings[savings.saving < 1.0]
+    rows = zip(worse.quantity, worse.family, worse.bar_of, 1.0 / worse.saving, strict=True)
+    words = [f"the {what} of `{of}`, {bar}, {times:.2f} times as many" for what, of, bar, times in rows]
+    return listed(words or ["none"])
 
 
 def jump_table(results: Path) -> list[str]:

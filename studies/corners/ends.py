@@ -54,7 +54,7 @@ SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths
 
 
 def data(folder: Folder, short: bool) -> None:
-    """``ladder``, a row per example, support, level; ``jumps``; ``ends``; ``shifted``; ``grid`` of Fig. 16."""
+    """``ladder``, a row per example, support, level; ``jumps``; ``ends``; ``shifted``; ``grid`` (Fig. 16)."""
     rows, at_ends, jumps = [], [], []
     for case in CASES[1::6] if short else CASES:
         initial = case.build()

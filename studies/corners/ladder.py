@@ -196,8 +196,8 @@ def halved(
     if not len(growing):
         return []
     level = int(growing[np.argmax(steps[growing])]) + 1
-    fine = [_solved(refine(reached[k + 1], 1, project), support) for k in (level - 1, level)]
-    energy, finer = energies[level - 1 : level + 1], [result.energy for result in fine]
+    fine = [_solved_finer(reached[k + 1], support, project) for k in (level - 1, level)]
+    energy, finer = energies[level - 1 : level + 1], [found for found, _ in fine]
     return [
         {
             "level": level,
@@ -210,10 +210,20 @@ def halved(
             "step": energy[1] - energy[0],
             "step_halved": finer[1] - finer[0],
             "mesh_error": (energy[1] - finer[1]) * 4.0 / 3.0,
-            "status_before_halved": fine[0].status.name.lower(),
-            "status_halved": fine[1].status.name.lower(),
+            "status_before_halved": fine[0][1],
+            "status_halved": fine[1][1],
         }
     ]
+
+
+def _solved_finer(surface: Surface, support: str, project: Projection | None) -> tuple[float, str]:
+    """The energy with every triangle cut into four, and how the solver ended."""
+    try:
+        finer = refine(surface, 1, project)
+    except SurfaceError:  # walls have come down to nothing
+        return math.nan, "cannot be cut"
+    result = _solved(finer, support)
+    return result.energy, result.status.name.lower()
 
 
 def _solved(shape: Surface, support: str) -> Result:

@@ -11,6 +11,7 @@ from generators import two_caps
 from pcmc import Surface, mean_curvature
 
 from ..folder import Folder
+from ..paper import printed
 from ..study import Study
 from .example import gradient_history, numbers, shapes
 from .flow import Case, curvature_table, run_cases
@@ -83,7 +84,7 @@ def _patch(stages: dict[str, Surface], name: str) -> dict[str, float | str]:
 def figure(folder: Folder) -> None:
     """Figs. 11 to 15."""
     pictures = {"initial": ("fig11", "fig12"), "final": ("fig13", "fig14")}
-    shapes(folder, "main", pictures, "fig15", walls_view=(-165.0, 15.0))
+    shapes(folder, "main", pictures, "fig15", printed("example2.gradient_squared"), walls_view=(-165.0, 15.0))
     gradient_history(folder, {"the paper's flow": "main", "L-BFGS": "lbfgs"}, "methods")
 
 

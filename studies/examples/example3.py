@@ -11,6 +11,7 @@ from generators import four_fans
 from pcmc import Surface
 
 from ..folder import Folder
+from ..paper import printed
 from ..study import Study
 from .example import gradient_history, numbers, shapes
 from .flow import DECIMALS, Case, curvature_table, run_cases
@@ -114,7 +115,8 @@ def _misfit(ridges: pd.DataFrame, mesh: str, *, ellipse: bool = True) -> float:
 
 def figure(folder: Folder) -> None:
     """Figs. 17 to 21."""
-    shapes(folder, "main", {"initial": ("fig17", "fig18"), "final": ("fig19", "fig20")}, "fig21")
+    pictures = {"initial": ("fig17", "fig18"), "final": ("fig19", "fig20")}
+    shapes(folder, "main", pictures, "fig21", printed("example3.gradient_squared"))
     gradient_history(folder, {"the paper's flow": "on", "L-BFGS": "lbfgs"}, "methods")
 
 
