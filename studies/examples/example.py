@@ -14,6 +14,7 @@ from pcmc.forces.curvature import METHODS
 from ..folder import Folder
 from .flow import errors, external_area
 
+ENLARGED = 0.12  # the part of E's range that an inset shows
 EVEN = 0.01  # a smaller relative spread of errors shows as one colour
 
 
@@ -137,15 +138,26 @@ def flow_history(folder: Folder, case: str, name: str, bound: float) -> None:
     finish(picture, folder.figure(name))
 
 
-def energy_history(folder: Folder, cases: Mapping[str, str], name: str, title: str = "") -> None:
-    """E against the iteration for cases by their names in the picture."""
-    from pcmc.plot import histories
+def energy_history(folder: Folder, cases: Mapping[str, str], name: str, title: str) -> None:
+    """E against the iteration for cases by their names in the picture, and its lowest part enlarged."""
+    from pcmc.plot.curves import add_legend, new_axes
+    from pcmc.plot.figure import CURVES, SMALL, finish, overlap_style, style
 
     table = folder.read_table("histories")
     frames = {label: table[table.case == case] for label, case in cases.items()}
-    histories(
-        frames, folder.figure(name), x="iteration", label="energy E", dashes=len(cases) > 1, title=title
-    )
+    picture, axes = new_axes(1200, 720, title, "iteration", "energy E")
+    part = style(axes.inset_axes((0.3, 0.3, 0.68, 0.45)))
+    for k, (label, frame) in enumerate(frames.items()):
+        look = {"color": CURVES[k]} | overlap_style(k, len(frames))
+        for place in (axes, part):
+            place.plot(frame.iteration, frame.energy, label=label, **look)
+    low = min(frame.energy.min() for frame in frames.values())
+    high = max(frame.energy.max() for frame in frames.values())
+    part.set_ylim(low - 0.1 * ENLARGED * (high - low), low + ENLARGED * (high - low))
+    part.set_title("enlarged", fontsize=SMALL, pad=2.0)
+    axes.indicate_inset_zoom(part, edgecolor="#808080", linewidth=0.6)
+    add_legend(axes, len(frames))
+    finish(picture, folder.figure(name))
 
 
 def gradient_history(folder: Folder, cases: Mapping[str, str], name: str) -> None:
