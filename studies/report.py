@@ -68,11 +68,12 @@ finds none, and returns the saddle under that name. Its worst triangle has quali
 {solvers.worst_quality_newton_minimum:.2g}."""
 
 CORNERS = """\
-The study `corners` solves the examples on meshes that get finer only near the ends of their junctions.
-Where the solver fails on a level, that level is solved anew from the initial shape. Then the vertices
-come to lie elsewhere along the same shape, and the energy of flat triangles depends on where they lie.
-`corners/jumps.csv` has, for each example and support, the largest step of the energy that is larger than
-the one before it: between the meshes of the two levels, and with every triangle of both cut into four.
+The study `corners` solves the examples on meshes that get finer only near the ends of their junctions. Where
+the solver fails on a level, that level is solved anew from the initial shape. Then, and where the solver
+spreads vertices to keep triangles sound, they come to lie elsewhere along the same shape, and the energy of
+flat triangles depends on where they lie. `corners/jumps.csv` has, for each example and support, the largest
+step of the energy that is larger than the one before it: between the meshes of the two levels, and with
+every triangle of both cut into four.
 
 In Example 1 with a wall of 1 and held bottoms the energy steps by {corners.example1-1_held_jump_step:.2g}
 at level {corners.example1-1_held_jump_level}, after steps of less and less. That level is solved anew,
@@ -241,7 +242,7 @@ def jump_table(results: Path) -> list[str]:
             row["bottom"],
             row["level"],
             "yes" if row["anew"] else "no",
-            *(f"{row[key]:.2g}" for key in ("slid", "step", "step_halved")),
+            *(f"{row[key]:.2g}".replace("nan", "") for key in ("slid", "step", "step_halved")),
         ]
         for row in rows
     ]
@@ -251,6 +252,7 @@ def jump_table(results: Path) -> list[str]:
 def fair_pairs(results: Path) -> list[str]:
     """The benchmark's rows in which both programs do the same work; no line where one of them is missing."""
     rows = Folder(results / "benchmark").read_table("full").drop_duplicates("what")
+    # of rows with one name the first: of Newton steps that on the smaller mesh
     seconds = {str(what): float(median) for what, median in zip(rows["what"], rows["median"], strict=True)}
     ratios = {
         key: seconds.get(theirs, math.nan) / seconds.get(ours, math.nan)

@@ -86,7 +86,7 @@ def shapes(
             columns=2,
             one_scale=False,
             legend=True,
-            width=1500,
+            width=1150,
         )
         if error is not None:
             draw(
@@ -95,7 +95,7 @@ def shapes(
                 view="plan",
                 scalars=error_percent(surface),
                 patches=roofs,
-                width=1000,
+                width=800,
                 legend=True,
                 title=_even(surface),
                 **error_scale(surface),
