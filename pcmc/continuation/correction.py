@@ -81,14 +81,14 @@ def fixed_arclength(near: BranchState, row: Floats, rate: float) -> Constraint:
 
 def fixed_volume(mesh: BranchMesh, volume: float) -> Constraint:
     """The volume is given."""
-    unit = mesh.full.size**3
+    unit = mesh.size**3
     return Constraint(lambda at: (at.volume - volume) / unit, lambda at: at.volume_gradient / unit, 0.0)
 
 
 def fixed_height(mesh: BranchMesh, vertex: int, height: float) -> Constraint:
     """The height of one vertex over Π is given."""
-    plane, unit = mesh.surface.plane, mesh.full.size
-    row = np.zeros((mesh.full.n, 3))
+    plane, unit = mesh.surface.plane, mesh.size
+    row = np.zeros((mesh.surface.n, 3))
     row[vertex] = np.array(plane.normal) / unit
     return Constraint(lambda at: float(plane.height(at.X[vertex]) - height) / unit, lambda _: row, 0.0)
 
@@ -156,7 +156,7 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
         s, change = matrix.solve(-at.rest.defects, -g, 1e-3)
         size = at.rest.space.size
         step = at.motion(s[:size], change)
-        if not np.abs(step).max() < mesh.full.size:
+        if not np.abs(step).max() < mesh.size:
             break
         value = at.parameter + change if asked is None else asked
         at = at.step(step, value, iteration, at.with_rooms(s[size:]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..forces.motion_space import MotionSpace
-from ..forces.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
+from ..forces.pinching import StandingPart, standing_part
 from ..forces.rooms import with_room_pressures
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
@@ -28,14 +28,14 @@ QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a go
 class BranchMesh:
     """What the points of a branch share as long as neither the mesh nor the contact with Π changes.
 
-    ``full`` is the surface with all its walls, ``line`` its values and boundary as functions of λ, ``part``
-    what stands of it, without the walls that vanish where a junction rests on Π; ``surface`` is that of it.
+    ``part`` is what stands of its surface, without the walls that vanish where a junction rests on Π;
+    ``surface`` is that of it; ``line`` has its values and boundary as functions of λ.
     """
 
     def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
-        self.full, self.line, self._backend = surface, line, backend
+        self.line, self.size, self._backend = line, surface.size, backend
         self.part = part = standing_part(surface)
-        self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
+        self.surface, self.resting = part.surface, part.resting
         self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
@@ -43,9 +43,9 @@ class BranchMesh:
         least = LEAST_VOLUME * surface.size**3
         self._last = Equilibrium(part, self.surface.vertices, backend, least)
 
-    def equilibrium(self, surface: Surface, X: Floats) -> Equilibrium:
-        """That of a surface of this mesh with its vertices at X; factors are valid until the next one's."""
-        self._last = self._last.at(X, surface)
+    def equilibrium(self, part: StandingPart, X: Floats) -> Equilibrium:
+        """That of the part with its values at X (n,3); factors are valid until the next one's."""
+        self._last = self._last.at(X, part)
         return self._last
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
@@ -66,21 +66,9 @@ class BranchMesh:
         w[surface.pinned] = change
         return w
 
-    def full_surface(self, X: Floats) -> Surface:
-        """The surface with all its walls; those that vanish lie on Π."""
-        if not self.resting.any():
-            return self.full.moved(X)
-        return self.full.moved(place_pinched_walls(self.full, self.walls, self.resting, X))
-
-    def surface_in_contact(self, X: Floats) -> Surface:
-        """The full surface, with the vertices that came down to Π placed on it."""
-        X = put_down(self.surface, self.walls, X, self.reaches_plane(X))
-        return self.full_surface(place_wall_rows(self.surface, self.walls, X))
-
     def reaches_plane(self, X: Floats) -> Bools:
         """(n,) bool, junction vertices that stood off Π and are now on it or beyond."""
-        standing_off = self.walls.top_free & ~self.resting
-        return coming_down(self.surface, self.walls, standing_off, self.surface.vertices, X, 0.0)
+        return self.part.coming_down(X, self.surface.vertices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +92,18 @@ class BranchState:
     @cached_property
     def rest(self) -> Equilibrium:
         """The equations and their derivatives by the positions."""
-        return self.mesh.equilibrium(self.with_values(self.mesh.surface), self.X)
+        return self.mesh.equilibrium(self.mesh.part.with_values(self.with_values), self.X)
+
+    @property
+    def whole(self) -> Surface:
+        """The surface with all its walls; those that vanish lie on Π."""
+        return self.rest.part.whole_at(self.X)
+
+    @property
+    def in_contact(self) -> Surface:
+        """The same, with the vertices that came down to Π placed on it."""
+        part = self.rest.part
+        return part.whole_at(part.landed(self.X, self.mesh.reaches_plane(self.X)))
 
     @property
     def surface(self) -> Surface:
@@ -167,12 +166,12 @@ class BranchState:
     def area_weights(self) -> Floats:
         """(n,) the area around each vertex over all area, over size², 1/length²."""
         area = vertex_area_vectors(self.X, self.mesh.part.classes.faces)[1]
-        return area / (area.sum() * self.mesh.full.size**2)
+        return area / (area.sum() * self.mesh.size**2)
 
     @cached_property
     def aligned(self) -> Floats:
         """X (n,3) with the rows of walls below their junction; motions count from here."""
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X, self.rest.space)
+        return self.mesh.part.follow(self.X, self.rest.space)
 
     def motion(self, s: Floats, change: float = 0.0) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves.
@@ -201,5 +200,4 @@ class BranchState:
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their junction."""
-        X = onto_circles(self.mesh.surface, self.X + d)
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, X, self.rest.space)
+        return self.mesh.part.follow(onto_circles(self.mesh.surface, self.X + d), self.rest.space)

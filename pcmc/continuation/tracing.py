@@ -208,9 +208,8 @@ class Tracer:
 
     def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        surface = near.with_values(near.mesh.surface_in_contact(near.X))
         tolerance, backend = self.options.tolerance, self.options.backend
-        result = solve(surface, "newton", target="stationary", tolerance=tolerance, backend=backend)
+        result = solve(near.in_contact, "newton", target="stationary", tolerance=tolerance, backend=backend)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
@@ -228,7 +227,7 @@ class Tracer:
         here, tangent = self.here.state, self.here.tangent
         if self.options.remesh is not None and here.quality < wanted:
             try:
-                mesh = self.mesh(remesh(self.surface_at(here), self.options.remesh))
+                mesh = self.mesh(remesh(here.whole, self.options.remesh))
             except SurfaceError:
                 return
             start = BranchState(mesh, mesh.surface.vertices, here.parameter)
@@ -291,7 +290,7 @@ class Tracer:
             "index_before": before,
             "index_after": after,
             "along_branch": along,
-            "surface": self.surface_at(at),
+            "surface": at.whole,
         }
 
     def record(self) -> None:
@@ -310,20 +309,16 @@ class Tracer:
         self.rows.append(row)
         if (number - 1) % self.options.keep:
             self.surfaces.pop(number - 1, None)
-        self.surfaces[number] = self.surface_at(self.here.state)
+        self.surfaces[number] = self.here.state.whole
         if self.callback is not None:
-            self.callback(Progress(number, lambda: self.surface_at(here.state), self.rows[-1]))
+            self.callback(Progress(number, lambda: here.state.whole, self.rows[-1]))
 
     def columns(self, at: BranchState) -> dict[str, Any]:
         """The columns of both tables."""
         rooms = zip(at.surface.rooms, room_pressures(at.surface).tolist(), strict=True)
         return {
             "parameter": at.parameter,
-            **self.line.columns(at.mesh.full, at.parameter),
+            **self.line.columns(at.mesh.surface, at.parameter),
             **{f"pressure {room.name}": pressure for room, pressure in rooms},
             **{name: getattr(at, name) for name in ("energy", "volume", "height")},
         }
-
-    def surface_at(self, at: BranchState) -> Surface:
-        """The whole surface at a state."""
-        return at.with_values(at.mesh.full_surface(at.X))

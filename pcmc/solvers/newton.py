@@ -80,7 +80,7 @@ def _solve_level(
 
 def _attempts(first: NewtonRun) -> NewtonRun:
     """Run it; where that fails, once more from the same start in another way."""
-    start, options = first.state.full, first.options
+    start, options = first.state.at.part.whole, first.options
     first.run()
     for more in (*SLOW_DESCENT_STEPS[1:], inf):
         if first.status is not Status.SADDLE:

@@ -61,13 +61,12 @@ class Equilibrium:
         part = standing_part(surface)
         return cls(part, part.surface.vertices, backend)
 
-    def at(self, X: Floats, surface: Surface | None = None) -> Equilibrium:
-        """The same part at other positions, or with the tensions and pressures of another surface.
+    def at(self, X: Floats, part: StandingPart | None = None) -> Equilibrium:
+        """The same part at other positions, or with other tensions and pressures.
 
         The pattern and its order of elimination go along where each vertex has as many unknowns.
         """
-        part = self.part if surface is None else replace(self.part, surface=surface)
-        new, known = replace(self, part=part, X=X), self.__dict__
+        new, known = replace(self, part=part or self.part, X=X), self.__dict__
         if "rigid_motions" in known:
             new.__dict__["rigid_motions"] = self.rigid_motions
         if "unknowns" in known and np.array_equal(new.space.dimension, self.space.dimension):
@@ -146,7 +145,7 @@ class Equilibrium:
         """(n,) the pull on resting vertices beyond what their walls can take, force."""
         if not self.part.resting.any():
             return np.zeros(len(self.X))
-        return excess_pull(self.shape, self.part.walls, self.part.resting)
+        return excess_pull(self.shape, self.part.walls, self.part.resting, -self.gradient_with_reactions)
 
     @cached_property
     def jacobian(self) -> Linearisation:
