@@ -251,7 +251,7 @@ def test_a_vertex_on_no_top_edge_is_not_lifted():
 @pytest.mark.parametrize(("alpha_aux", "lifts"), [(0.5, 3), (50.0, 0)])
 def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, lifts):
     state = SolverState(two_squares(6, alpha_aux=alpha_aux), min_quality=0.45)
-    crest = crest_of(state.full, state.walls)[:3]
+    crest = crest_of(state.at.part.whole, state.walls)[:3]
     drop = np.zeros_like(state.at.X)
     drop[crest, 2] = -state.at.X[crest, 2]
     X, down = state.displaced(drop)
