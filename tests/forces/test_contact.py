@@ -265,7 +265,7 @@ def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, l
     assert ((height > 0.0) == (lifts > 0)).all()
     if lifts:  # its wall is back, with all its rows
         quality = triangle_quality(state.at.X, state.at.surface.faces)
-        assert len(quality) == state.full.m
+        assert len(quality) == state.at.part.whole.m
         assert quality.min() > 1e-3
 
 
