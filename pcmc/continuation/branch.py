@@ -12,12 +12,11 @@ import pandas as pd
 
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..design import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
 from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
-from .direction import Direction, ParameterLine
+from .direction import Direction, Named, ParameterLine
 from .options import Ending, FollowOptions
 from .state import QUANTITIES, BranchMesh
 from .tracing import Tracer
@@ -177,7 +176,7 @@ def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
 
 def follow(
     surface: Surface,
-    parameter: str | Parameter | Direction | BoundaryMotion,
+    parameter: str | Named | Direction | BoundaryMotion,
     stop: float | None = None,
     *,
     until: Mapping[str, float] | None = None,
@@ -247,7 +246,7 @@ def follow(
         raise MissingExtra("mmgpy", "remesh")
     goals = _goals(stop, until)
     direction: object = Direction({parameter: 1.0}) if isinstance(parameter, str) else parameter
-    if isinstance(parameter, Parameter):
+    if isinstance(parameter, Named):
         by_kind: dict[str, Any] = {parameter.key: dict.fromkeys(parameter.names, 1.0)}
         direction = Direction(**by_kind)
     if not isinstance(direction, Direction | BoundaryMotion):

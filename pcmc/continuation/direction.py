@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -24,6 +25,19 @@ from ..surface.values import KINDS, part_index, part_values, rates_of
 
 VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
 SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same λ
+
+
+@runtime_checkable
+class Named(Protocol):
+    """What names the parts whose value varies, such as ``pcmc.Parameter``."""
+
+    @property
+    def key(self) -> str:
+        """One of ``VARIED``."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the parts."""
 
 
 @dataclass(frozen=True)

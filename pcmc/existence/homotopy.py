@@ -21,8 +21,8 @@ from ..certificate.proof import Attempt
 from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..forces.functional import gradient
 from ..solvers.result import Callback, Progress, Result, Status
+from ..solvers.starts import low_start
 from ..surface import Surface
-from .starts import low_start
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
 SOUND = 0.2  # triangle quality from which a turn counts as the surface's, not the mesh's

@@ -22,6 +22,7 @@ from ..certificate.neck import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result, Status
+from ..solvers.starts import low_start
 from ..surface import Surface
 from .homotopy import (
     Homotopy,
@@ -33,7 +34,6 @@ from .homotopy import (
     raise_loads,
     relax_tensions,
 )
-from .starts import low_start
 
 FAILED = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 

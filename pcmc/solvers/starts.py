@@ -68,7 +68,8 @@ def low_start(surface: Surface) -> Surface | None:
     if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
         place = surface.plane.to_local(moved.vertices)
         moved = _at(surface, _in_the_middle(surface.faces, roof | surface.held, place))
-    return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
+    walls_below = find_walls(moved)
+    return moved.moved(place_wall_rows(moved, walls_below, moved.vertices))
 
 
 def _spans_a_surface(surface: Surface) -> bool:
