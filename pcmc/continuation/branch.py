@@ -96,13 +96,12 @@ class Branch:
 
         Raises
         ------
-        OptionError : the event is not a bifurcation: a fold, a change of contact, or without a mode of
-            eigenvalue 0; or several modes turn at once.
+        OptionError : the event is no bifurcation, or several modes turn at once.
 
         Notes
         -----
         The mesh must have the symmetry that makes the bifurcation. On another mesh the branches pass
-        each other at a small distance: the one followed bends away smoothly, without an event.
+        each other at a small distance, without an event.
 
         The event is where an eigenvalue of the Hessian passes 0. The equations of equilibrium on a mesh
         are singular a little beside it, to second order in the edge length; there the branches leave.

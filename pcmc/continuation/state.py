@@ -1,4 +1,4 @@
-"""A mesh on a branch, and on it positions X and a parameter λ, with the equations r = B(X)ᵀ ∇E(X; λ) = 0."""
+"""Positions X on a mesh of a branch and a parameter λ, with the equations r = B(X)ᵀ ∇E(X; λ) = 0."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..forces.motion_space import MotionSpace
-from ..forces.pinching import StandingPart, standing_part
+from ..forces.pinching import standing_part
 from ..forces.rooms import with_room_pressures
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
@@ -26,27 +26,21 @@ QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a go
 
 
 class BranchMesh:
-    """What the points of a branch share as long as neither the mesh nor the contact with Π changes.
+    """What the points of a branch share as long as neither the mesh nor what rests on Π changes.
 
-    ``part`` is what stands of its surface, without the walls that vanish where a junction rests on Π;
-    ``surface`` is that of it; ``line`` has its values and boundary as functions of λ.
+    ``surface`` is the standing part's; ``line`` has its values and boundary as functions of λ.
     """
 
     def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.line, self.size, self._backend = line, surface.size, backend
         self.part = part = standing_part(surface)
-        self.surface, self.resting = part.surface, part.resting
+        self.surface = part.surface
         self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
         least = LEAST_VOLUME * surface.size**3
-        self._last = Equilibrium(part, self.surface.vertices, backend, least)
-
-    def equilibrium(self, part: StandingPart, X: Floats) -> Equilibrium:
-        """That of the part with its values at X (n,3); factors are valid until the next one's."""
-        self._last = self._last.at(X, part)
-        return self._last
+        self.last = Equilibrium(part, self.surface.vertices, backend, least)  # that asked for last
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
@@ -91,8 +85,9 @@ class BranchState:
 
     @cached_property
     def rest(self) -> Equilibrium:
-        """The equations and their derivatives by the positions."""
-        return self.mesh.equilibrium(self.mesh.part.with_values(self.with_values), self.X)
+        """The equations and their derivatives by the positions; factors are valid until the next one's."""
+        self.mesh.last = self.mesh.last.at(self.X, self.mesh.part.with_values(self.with_values))
+        return self.mesh.last
 
     @property
     def whole(self) -> Surface:
@@ -105,21 +100,11 @@ class BranchState:
         part = self.rest.part
         return part.whole_at(part.landed(self.X, self.mesh.reaches_plane(self.X)))
 
-    @property
-    def surface(self) -> Surface:
-        """The mesh's surface with the tensions and pressures at λ; its positions are not X."""
-        return self.rest.surface
-
-    @property
-    def residual(self) -> float:
-        """‖r‖, with the defects of volumes, over the norm of the single triangles' forces."""
-        return self.rest.residual
-
     @cached_property
     def parameter_derivative(self) -> Floats:
         """(N+r,) dr/dλ = Bᵀ ∂∇E/∂λ, and Bᵀ Df[v] where λ moves the boundary; -dV̄/dλ in units of force."""
         rest, line = self.rest, self.mesh.line
-        change = rest.space.to_coordinates(line.gradient(self.surface, self.X))
+        change = rest.space.to_coordinates(line.gradient(rest.surface, self.X))
         if self.carried is not None:
             change = change + rest.jacobian.times(self.carried)
         return np.append(change, -rest.volume_units * line.volume_rates)
@@ -174,10 +159,7 @@ class BranchState:
         return self.mesh.part.follow(self.X, self.rest.space)
 
     def motion(self, s: Floats, change: float = 0.0) -> Floats:
-        """The motion Bs (n,3), in which the insides of the sheets follow their curves.
-
-        With a change of λ, and so of the boundary, what follows that is added to first order.
-        """
+        """``BranchMesh.motion``; and what follows a change of λ, and so of the boundary, to first order."""
         d = self.mesh.motion(self.rest.space, self.X, s)
         return d if self.carried is None or not change else d + change * self.carried
 

@@ -85,25 +85,21 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     roof_vertex[surface.faces[roof]] = True
     height = surface.plane.height(X)
     low, foot = lying(height, X), np.full(n, -1, dtype=np.int64)
-    sliding = list[tuple[int, Ints, Ints, Ints | None]]()
+    every = list[tuple[int, Ints, Ints, Ints | None]]()
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
         edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
         if surface.on_ground[edges].any() and len(top):
-            sliding.append((index, edges, top, None))
-    rows, wall_below = [], [np.empty(0, dtype=np.int64)]
-    tops: list[Ints] = [np.empty((0, 2), dtype=np.int64)]
-    for index, edges, top, feet in (*sliding, *held_walls(surface, roof_edge, roof_vertex, low, held)):
-        before = np.concatenate(tops)
-        if feet is not None:
-            if np.isin(top, before[(foot[before] < 0).all(axis=1)]).any():
-                continue
+            every.append((index, edges, top, None))
+    none = np.empty((0, 2), dtype=np.int64)
+    sliding = np.concatenate([none, *(top for _, _, top, _ in every)])
+    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
+        if not np.isin(top, sliding).any():
             foot = np.where(feet >= 0, feet, foot)
-        inner = np.unique(edges)
-        rows.append(wall_rows(surface, inner[~roof_vertex[inner]], top, edges, feet))
-        tops.append(top)
-        wall_below.append(np.full(len(top), index))
-    top_edges, below = np.concatenate(tops), np.concatenate(wall_below)
+            every.append((index, edges, top, feet))
+    rows = join_rows([wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every])
+    top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
+    below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])
     on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
     on_top[top_edges], pinchable[below] = True, True
     # on Π the side is that of the push of the sheets' pressure along its normal
@@ -112,7 +108,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
     push = vertex_sums((force * (area_vectors(X[F]) @ np.array(surface.plane.normal)))[:, None], F, n)[:, 0]
     return Walls(
-        rows=join_rows(rows),
+        rows=rows,
         top_edges=top_edges,
         wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,
@@ -146,24 +142,6 @@ def resting_vertices(surface: Surface, walls: Walls) -> Bools:
     gap = surface.plane.height(X)
     gap[held] = np.linalg.norm(X[held] - X[walls.foot[held]], axis=1)
     return walls.top_free & lying(gap, X)
-
-
-def coming_down(
-    surface: Surface, walls: Walls, standing: Bools, before: Floats, X: Floats, low: Floats | float
-) -> Bools:
-    """(n,) the ``standing`` junction vertices that a move from ``before`` to X (n,3) brings down.
-
-    They reach Π or the curve of a held bottom, pass it, or come nearer to it than ``low``.
-    """
-    above, last = (walls.side * surface.plane.height(Y) for Y in (X, before))
-    down = standing & ((above <= 0.0) | ((above < last) & (above <= low)))
-    held = walls.held
-    if not held.any():
-        return down
-    gap, gap_before = (walls.across_bottom(Y - Y[walls.foot], Y) for Y in (X, before))
-    near, near_before = np.linalg.norm(gap, axis=1), np.linalg.norm(gap_before, axis=1)
-    passes = np.einsum("ij,ij->i", gap, gap_before) <= 0.0
-    return np.where(held, standing & (passes | ((near < near_before) & (near <= low))), down)
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:
@@ -227,10 +205,7 @@ class StandingPart:
 
     @cached_property
     def places(self) -> tuple[Ints, Floats]:
-        """i, j (2,n) and λ (n,).
-
-        A foot that still carries a triangle slides on Π and stays where it is.
-        """
+        """i, j (2,n) and λ (n,); a foot that still carries a triangle slides on Π and stays where it is."""
         n, walls, resting = self.whole.n, self.walls, self.resting
         rows, owner = walls.rows, _owners(n, walls, resting)
         stands = np.zeros(n, dtype=bool)
@@ -258,14 +233,25 @@ class StandingPart:
         """X (n,3) with the rows of walls placed below their top edges; see ``place_wall_rows``."""
         return place_wall_rows(self.surface, self.walls, X, space)
 
-    def coming_down(self, X: Floats, before: Floats, low: Floats | float = 0.0) -> Bools:
-        """(n,) the standing junction vertices that a move from ``before`` to X (n,3) brings down."""
-        return coming_down(self.surface, self.walls, self.standing, before, X, low)
-
     @property
     def standing(self) -> Bools:
         """(n,) the junction vertices that can come to rest."""
         return self.walls.top_free & ~self.resting
+
+    def coming_down(self, X: Floats, before: Floats, low: Floats | float = 0.0) -> Bools:
+        """(n,) the standing junction vertices that a move from ``before`` to X (n,3) brings down.
+
+        They reach Π or the curve of a held bottom, pass it, or come nearer to it than ``low``.
+        """
+        walls, standing, held = self.walls, self.standing, self.walls.held
+        above, last = (walls.side * self.surface.plane.height(Y) for Y in (X, before))
+        down = standing & ((above <= 0.0) | ((above < last) & (above <= low)))
+        if not held.any():
+            return down
+        gap, gap_before = (walls.across_bottom(Y - Y[walls.foot], Y) for Y in (X, before))
+        near, near_before = np.linalg.norm(gap, axis=1), np.linalg.norm(gap_before, axis=1)
+        passes = np.einsum("ij,ij->i", gap, gap_before) <= 0.0
+        return np.where(held, standing & (passes | ((near < near_before) & (near <= low))), down)
 
     def landed(self, X: Floats, down: Bools, space: MotionSpace | None = None) -> Floats:
         """X (n,3) with the vertices ``down`` on Π or on their bottom, and the rows of walls below.
@@ -336,24 +322,17 @@ def top_spacing(surface: Surface, walls: Walls) -> Floats:
 
 
 def lift(
-    surface: Surface,
-    walls: Walls,
-    vertices: Bools,
-    fraction: float | Floats,
-    directions: Floats | None = None,
+    surface: Surface, walls: Walls, vertices: Bools, fraction: float | Floats, ways: Floats | None = None
 ) -> Surface:
-    """The whole surface with resting ``vertices`` raised off Π by a fraction of their spacing.
+    """The whole surface with resting ``vertices`` raised by a fraction of their spacing, and their wall rows.
 
-    The fraction may be one for each vertex (n,), and so may the unit directions (n,3), which else lead off
-    Π. The wall rows below are placed anew.
+    ``ways`` are unit directions (n,3), by default off Π.
     """
-    if directions is None:
-        directions = walls.side[:, None] * np.array(surface.plane.normal)
+    ways = walls.side[:, None] * np.array(surface.plane.normal) if ways is None else ways
     spacing = top_spacing(surface, walls)
     rise = fraction * np.where(vertices & np.isfinite(spacing), spacing, 0.0)
-    X = surface.vertices + rise[:, None] * directions
-    rows = walls.rows
-    below = rows.vertices[vertices[rows.top_ends].any(axis=1)]
+    X = surface.vertices + rise[:, None] * ways
+    below = walls.rows.vertices[vertices[walls.rows.top_ends].any(axis=1)]
     X[below] = place_wall_rows(surface, walls, X)[below]
     return surface.moved(X)
 

@@ -72,15 +72,17 @@ class WallRows:
 
 
 def wall_rows(
-    surface: Surface, vertices: Ints, top_edges: Ints, wall_edges: Ints, foot: Ints | None = None
+    surface: Surface, roof_vertex: Bools, top_edges: Ints, wall_edges: Ints, foot: Ints | None
 ) -> WallRows:
-    """The rows of one wall: its ``vertices`` below the nearest of its ``top_edges`` (k,2), seen along n.
+    """The rows of one wall: its vertices below the nearest of its ``top_edges`` (k,2), seen along n.
 
     ``foot`` (n,) gives the held bottom vertex below each top vertex, if the bottom is held.
 
     Where the top edge lies on the bottom its height shows nothing. There ρ is that of the vertex's row: steps
     along ``wall_edges`` from the foot, over those from foot to top.
     """
+    vertices = np.unique(wall_edges)
+    vertices = vertices[~roof_vertex[vertices]]
     X, height = surface.vertices, surface.plane.height(surface.vertices)
     flat = X - height[:, None] * np.array(surface.plane.normal)
     ends, fraction = _nearest(flat, vertices, top_edges)

@@ -65,12 +65,13 @@ class NewtonOptions:
         validate.number("inflation", self.inflation, above=1.0)
 
 
+@dataclass
 class Log:
     """What all attempts of a solve share: the callback, and the counts of their work."""
 
-    def __init__(self, callback: Callback | None) -> None:
-        self.callback = callback
-        self.evaluations = self.factorisations = 0
+    callback: Callback | None
+    evaluations: int = 0
+    factorisations: int = 0
 
 
 class NewtonRun:
@@ -206,10 +207,7 @@ class NewtonRun:
         return False
 
     def _descends_slowly(self) -> bool:
-        """Whether the way down from a saddle hardly lowers E: often it only spoils triangles.
-
-        True once for each number of steps in ``SLOW_DESCENT_STEPS``.
-        """
+        """Whether ``patience`` steps down from a saddle hardly lowered E: often they only spoil triangles."""
         state = self.state
         down = self.stepper.kind in DOWN and state.at.residual <= NEAR_SADDLE
         if self.patience == np.inf or not down:

@@ -22,10 +22,9 @@ SOUND = 0.05  # quality of the plan's triangles above which the plan is kept
 def low_start(surface: Surface) -> Surface | None:
     """The same mesh, low over the surface that its boundary spans; None where it spans none.
 
-    The lowest surface has each vertex at the mean height of its neighbours. Over a plan whose triangles
-    are sound the vertices keep their places, and their heights over the lowest surface are scaled down
-    together. Otherwise the mesh is spread anew, each vertex in the middle of its neighbours (Tutte
-    1963), with a low dome on top where there is pressure.
+    The lowest surface has each vertex at the mean height of its neighbours. Over a sound plan the vertices'
+    heights over it are scaled down together. Otherwise the mesh is spread anew, each vertex in the middle of
+    its neighbours (Tutte 1963), with a low dome on top where there is pressure.
 
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 7]]
@@ -57,7 +56,8 @@ def low_start(surface: Surface) -> Surface | None:
     # a dome: 1 above the mean of the neighbours
     above = place[:, 2] - low[:, 2] if kept else _in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
-        above *= np.sign(load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
+        domed = _at(surface, low + above[:, None] * [0.0, 0.0, 1.0])
+        above *= np.sign(load(domed)) or 1.0
     rise, most = RISE * span, float(np.abs(above[roof]).max())
     if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)

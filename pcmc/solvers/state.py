@@ -80,12 +80,10 @@ class SolverState:
 
     @property
     def walls(self) -> Walls:
-        """The walls that can pinch."""
         return self.at.part.walls
 
     @property
     def resting(self) -> Bools:
-        """(n,) the junction vertices that rest on Π."""
         return self.at.part.resting
 
     @property
@@ -146,10 +144,7 @@ class SolverState:
             self.go_to(X)
 
     def displaced(self, d: Floats) -> tuple[Floats, Bools]:
-        """X + d, and the junction vertices that this brings down to Π, where they are placed.
-
-        The rows of a wall follow its junction.
-        """
+        """X + d with walls following, and the junction vertices that it brings down to Π, placed there."""
         part = self.at.part
         X = onto_circles(part.surface, self.at.X + d)
         if not part.standing.any():
@@ -158,10 +153,7 @@ class SolverState:
         return part.landed(X, down, self.at.space), down
 
     def spoils_triangles(self, X: Floats) -> bool:
-        """Whether the move to X turns a triangle over, makes the worst one much worse or leads too far out.
-
-        Triangles of walls that can pinch do not count: their height may vanish.
-        """
+        """Whether the move to X turns a triangle over, makes the worst much worse or leads too far out."""
         if not reachable(X):
             return True
         turned, before, after = compare(self.at.X, X, self.quality_faces)

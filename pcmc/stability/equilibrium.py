@@ -1,8 +1,7 @@
 """One equilibrium: a surface at positions X, and all that tells whether it is at rest there and stable.
 
 A P-CMC surface at rest solves r = Bᵀ∇E = 0, with B the basis of the motion space at X. Where rooms prescribe
-volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation. Each value is
-computed once, when a solver, a branch, a sensitivity or the certificate first asks for it.
+volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation.
 """
 
 from __future__ import annotations
@@ -91,7 +90,6 @@ class Equilibrium:
 
     @property
     def classes(self) -> VertexClasses:
-        """What the vertices lie on."""
         return self.part.classes
 
     @cached_property
@@ -287,9 +285,8 @@ class Equilibrium:
     ) -> SecondVariation:
         """A + stiffness · BᵀLB - diag(shift), shift (N,), factorised; the factor before is used up.
 
-        Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part that
-        rests on Π. Then, with ``soften``, a little more stiffness is added: such motions do not lower the
-        energy. SingularMatrix if that does not help.
+        Motions that cost no energy make it singular, such as sliding a vertex inside a flat part on Π. Then,
+        with ``soften``, a little more stiffness is added. SingularMatrix if that does not help.
         """
         pattern, solver = self.unknowns
         for added in (0.0, SOFT) if soften else (0.0,):

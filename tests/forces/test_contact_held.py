@@ -12,7 +12,6 @@ from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.forces.functional import energy_and_gradient
 from pcmc.forces.pinching import (
     StandingPart,
-    coming_down,
     find_walls,
     lift,
     resting_vertices,
@@ -126,6 +125,7 @@ def directions_of_pull(standing, walls, resting):
 def test_a_move_past_the_bottom_comes_down_on_it():
     full = example(6, 3.0)
     walls = find_walls(full, held=True)
+    part = StandingPart.of(full, walls, np.zeros(full.n, dtype=bool))
     top = int(np.flatnonzero(walls.held)[2])
     height = full.vertices[top, 2]
     for move, expected in [
@@ -136,7 +136,7 @@ def test_a_move_past_the_bottom_comes_down_on_it():
     ]:
         X = full.vertices.copy()
         X[top] += move
-        down = coming_down(full, walls, walls.top_free, full.vertices, X, 5e-3)
+        down = part.coming_down(X, full.vertices, 5e-3)
         assert down.sum() == down[top] == expected
 
 
