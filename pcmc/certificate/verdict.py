@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -67,6 +67,8 @@ class Findings:
     tried: tuple[Attempt, ...] = ()  # by a search
     mode: Floats = field(default_factory=lambda: np.empty((0, 3)))  # (n,3) the lowest; empty if unknown
     rigid: int = 0  # number of rigid motions that nothing resists, where rooms prescribe volumes
+    pulled: tuple[int, ...] = ()  # pinched vertices at which the sheets pull harder than the wall can hold
+    left_over: str = ""  # where pressures do not cancel at free edges, as a sentence
 
     @property
     def moving(self) -> bool:
@@ -132,10 +134,23 @@ def only_coarse(surface: Surface, pinchable: Bools) -> str:
 
 
 def judge(findings: Findings) -> tuple[Verdict, str]:
-    """The verdict on the findings and its reason, by the first of ``RULES`` that applies."""
+    """The verdict on the findings and its reason, by the first of ``RULES`` that applies; with notes."""
     verdict, reason = next((verdict, reason) for verdict, applies, reason in RULES if applies(findings))
     parts = reason(findings)
-    return verdict, parts if isinstance(parts, str) else "; ".join(str(part) for part in parts if part)
+    parts = [parts] if isinstance(parts, str) else parts
+    return verdict, "; ".join(str(part) for part in (*parts, *_notes(findings)) if part)
+
+
+def _notes(f: Findings) -> Iterator[str]:
+    """What is to be known whatever the verdict is."""
+    if not f.moving and f.quality > COLLAPSED and f.surface.tensions.any():
+        yield only_coarse(f.surface, f.pinchable)
+    if len(f.pulled):
+        yield (
+            f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than the"
+            " wall can hold: the wall will stand there once solved"
+        )
+    yield f.left_over
 
 
 def _disproved(f: Findings) -> list[object]:

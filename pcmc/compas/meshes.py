@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import FileWarning, PcmcError, SurfaceError
-from ..certificate.reactions import reactions
+from ..certificate.forces import reactions
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import standing_part
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of

@@ -17,8 +17,8 @@ from scipy.sparse import csr_array
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..certificate.cables import chord
-from ..certificate.reactions import SupportForces, support_forces
-from ..certificate.tables import lean_sines, sides_at
+from ..certificate.forces import Forces, sides_at
+from ..certificate.tables import lean_sines
 from ..forces.functional import weighted
 from ..forces.parameters import gradient_by
 from ..forces.volume_below import volume_below_gradient, volumes_below
@@ -151,14 +151,14 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
 
     As in the certificate's table of supports; an edge that slides pulls across its plane. Force/length.
     """
-    acting = support_forces(surface)
+    acting = Forces.of(surface)
     edges = acting.along_patch(None if of is None else surface.patch_index(of))
     if not edges.any():
         raise OptionError(f"reaction of {of}: nothing holds the edges of that patch", what="of", found=of)
     return largest_pull(acting, edges)
 
 
-def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
+def largest_pull(acting: Forces, edges: Bools) -> Measurement:
     """The largest pull along some of the edges (e,) of a surface, force/length.
 
     A side from a to b of length L, with the unit tangent t, has in a triangle of normal ν the co-normal n;
@@ -173,7 +173,7 @@ def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
 
     def branches(near: Ints) -> Branches:
         ends = acting.surface.topology.edges[numbers[near]]
-        at, face, corners = sides_at(surface, surface.topology.edge_numbers(ends))
+        at, face, corners = sides_at(surface, ends)
         c, a, b = surface.vertices[corners].transpose(1, 0, 2)
         k, pull = surface.patch_of_face[face], (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][at]
         length = np.linalg.norm(b - a, axis=1)[:, None]

@@ -95,6 +95,7 @@ def test_solving_a_project_fills_the_cache(folder):
         ("tension = 2.0", "tension = 2.1"),
         ('method = "newton"', "tolerance = 1e-11"),
         ("value = 0.6", "value = 0.61"),
+        ("[targets]", "[targets]\ntolerance = 1e-5"),
         ("edge_length = 0.8", "edge_length = 0.7"),
     ],
 )
