@@ -28,13 +28,13 @@ class Branch:
 
     Attributes
     ----------
-    points : one row per point: arclength s (a number), parameter λ, the values that vary (``tension NAME``,
+    points : a row per point: arclength s (a number), parameter λ, the values that vary (``tension NAME``,
         ``pressure NAME``), energy (force·length), volume (length³, that of certificates), height over Π
         (length), index, lowest_eigenvalue (force/length³), residual (relative), quality of the worst
         triangle, slope dλ/ds, iterations of Newton's method.
-    events : one row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
-        arclength, the index before and after it, and, of a change of index, along_branch: the cosine between
-        the mode that turns and the branch: 1 at a fold; 0 where the branch goes on and others leave it.
+    events : a row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
+        arclength, the index before and after, and along_branch, the cosine between the mode that turns and
+        the branch: 1 at a fold; 0 where the branch goes on and others leave it.
     surfaces, event_surfaces : by row of ``points``, and of ``events``.
     ending, detail : why the branch ends, and the last difficulty.
     """

@@ -156,5 +156,5 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
         if not np.abs(step).max() < mesh.size:
             break
         value = at.parameter + change if asked is None else asked
-        at = at.step(step, value, iteration, at.with_rooms(s[size:]))
+        at = at.step(step, value, iteration, s[size:])
     raise NotOnBranch(f"Newton's method does not converge (residual {at.rest.residual:.1e})")

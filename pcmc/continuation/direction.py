@@ -29,15 +29,13 @@ SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same 
 
 @runtime_checkable
 class Named(Protocol):
-    """What names the parts whose value varies, such as ``pcmc.Parameter``."""
+    """What names the parts whose value varies, and one of ``VARIED``, such as ``pcmc.Parameter``."""
 
     @property
-    def key(self) -> str:
-        """One of ``VARIED``."""
+    def key(self) -> str: ...
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """The names of the parts."""
+    def names(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)

@@ -94,12 +94,6 @@ class BranchState:
         """The surface with all its walls; those that vanish lie on Π."""
         return self.rest.part.whole_at(self.X)
 
-    @property
-    def in_contact(self) -> Surface:
-        """The same, with the vertices that came down to Π placed on it."""
-        part = self.rest.part
-        return part.whole_at(part.landed(self.X, self.mesh.reaches_plane(self.X)))
-
     @cached_property
     def parameter_derivative(self) -> Floats:
         """(N+r,) dr/dλ = Bᵀ ∂∇E/∂λ, and Bᵀ Df[v] where λ moves the boundary; -dV̄/dλ in units of force."""
@@ -163,22 +157,20 @@ class BranchState:
         d = self.mesh.motion(self.rest.space, self.X, s)
         return d if self.carried is None or not change else d + change * self.carried
 
-    def with_rooms(self, change: Floats) -> tuple[float, ...]:
-        """The rooms' pressures after a change (r,) of them, given in units of the borders."""
-        before = self.room_changes or np.zeros(len(change))
-        return tuple((before + self.rest.volume_units * change).tolist())
-
     def step(
-        self, d: Floats, parameter: float, iterations: int = 0, rooms: tuple[float, ...] | None = None
+        self, d: Floats, parameter: float, iterations: int = 0, rooms: Floats | None = None
     ) -> BranchState:
-        """The state at X + d (n,3) and λ, its boundary where λ has it, with these ``room_changes``."""
-        X = self.moved(d)
+        """The state at X + d (n,3) and λ, its boundary there, and ``rooms`` (r,) more in units of borders."""
+        X, changes = self.moved(d), self.room_changes
+        if rooms is not None:
+            before = np.array(changes) if changes else np.zeros(len(rooms))
+            changes = tuple((before + self.rest.volume_units * rooms).tolist())
         boundary = self.mesh.line.boundary(parameter)
         if boundary is not None:
             fixed = self.mesh.surface.pinned
             X = self.moved(d + self.mesh.carried(boundary - X[fixed], self.X))
             X[fixed] = boundary
-        return BranchState(self.mesh, X, parameter, iterations, self.room_changes if rooms is None else rooms)
+        return BranchState(self.mesh, X, parameter, iterations, changes)
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their junction."""

@@ -1,7 +1,4 @@
-"""Homotopies: from an easier surface at rest along the branch of equilibria to the one asked for.
-
-What grows is the load, the share of the way from equal tensions, or the distance between held curves.
-"""
+"""Homotopies: from an easier surface at rest along the branch of equilibria to the one asked for."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Log:
 class NewtonRun:
     """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
-    ``rows`` are the history up to here, with those of the runs ``before``; ``status`` is why the run ended.
+    ``rows`` are its history, after those of the runs ``before``; ``status`` is why it ended.
     """
 
     def __init__(
@@ -167,7 +167,7 @@ class NewtonRun:
             self.log.callback(Progress(len(self.rows) - 1, state.result_surface, row))
 
     def _step(self) -> None:
-        """One step: along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
+        """Along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
         stepper = self.stepper
         if stepper.saddle_near() and stepper.leave_saddle():
             self.smooth_steps = 0

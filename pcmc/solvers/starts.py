@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
@@ -13,6 +12,7 @@ from ..forces.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import cross_2d
+from ..surface.topology import components
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
 WIDE = 1.5  # of that extent: a plan that is wider is not kept
@@ -98,7 +98,7 @@ def _in_the_middle(faces: Ints, known: Bools, values: Floats, excess: float = 0.
     ends = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     i, j = np.concatenate([ends, ends[:, ::-1]]).T
     A = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
-    part = connected_components(A, directed=False)[1]
+    part = components(ends, n)
     unknown = np.flatnonzero(~known & np.isin(part, part[known]))
     result = np.array(values, dtype=float)
     if len(unknown):

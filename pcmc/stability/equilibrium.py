@@ -61,10 +61,7 @@ class Equilibrium:
         return cls(part, part.surface.vertices, backend)
 
     def at(self, X: Floats, part: StandingPart | None = None) -> Equilibrium:
-        """The same part at other positions, or with other tensions and pressures.
-
-        The pattern and its order of elimination go along where each vertex has as many unknowns.
-        """
+        """The same part at other positions, or with other values; the pattern goes along where it can."""
         new, known = replace(self, part=part or self.part, X=X), self.__dict__
         if "rigid_motions" in known:
             new.__dict__["rigid_motions"] = self.rigid_motions
@@ -73,7 +70,7 @@ class Equilibrium:
         return new
 
     def same_as(self, other: Equilibrium) -> bool:
-        """Whether both have the same faces, patches, supports, cables, rooms and positions."""
+        """Whether both have the same faces, values, supports and positions."""
         here, there = self.surface, other.surface
         arrays = [(at.X, at.surface.faces, *at.space, *at.surface.cable_edges) for at in (self, other)]
         values = [(surface.patches, surface.rooms, surface.plane) for surface in (here, there)]
@@ -100,18 +97,18 @@ class Equilibrium:
     # At rest
 
     @cached_property
-    def _energy_and_gradient(self) -> tuple[float, Floats]:
+    def _measured(self) -> tuple[float, Floats]:
         return energy_and_gradient(self.surface, self.X, supports=False)
 
     @property
     def energy(self) -> float:
         """E, force·length."""
-        return self._energy_and_gradient[0]
+        return self._measured[0]
 
     @property
     def gradient_with_reactions(self) -> Floats:
         """∇E (n,3), supports not applied, force."""
-        return self._energy_and_gradient[1]
+        return self._measured[1]
 
     @cached_property
     def gradient(self) -> Floats:
@@ -147,7 +144,7 @@ class Equilibrium:
 
     @cached_property
     def jacobian(self) -> Linearisation:
-        """The derivative of r along motions of the vertices; B turns along with the surface."""
+        """J, the derivative of r along motions of the vertices; B turns along with the surface."""
         return linearise(self.surface, self.classes, self.space, self.X, self.gradient)
 
     # Rooms of prescribed volume
@@ -226,8 +223,8 @@ class Equilibrium:
     def unknowns(self) -> tuple[Pattern, Factoriser]:
         """The pattern of A and its factoriser; they stay while each vertex has as many unknowns.
 
-        Where tensions are of different orders, it factorises in units 1/√α of the tension around each
-        unknown, as powers of two: so a patch that pulls far less than another still counts.
+        Where tensions differ by orders, it factorises in units of powers of two near 1/√α around each
+        unknown: so a patch that pulls far less than another still counts.
         """
         pattern, patch = hessian_pattern(self.classes, self.space), self.classes.patch_of_face
         tension, units = self.surface.tensions[np.unique(patch)], None
@@ -251,7 +248,7 @@ class Equilibrium:
 
     @cached_property
     def rigid_motions(self) -> Floats:
-        """(k,2,3) the rigid motions that no support resists; see the function of this name."""
+        """(k,2,3) the rigid motions that no support resists."""
         return rigid_motions(self.surface)
 
     @cached_property
@@ -263,8 +260,7 @@ class Equilibrium:
     def excluded(self) -> Floats:
         """(N,k) the rigid motions, and the unit gradients of the volumes that rooms prescribe.
 
-        Motions that cross all of them deform the surface and keep the volumes. A volume that no motion
-        changes excludes none.
+        Motions across all of them deform the surface and keep the volumes.
         """
         if not self.surface.rooms:
             return self.rigid
