@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.arrays import Bools
+from ..forces.cables import cable_pulls
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.supports import common_point, uncancelled_pressures
@@ -20,7 +21,7 @@ HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets 
 
 def load_name(surface: Surface) -> str:
     """What sentences call the load: "pressure", "net pressure" less snow, "weight", or "load" for several."""
-    if surface.weights.any():
+    if surface.heavy:
         return "load" if surface.net_pressures.any() else "weight"
     return "net pressure" if surface.snows.any() else "pressure"
 
@@ -81,7 +82,7 @@ def load_is_given(surface: Surface) -> bool:
     topo, pinned = surface.topology, surface.pinned
     pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
     normals = [np.dot(plane.normal, surface.plane.normal) for plane, _ in surface.on_planes]
-    varies = surface.rooms or surface.weights.any() or surface.given_supports.on_line
+    varies = surface.rooms or surface.heavy or surface.given_supports.on_line
     if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > 1e-9 for up in normals):
         return False
     alone = pinned.copy()
@@ -112,8 +113,8 @@ def _capacity(surface: Surface, carrying: Bools) -> float:
     if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
         capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
-    ends, tension = surface.cable_edges
-    return capacity + float(tension[supports[ends].sum(axis=1) == 1].sum())
+    pulls = np.abs(cable_pulls(surface, X))
+    return capacity + float(pulls[supports[surface.cable_edges.ends].sum(axis=1) == 1].sum())
 
 
 def coarseness(surface: Surface) -> float:
@@ -213,8 +214,10 @@ def unheld(surface: Surface) -> Unheld | None:
     parts, patch = surface.topology.components, surface.patch_of_face
     resting = surface.held.copy()
     resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
-    falling = np.setdiff1d(parts[surface.faces[surface.weights[patch] > 0.0, 0]], parts[resting])
-    if len(falling) and not (surface.weights < 0.0).any():
+    ends, _, weight = surface.cable_edges
+    heavy = np.append(surface.faces[surface.weights[patch] > 0.0, 0], ends[weight > 0.0, 0])
+    falling = np.setdiff1d(parts[heavy], parts[resting])
+    if len(falling) and not ((surface.weights < 0.0).any() or (weight < 0.0).any()):
         return Unheld(int(np.flatnonzero(parts == falling[0])[0]), falls=True)
     for part, pressed in _scaled(surface):
         if not pressed and surface.tensions[patch[parts[surface.faces[:, 0]] == part]].any():
@@ -253,6 +256,7 @@ def _scaled(surface: Surface) -> list[tuple[int, bool]]:
         held |= along
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
+    held[surface.cable_edges.ends[surface.cable_edges.weight != 0.0]] = True
     loose = []
     for part in np.setdiff1d(parts[used], parts[held]):
         planes = [(surface.plane, given.on_plane), *surface.on_planes]

@@ -44,7 +44,7 @@ def too_long(surface: Surface) -> str:
     In a plane no arc is as wide, so a flat sheet is not at rest there; another one hardly.
     """
     for cable, curve in cable_parts(surface):
-        if curve.closed or len(curve.sheets) != 1:
+        if curve.closed or len(curve.sheets) != 1 or cable.weight:
             continue
         chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
         tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
@@ -118,7 +118,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
 def _plane_of_sail(surface: Surface) -> Floats | None:
     """(3,2) directions of the plane in which a sail of one tension lies at rest; None if there is none."""
     topo, X = surface.topology, surface.vertices[surface.fixed]
-    loads = surface.net_pressures.any() or surface.weights.any() or bool(surface.rooms)
+    loads = surface.net_pressures.any() or surface.heavy or bool(surface.rooms)
     slides = surface.on_plane.any() or bool(surface.on_planes or surface.given_supports.on_line)
     tensions = surface.tensions[surface.patch_of_face]
     outer = topo.boundary_edge[topo.edge_numbers(surface.cable_edges.ends)]

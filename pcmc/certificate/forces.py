@@ -17,7 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..forces.cables import add_cables, directions
+from ..forces import cable_weights, cables
+from ..forces.cables import directions, pull_along
+from ..forces.elements import add_values
 from ..forces.pinching import standing_part
 from ..forces.triangles import add_weights, energy_mesh, measure
 from ..surface import Surface
@@ -32,13 +34,23 @@ SPAN = 1e-9  # of the largest force: what planes leave of the forces that they c
 
 
 def loads(surface: Surface) -> Floats:
-    """(m,3) the force on each triangle: (p - s) A ν of pressure and snow, -w A n of weight."""
+    """(m + c,3) the force on each triangle, (p - s) A ν of pressure and snow, -w A n of weight; and -g ℓ n on
+    each edge of cables."""
     patch, vector = surface.patch_of_face, area_vectors(surface.vertices[surface.faces])
     found = surface.net_pressures[patch, None] * vector
-    if surface.weights.any():
-        weight = surface.weights[patch] * np.linalg.norm(vector, axis=1)
-        found -= weight[:, None] * np.array(surface.plane.normal)
-    return found
+    ends, _, weight = surface.cable_edges
+    heavy = np.append(
+        surface.weights[patch] * np.linalg.norm(vector, axis=1),
+        weight * segment_lengths(surface.vertices, ends),
+    )
+    found = np.concatenate([found, np.zeros((len(ends), 3))])
+    return found - heavy[:, None] * np.array(surface.plane.normal) if surface.heavy else found
+
+
+def load_places(surface: Surface) -> Floats:
+    """(m + c,3) where the forces of ``loads`` act: the middles of the triangles and of the cables' edges."""
+    X = surface.vertices
+    return np.concatenate([X[surface.faces].mean(axis=1), X[surface.cable_edges.ends].mean(axis=1)])
 
 
 def load(surface: Surface) -> float:
@@ -60,7 +72,8 @@ def by_cause(surface: Surface) -> dict[str, Floats]:
     X = surface.vertices
     tension = measure(energy_mesh(surface, pressure=np.zeros(len(surface.patches))), X)[2]
     cable, weight = np.zeros((2, *X.shape))
-    add_cables(surface, X, cable)
+    add_values(cables.elements(surface, X), cable)
+    add_values(cable_weights.elements(surface, X), weight)
     add_weights(surface, X, weight)
     third = area_vectors(X[surface.faces]) / 3.0 * surface.net_pressures[surface.patch_of_face, None]
     pressure = vertex_sums(third, surface.faces, surface.n)
@@ -83,7 +96,7 @@ class Forces:
 
     surface: Surface
     standing: Surface  # the part of it that stands, which the supports hold
-    loads: Floats  # (m,3) on its triangles
+    loads: Floats  # (m + c,3) on its triangles and cable edges
     reactions: Floats  # (n,3) of all supports
     along: Floats  # (n,3) the reactions on lines and sheets
     points: Floats  # (n,3) at single points, and of the cables that end on a line
@@ -248,9 +261,13 @@ def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
 
 
 def cable_ends(surface: Surface) -> list[CableEnd]:
-    """Each end of a part of a cable: the cable, the vertex, and -τ t (3,), the force that holds it there."""
+    """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it."""
     return [
-        (cable, int(pair[0]), -cable.tension * directions(surface.vertices, pair[None])[0][0])
+        (
+            cable,
+            int(pair[0]),
+            -pull_along(surface, cable, pair[:1]) * directions(surface.vertices, pair[None])[0][0],
+        )
         for cable, curve in cable_parts(surface)
         if not curve.closed
         for pair in (curve.vertices[:2], curve.vertices[:-3:-1])

@@ -12,7 +12,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..surface import Plane, Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, EdgeCurve, vertex_kind
-from .forces import Forces, at_both_ends, held_boundary, sheet_pulls
+from .forces import Forces, at_both_ends, held_boundary, load_places, sheet_pulls
 from .tables import middle, names_of
 
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
@@ -118,7 +118,7 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     """
     X, force, columns = acting.standing.vertices, acting.loads, [*FORCE, *MOMENT, *"xyz"]
     about = 0.5 * (X.min(axis=0) + X.max(axis=0))
-    arm = X[acting.standing.faces].mean(axis=1) - about
+    arm = load_places(acting.standing) - about
     rows, moments, places = np.split(supports[columns].to_numpy(float), 3, axis=1)
     loads = np.array([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
     carried = np.array([rows.sum(axis=0), (moments + np.cross(places - about, rows)).sum(axis=0)])

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
-from ..forces.cables import directions
+from ..forces.cables import directions, pull_along
 from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..forces.functional import patch_areas
 from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
@@ -90,31 +90,35 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
     their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in
     the mean over a cable's edges up to what the mesh leaves.
 
-    Columns: ``cable``, ``tension`` (its force) and ``length``; the middle of the part; ``sheet_pull``, the
-    mean of |Σ α n| and ``cable_pull``, that of τ |κ|, force/length; ``force_left`` per length in the motion
-    space, of ``left`` (n,3).
+    Columns: ``cable``, ``tension`` (its force, the largest where a weight g lets it vary) and ``length``; the
+    middle of the part; ``sheet_pull``, the mean of |Σ α n|, with the weight across the cable, and
+    ``cable_pull``, that of (τ + g z) |κ|, force/length; ``force_left`` per length in the motion space, of
+    ``left`` (n,3).
     """
     rows = []
     for cable, curve in cable_parts(surface):
         t, closed = directions(surface.vertices, curve.pairs)[0], curve.closed
-        lengths, sums, along = _along_curve(
-            surface, curve, left[curve.vertices if closed else curve.vertices[1:-1]]
-        )
+        inner = curve.vertices if closed else curve.vertices[1:-1]
+        load = -cable.weight * np.array(surface.plane.normal)
+        lengths, sums, along = _along_curve(surface, curve, left[inner], load - (t @ load)[:, None] * t)
         turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if closed else np.diff(t, axis=0), axis=1)
         weight = 0.5 * (lengths + np.roll(lengths, 1)) if closed else 0.5 * (lengths[1:] + lengths[:-1])
         pulls = {
             "sheet_pull": float(sums @ lengths) / (along["length"] or 1.0),
-            "cable_pull": cable.tension * float(turns.sum()) / (float(weight.sum()) or 1.0),
+            "cable_pull": float(pull_along(surface, cable, inner) @ turns) / (float(weight.sum()) or 1.0),
             "force_left": along.pop("force_left"),
         }
-        rows.append({"cable": cable.name, "tension": cable.tension, **along, **pulls})
+        tension = float(pull_along(surface, cable, curve.vertices).max())
+        rows.append({"cable": cable.name, "tension": tension, **along, **pulls})
     return pd.DataFrame(rows)
 
 
-def _along_curve(surface: Surface, curve: EdgeCurve, left: Floats) -> tuple[Floats, Floats, dict[str, float]]:
-    """Lengths, |Σ α n| (k,) of a curve's edges; its length, middle, largest force left (j,3) per length."""
+def _along_curve(
+    surface: Surface, curve: EdgeCurve, left: Floats, load: Floats | float = 0.0
+) -> tuple[Floats, Floats, dict[str, float]]:
+    """Lengths, |Σ α n + load| (k,) of a curve's edges; its length, middle, largest force left per length."""
     lengths = segment_lengths(surface.vertices, curve.pairs)
-    sums = np.linalg.norm(sheet_pulls(surface, curve.pairs), axis=1)
+    sums = np.linalg.norm(sheet_pulls(surface, curve.pairs) + load, axis=1)
     most = float(np.linalg.norm(left, axis=1).max(initial=0.0)) / (float(lengths.mean()) or 1.0)
     return lengths, sums, {"length": float(lengths.sum()), **middle(surface, curve), "force_left": most}
 
@@ -122,7 +126,7 @@ def _along_curve(surface: Surface, curve: EdgeCurve, left: Floats) -> tuple[Floa
 def cable_end_table(surface: Surface, ends: Iterable[CableEnd]) -> pd.DataFrame:
     """A row per end of each part of a cable: where it is, whether a support holds it, and the force.
 
-    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -τ t, with t the
+    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -(τ + g z) t, t the
     direction from the end along the cable. Where several cables end, their support carries the sum.
     """
     rows = [

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..forces.cables import compressed_cables
 from ..forces.triangles import compressed, effective_tensions
 from ..stability.modes import NEAR, NEUTRAL, Spectrum
 from ..surface import Surface
@@ -214,11 +215,17 @@ def _hidden_stability(f: Findings) -> list[object]:
 
 
 def _compressed(f: Findings) -> str:
-    """Names a patch whose weight leaves no tension somewhere; or empty, as where it grew without bound."""
+    """Names a patch or cable whose weight leaves no tension; or empty, as where it grew without bound."""
     surface = f.surface
-    faces = np.flatnonzero(compressed(surface))
-    if not len(faces) or f.evidence is Evidence.INFLATED:
+    faces, edges = np.flatnonzero(compressed(surface)), np.flatnonzero(compressed_cables(surface))
+    if not len(faces) + len(edges) or f.evidence is Evidence.INFLATED:
         return ""
+    if not len(faces):
+        place = surface.vertices[surface.cable_edges.ends[edges[0]]].mean(axis=0).round(4).tolist()
+        return (
+            f"a cable is under compression in {len(edges)} edges, the first at {place}: its weight leaves"
+            " τ + g z ≤ 0; raise its tension, or put Π lower"
+        )
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
     worst = faces[pull.argmin()]
     name = surface.patches[surface.patch_of_face[worst]].name
@@ -263,6 +270,7 @@ RULES: tuple[Rule, ...] = (
     (Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > SMALL * f.tolerance, _weak_patch),
     (Verdict.SADDLE, lambda f: compressed(f.surface).any(), _compressed),
+    (Verdict.SADDLE, lambda f: compressed_cables(f.surface).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
     (Verdict.NEUTRAL, lambda f: f.rigid > 0, _free_motions),

@@ -17,8 +17,7 @@ from ..certificate import Certificate
 from ..certificate.forces import Forces
 from ..certificate.quantities import dimension_of
 from ..design import Parameter, Target
-from ..design.quantities import MEASURES
-from ..design.targets import NAMED
+from ..design.targets import MEASURES, NAMED
 from ..forces.curvature import curvature_error, mean_curvature
 from ..margins.varied import named
 from ..panelling.distance import difference
