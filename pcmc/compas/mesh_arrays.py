@@ -168,9 +168,8 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
 
 
 def shared_vertices(vertices: Sequence[Vertex], weld: bool) -> tuple[Ints, Ints]:
-    """Which vertices to keep, and the index among them of every vertex.
-
-    Vertices of one key are one, and must lie at one place; with ``weld``, vertices at one place are one.
+    """Which vertices to keep, and the index among them of every vertex: those of one key are one, and must
+    lie at one place; with ``weld``, those at one place are one.
     """
     X = np.array([vertex.point for vertex in vertices])
     if weld:
@@ -209,9 +208,8 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
 
 
 def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) -> tuple[Cable, ...]:
-    """A cable for each value of the edges' attribute ``cable``; their attribute ``tension`` is its force.
-
-    ``names`` lists cables that come first.
+    """A cable for each value of the edges' attribute ``cable``, those in ``names`` first; their attribute
+    ``tension`` is its force.
     """
     edges: dict[str, set[tuple[int, int]]] = {name: set() for name in names}
     tensions: dict[str, float] = {}

@@ -1,7 +1,5 @@
-"""Surface to COMPAS meshes, one per patch, and back.
-
-The names of attributes are those of COMPAS packages where they have one: ``is_support``, and ``rx``, ``ry``,
-``rz`` for reactions.
+"""Surface to COMPAS meshes, one per patch, and back; names of attributes are those of COMPAS packages where
+they have one: ``is_support``, and ``rx``, ``ry``, ``rz`` for reactions.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
-"""The reader of Surface Evolver datafiles.
-
-It takes datafiles as ``evolver`` writes them, those that the program's ``dump`` writes, and others whose
-sections list elements by number.
+"""The reader of Surface Evolver datafiles: those that ``evolver`` and the program's ``dump`` write, and
+others whose sections list elements by number.
 """
 
 from __future__ import annotations
@@ -250,9 +248,8 @@ def _cables(
 def _pressures(
     file: _Datafile, face_ids: Ints
 ) -> tuple[Floats, dict[tuple[str, float], Ints], tuple[str, ...]]:
-    """(m,) pressure along each face's normal: the sum over the bodies on its two sides.
-
-    And the bodies of prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
+    """(m,) pressure along each face's normal: the sum over the bodies on its two sides; and the bodies of
+    prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
     """
     pressure = np.zeros(len(face_ids))
     prescribed: dict[tuple[str, float], Ints] = {}
@@ -299,8 +296,7 @@ def _planes(
 ) -> tuple[Plane | None, tuple[tuple[Plane, Bools], ...], Floats]:
     """Π, the other planes with their vertices, and the file's origin; ``support`` is changed to fit.
 
-    Π is constraint 1, or the first that sliding vertices lie on; sliding vertices on others alone are free of
-    it.
+    Π is constraint 1, or the first that sliding vertices lie on; those on others alone are free of it.
     """
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
     header = _Section(file.header, 1, file["top"].known)

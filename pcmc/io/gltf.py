@@ -1,11 +1,8 @@
-"""glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
+"""glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in metres and single precision, y up.
 
-In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Lengths are metres. Single precision
-keeps seven digits only, so a surface far from the origin, as in a survey's coordinates, is written about its
-middle, and the nodes place it. Each patch has a material of its name, in its colour. With ``colour`` the
-materials are white, and the vertices have the colours of a scalar; the metadata note its limits.
-Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane and walls without
-height are metadata of the scene.
+A surface far from the origin is written about its middle, and the nodes place it. Each patch has a material
+of its name, in its colour, or white where the vertices have the colours of a scalar. Supports and scalars are
+attributes of vertices; tensions, pressures, plane and walls without height are metadata of the scene.
 """
 
 from __future__ import annotations
@@ -73,10 +70,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 
 
 def read(path: Path) -> MeshData:
-    """Meshes as patches, by the names of their nodes.
-
-    trimesh believes that parts are files, and that arrays are not larger than the bytes there are.
-    """
+    """Meshes as patches, by the names of their nodes. trimesh believes the names and counts in a file."""
     trimesh, content = load_library("trimesh"), path.read_bytes()
     size, items = len(content), 0
     if path.suffix.lower() == ".glb":

@@ -1,10 +1,8 @@
 """IFC4 (.ifc), for building information models: a roof of one element per patch, with its properties.
 
-Project, site, building, storey and one IfcRoof. Its parts are an IfcSlab of type ROOF for each patch and an
-IfcWall for each wall, with an IfcTriangulatedFaceSet in double precision, a colour, and the property set
-``Pcmc_Patch``; and an IfcTendon for each cable, with its axis, its force, and ``Pcmc_Cable``. The roof has
-``Pcmc_Certificate`` and, so that pcmc can read the file, ``Pcmc_Surface``. The same surface gives the same
-bytes: the content makes the identifiers, and the time stamp is always the same.
+The parts of an IfcRoof are an IfcSlab of type ROOF for each patch and an IfcWall for each wall, as
+IfcTriangulatedFaceSet, and an IfcTendon for each cable. pcmc reads ``Pcmc_Surface`` back. The same surface
+gives the same bytes: the content makes the identifiers, and the time stamp is always the same.
 """
 
 from __future__ import annotations
@@ -221,10 +219,7 @@ def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
 
 
 def assigned_units(add: Callable[..., Any], units: Units) -> Any:
-    """Units of length and angle; areas and volumes in m², m³; and the units of tensions and pressures.
-
-    ``add`` makes an entity.
-    """
+    """The units of length, angle, area, volume, tension and pressure; ``add`` makes an entity."""
     length = _unit(add, "LENGTHUNIT", "METRE", units.length, (1, 0, 0), length_factor(units.length, "m"))
     kinds = {"AREAUNIT": "SQUARE_METRE", "VOLUMEUNIT": "CUBIC_METRE", "PLANEANGLEUNIT": "RADIAN"}
     listed = [length, *(add("IfcSIUnit", UnitType=kind, Name=name) for kind, name in kinds.items())]

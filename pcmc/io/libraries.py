@@ -1,9 +1,7 @@
 """Libraries that read and write formats: imported on demand, their errors translated.
 
 VTK, rhino3dm, IfcOpenShell and MeshLab believe the counts and offsets in a file, so bad files crash them, or
-fill the memory; to check all beforehand is to parse the file a second time. So they read in a process, with
-limits of time and, on Linux, of memory. Starting it takes as long as importing PyVista here would. It is kept
-for the next file, and ends with this process.
+fill the memory. So they read in a process of limited time and, on Linux, memory, kept for the next file.
 """
 
 from __future__ import annotations
@@ -66,8 +64,7 @@ def unreadable(kind: str, error: Exception) -> FileError:
 
 
 def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
-    """The plain values that a function in a script of this package, such as io/reading_scripts.py, returns.
-
+    """The plain values that a function in a script of this package, such as io/reading_scripts.py, returns;
     FileError if the library refuses the file, crashes or takes too long.
     """
     place, size = Path(__file__).parents[1] / script, path.stat().st_size

@@ -1,7 +1,6 @@
 """One line of JSON with what formats of plain meshes have no place for: patches, plane, cables, rooms, ...
 
-Vertices are named by their number where the mesh keeps its vertices, or by their position where the file
-has a mesh per patch.
+Vertices are named by their number where the mesh keeps its vertices, by position where each patch has a mesh.
 """
 
 from __future__ import annotations
@@ -36,14 +35,10 @@ def metadata_text(
     counts: tuple[int, int] | None = None,
     bare: Collection[str] = (),
 ) -> str:
-    """Everything of a surface but its mesh and supports on Π, as JSON: a format's comment or metadata.
+    """Everything of a surface but its mesh and supports on Π, as JSON.
 
-    Parameters
-    ----------
-    joined : whether vertices keep their numbers in the file.
-    without : the parts that the format holds itself.
-    counts : numbers of vertices and faces in the file, if not those of the surface.
-    bare : the patches whose tension and pressure of 1 stand for none.
+    ``joined``: vertices keep their numbers in the file; ``without``: the parts that the format holds itself;
+    ``counts``: of vertices and faces in the file; ``bare``: patches without tension and pressure.
     """
 
     def where(chosen: Ints | Bools) -> Any:
@@ -98,7 +93,7 @@ class Metadata:
     def of_meshes(self, meshes: Iterable[tuple[str, Any, Any]], default: str = "", **more: Any) -> MeshData:
         """Meshes of a name, points (n,3) and triangles (m,3) each; those of one name are one patch.
 
-        ``default`` is the name of the only patch, if it is to have another.
+        ``default`` names the only patch.
         """
         X, F, named, start = [], [], list[str](), 0
         for name, points, faces in meshes:
@@ -146,10 +141,7 @@ def _damaged(text: str) -> FileError:
 
 
 def with_parts(data: MeshData) -> MeshData:
-    """A file's mesh with the cables, rooms, lines and planes of its metadata.
-
-    Those whose vertices are no longer there are left out, with a note; what they hold stays fixed.
-    """
+    """The mesh with the cables, rooms, lines and planes of its metadata; a note on those that do not fit."""
     try:
         return _with_parts(data) if data.parts else data
     except DAMAGED:
@@ -162,10 +154,9 @@ def _with_parts(data: MeshData) -> MeshData:
     group: Ints = keep
 
     def groups(where: Any, what: str, exact: bool = False) -> Ints | None:
-        """The groups of vertices at one place that are meant, by number or position.
+        """The groups of vertices at a place, by number or position; None, ``what`` being lost, if one is gone.
 
-        None, and ``what`` is lost, if one is gone. With ``exact`` the vertices get the positions of the
-        metadata, to the last digit.
+        With ``exact`` the vertices get the positions of the metadata, to the last digit.
         """
         nonlocal X, keep, group
         given = np.array(where)

@@ -1,10 +1,8 @@
 """The native format (.pcmc): everything there is to a surface, to the last bit.
 
-A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
-``patch_of_face``, ``support``; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
-certificate, and ``meta``, a JSON text with the format's version, the description of ``metadata``, the curves
-with their vertices and the parameters of these, and the rest of the certificate, its tables as lists of rows.
-Up to version 5 cables, lines and planes were arrays.
+A zip archive of NumPy arrays that ``numpy.load`` opens: ``vertices``, ``faces``, ``patch_of_face``,
+``support``, ``scalar <name>``, ``certificate <name>``, and ``meta``, a JSON text with the version, the
+description of ``metadata``, the curves and the rest of the certificate.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """A mesh per patch, as formats and trimesh have them: those of a surface, and back to one mesh.
 
-Below a junction on Π the triangles of a wall have no area, and its vertices lie on the junction. Such meshes
-cannot hold them, and a reader that joins patches by position would merge them. So the file has the meshes
-without them and a text with all walls; the reader puts these walls back.
+Below a junction on Π a wall's triangles have no area, and readers that join patches by position would merge
+its vertices. So the file has the meshes without them, and a text from which the reader puts the walls back.
 """
 
 from __future__ import annotations
@@ -75,10 +74,7 @@ def encode_walls(surface: Surface, shown: Surface) -> str:
 
 
 def restore_walls(data: MeshData) -> MeshData:
-    """The same, its patches joined, with the walls of ``data.walls`` in place of those in the meshes.
-
-    If the surface has changed since, the walls are left out, with a note.
-    """
+    """The same, joined, with the walls of ``data.walls``; without them, with a note, if it has changed."""
     if data.walls is None:
         return data
     walls, above, shown = _parsed(data.walls)

@@ -1,9 +1,8 @@
 """Stanford PLY (.ply): written binary in double precision, read in any form.
 
-Faces carry ``patch``, vertices ``support`` (0 free, 1 sliding, 2 fixed) and both the scalars, as
-properties; names, tensions, pressures and plane are a comment. The usual libraries lose double precision
-and properties (VTK), cannot read properties of faces (meshio), or refuse polygons of different sizes in
-binary files and accept a text file that is cut off (trimesh).
+Faces carry ``patch``, vertices ``support`` and both the scalars, as properties; the rest is a comment. The
+usual libraries lose precision and properties (VTK), cannot read properties of faces (meshio), or refuse
+polygons of different sizes in binary files and accept a text file that is cut off (trimesh).
 """
 
 from __future__ import annotations

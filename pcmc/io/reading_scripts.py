@@ -1,7 +1,6 @@
 """What VTK, rhino3dm, IfcOpenShell and MeshLab do in a process of their own: read files, and repair.
 
-``libraries`` loads this file by its path, so it imports nothing of pcmc, and each function only the library
-that it needs, and only those parts of VTK that read. A path goes in, plain values come out.
+``libraries`` loads this file by its path: it imports nothing of pcmc, and each function only its library.
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-"""Meshes of other programs through MeshLab (pymeshlab, licence GPL): it reads formats, and repairs them.
-
-It reads .off, .3ds, .dae and .x3d, which are not written.
+"""Meshes of other programs through MeshLab (pymeshlab, licence GPL), which repairs them and also reads .off,
+.3ds, .dae and .x3d.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
-Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds
-on the layers "fixed" and "sliding". Each cable is polylines on a layer "cable NAME". Ridges, rims and wall
-lines are curves on layers of their own, for drawing; reading leaves them out. Scalars are lost.
+Metadata are the layers' user text; supports are point clouds on the layers "fixed" and "sliding". Each cable
+is polylines on a layer "cable NAME". Ridges, rims and wall lines are curves, which reading leaves out.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""STL (.stl): written as text with one solid per patch, read in either form.
+"""STL (.stl): written as text with one solid per patch, read in either form: only triangles and names.
 
-It holds only triangles and names: supports, tensions, pressures and scalars are lost. Programs read the
-coordinates in single precision, seven digits. So a surface far from the origin, as in a survey's
-coordinates, is written about its middle, which the format has no place for.
+Programs read the coordinates in single precision. So a surface far from the origin is written about its
+middle, which the format has no place for.
 """
 
 from __future__ import annotations

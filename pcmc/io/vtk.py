@@ -1,7 +1,6 @@
 """VTK's XML files (.vtp, .vtu), which ParaView reads: only the certificate is lost.
 
-Cells carry ``patch``, points ``support`` (0 free, 1 sliding, 2 fixed), both the scalars; names,
-tensions, pressures and plane are field data.
+Cells carry ``patch``, points ``support``, both the scalars; the metadata are field data.
 """
 
 from __future__ import annotations

@@ -26,10 +26,7 @@ Path = str | os.PathLike[str]
 
 
 def new(width: float, height: float, pad: float = 4.0) -> Any:
-    """A figure of the given size in pixels, drawn by Agg; no global state.
-
-    Matplotlib's constrained layout places its parts, ``pad`` pixels apart.
-    """
+    """A figure of a size in pixels, drawn by Agg, its parts ``pad`` pixels apart; no global state."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -53,12 +50,9 @@ def grid(figure: Any, count: int, columns: int, **options: Any) -> tuple[list[An
 
 
 def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
-    """Choose the figure's height so that each row of axes has its ratio of height to width.
+    """Choose the figure's height so that each row of axes has its ratio of height to width; end the layout.
 
-    Parameters
-    ----------
-    ratios : height / width by axes, one of each row. Titles, labels, scales and legends take the
-        space that the layout finds for them. The layout is then final: nothing moves any more.
+    ``ratios`` are height / width by axes, one of each row; titles, scales and legends keep their space.
     """
     _as_written(figure)
     for _ in range(4):
@@ -73,10 +67,7 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
 
 
 def _as_written(figure: Any) -> None:
-    """Draw the names in a figure as they are, and no mathematics between two signs $.
-
-    Numbers at axes have no text yet, and are mathematics once they are drawn: powers of ten.
-    """
+    """Draw names as they are, and no mathematics between two signs $; powers of ten at axes come later."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
@@ -98,9 +89,8 @@ def style(axes: Any) -> Any:
 
 
 def overlap_style(k: int, count: int) -> dict[str, Any]:
-    """Line style of curve ``k`` of ``count`` by which curves that lie on each other all stay visible.
-
-    The first is wide and solid, the others are thinner and thinner, dashed in each other's gaps.
+    """Line style of curve ``k`` of ``count`` by which curves that lie on each other all stay visible: wide
+    and solid, then thinner and thinner, dashed in each other's gaps.
     """
     if k == 0:
         return {"linewidth": 2.6, "linestyle": "-"}
@@ -116,8 +106,7 @@ def check_suffix(path: Path) -> None:
 def finish(figure: Any, path: Path | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG, SVG or PDF if there is a path.
 
-    The file has no date and no program's name: the same figure gives the same bytes. In SVG and PDF, text
-    and curves are lines, and surfaces are pictures in them.
+    No date and no program's name: the same figure gives the same bytes. In SVG and PDF, text is lines.
     """
     _as_written(figure)
     figure.canvas.draw()

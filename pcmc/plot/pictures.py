@@ -133,8 +133,7 @@ def compose(
 ) -> Image:
     """The picture of all drawings; the options are those of ``draw`` and ``panel``.
 
-    Points ``around`` (k,2) have a place in it, too, as has a text at its ``foot``; ``overlay`` draws on the
-    last of the axes.
+    Points ``around`` (k,2) and a text at the ``foot`` have a place; ``overlay`` draws on the last axes.
     """
     points = [np.concatenate([drawing.points(one_scale), *around]) for drawing in drawings]
     frames = frames_of(points, columns, width, one_scale)

@@ -22,9 +22,8 @@ MANY = 40_000  # triangles from which pyvista is faster than matplotlib, its imp
 
 
 def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto") -> Image:
-    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner.
-
-    ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
+    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner, ``scale``
+    pixels per unit of length, ``size`` (w, h) in pixels.
     """
     from PIL import Image as Pillow
 

@@ -1,7 +1,5 @@
-"""Write a structural model as the input file of CalculiX (``.inp``, in the language of Abaqus).
-
-Cables are trusses with the tension of the cable. Beams would bend: beside a held end over a length √(EI/τ),
-which a thick cable feels over a whole bay.
+"""Write a structural model as the input file of CalculiX (``.inp``, in the language of Abaqus). Cables are
+trusses: a beam would bend beside a held end over a length √(EI/τ), for a thick cable a whole bay.
 """
 
 from __future__ import annotations

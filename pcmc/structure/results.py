@@ -26,8 +26,7 @@ FAR = 1e-4  # of the size: a node farther from its vertex belongs to another sur
 class StepResults:
     """The end of one step of the analysis. Vertices and faces that are not in the model have NaN.
 
-    Stresses from an .frd file are the mean of a triangle's corners, where all elements around have been
-    averaged, those of other patches too.
+    Stresses from an .frd file are the mean of a triangle's corners, averaged over all elements around each.
     """
 
     name: str  # of the step
