@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from .. import mean_curvature
 from ..base import validate
 from ..base.errors import FileWarning, PcmcError, SurfaceError
-from ..certificate.reactions import reactions
-from ..forces.curvature import mean_curvature
-from ..forces.pinching import standing_part
+from ..certificate.reactions import support_forces
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
@@ -193,7 +192,7 @@ def _plain(value: Any) -> dict[str, Any]:
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
-    support, standing = support_of(surface, planes=True), standing_part(surface).surface
+    support, acting = support_of(surface, planes=True), support_forces(surface)
     guide = np.full(surface.n, None)
     for number, (_, along) in enumerate(surface.given_supports.on_line):
         guide[along] = number
@@ -201,7 +200,7 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     for number, (_, mask) in enumerate(surface.on_planes):
         for vertex in np.flatnonzero(mask):
             planes[vertex].append(number)
-    curvature = mean_curvature(standing, "variational").tolist()
+    curvature = mean_curvature(acting.standing, "variational").tolist()
     columns: dict[str, list[Any]] = {
         **dict(zip("xyz", surface.vertices.T.tolist(), strict=True)),
         "is_support": (support == FIXED).tolist(),
@@ -209,6 +208,6 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
         GUIDE: guide.tolist(),
         PLANES: planes,
         "mean_curvature": [H if H == H else None for H in curvature],  # JSON has no NaN
-        **dict(zip(("rx", "ry", "rz"), reactions(standing).T.tolist(), strict=True)),
+        **dict(zip(("rx", "ry", "rz"), acting.forces.T.tolist(), strict=True)),
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

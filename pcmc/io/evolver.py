@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, format_rows
 from ..base.errors import FileError
 from ..forces.flat_pieces import add_plane_volumes, flat_pieces
 from ..forces.rooms import room_pressures, room_volumes
@@ -28,7 +28,7 @@ from ..surface import Surface
 from .evolver_reading import ROUNDING, read
 from .formats import Content
 from .mesh_data import FREE, SLIDING, support_of
-from .text import escaped, format_rows
+from .text import escaped
 
 __all__ = ["read", "write"]
 

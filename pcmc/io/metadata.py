@@ -154,7 +154,7 @@ def _with_parts(data: MeshData) -> MeshData:
     group: Ints = keep
 
     def groups(where: Any, what: str, exact: bool = False) -> Ints | None:
-        """The groups of vertices at a place, by number or position; None, ``what`` being lost, if one is gone.
+        """The groups of vertices at a place, by number or position; None, and ``what`` lost, if one is gone.
 
         With ``exact`` the vertices get the positions of the metadata, to the last digit.
         """

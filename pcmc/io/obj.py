@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, format_rows
 from ..base.errors import FileError
 from ..base.validate import parsed
 from ..surface import Surface
@@ -19,7 +19,7 @@ from .formats import Content
 from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import triangulate
-from .text import escaped, format_rows, numbers
+from .text import escaped, numbers
 
 MARK = "# pcmc "
 SPECIAL = "\\"

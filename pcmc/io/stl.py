@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.arrays import format_rows
 from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.geometry import area_vectors, file_origin
@@ -19,7 +20,6 @@ from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata
 from .patch_meshes import from_scene
-from .text import format_rows
 
 SPECIAL = re.compile("solid|vertex", re.I)  # readers look for these words, in names too
 FACET = (

@@ -20,15 +20,6 @@ LONGEST = 500  # characters: Python's parser cannot bear any depth of brackets a
 Fail = Callable[[str], FileError]
 
 
-def format_rows(template: str, *columns: np.ndarray) -> str:
-    """The template filled with each row of the columns; ``%r`` writes a float exactly.
-
-    >>> format_rows("v %r %d\\n", np.array([0.1, 2.0]), np.array([3, 4]))
-    'v 0.1 3\\nv 2.0 4\\n'
-    """
-    return "".join(template % row for row in zip(*(column.tolist() for column in columns), strict=True))
-
-
 def numbers(words: Sequence[str], kind: type = np.float64) -> Any:
     """The numbers in words; ValueError for another word, and for 1_000, a number to Python alone."""
     if "_" in "".join(words):

@@ -17,8 +17,6 @@ from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, fit_height, g
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..continuation import Branch
-
 SCALES = ("linear", "log")
 MARKERS = "osD^vPX"
 EVENT_MARKERS = {"fold": "o", "index": "D", "contact": "x"}
@@ -202,7 +200,7 @@ def heatmap(
 
 
 def diagram(
-    branches: Mapping[str, Branch],
+    branches: Mapping[str, Any],
     path: Path | None = None,
     *,
     x: str = "parameter",
@@ -213,7 +211,7 @@ def diagram(
     width: int = 900,
     height: int = 640,
 ) -> Image:
-    """Branches by label: columns y against x, solid where stable (index 0), dashed where not.
+    """Branches of ``pcmc.follow`` by label: columns y against x, solid where stable, dashed where not.
 
     Folds, changes of index and changes of contact are marked.
     """
@@ -239,7 +237,7 @@ def diagram(
     return finish(figure, path)
 
 
-def _pieces(branch: Branch, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:
+def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:
     """The branch cut where its stability changes; events are points of it too."""
     columns = ["arclength", x, y]
     events = branch.events[columns].assign(index=branch.events.index_after)

@@ -25,7 +25,7 @@ from .raster import paint
 from .scene import Camera, Rendering, mean_edge, scene, view_of
 
 if TYPE_CHECKING:
-    from ..panelling import Panels
+    from .. import Panels
 
 ViewName = str | tuple[float, float]
 

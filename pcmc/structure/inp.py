@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, format_rows
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
-from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from .loads import Step
 from .model import Material, StructuralModel
