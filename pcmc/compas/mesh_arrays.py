@@ -81,9 +81,7 @@ class WholeMesh(NamedTuple):
     planes: tuple[Plane, ...] = ()  # besides Π, that vertices slide on
     rooms: tuple[Room, ...] = ()
     cables: tuple[str, ...] = ()  # their names in order
-    curves: tuple[
-        HeldCurve, ...
-    ] = ()  # that held vertices were drawn on; their vertices are keys of the meshes
+    curves: tuple[HeldCurve, ...] = ()  # that held vertices were drawn on, by their keys
 
 
 def read_whole(named: Mapping[str, Any]) -> WholeMesh:
@@ -112,13 +110,10 @@ def read_whole(named: Mapping[str, Any]) -> WholeMesh:
             tuple(map(HeldCurve.from_plain, values.get("curves", ()))),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({reason}); without it Π is z = 0")
+        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({_reason(error)}); without it Π is z = 0")
 
 
 class Vertex(NamedTuple):
-    """A vertex of a mesh that a face uses."""
-
     mesh: str
     key: int
     point: list[float]
@@ -231,16 +226,18 @@ def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) 
 
 
 def refuse(what: str, name: str, problem: str) -> NoReturn:
-    """Raise the error about a mesh."""
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
 
 
 def damaged_mesh(error: Exception) -> SurfaceError:
     """The error for a mesh that is wrong in a way that none checks."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-    return SurfaceError(f"meshes: one is damaged ({reason}); check it with mesh.is_valid()", what="meshes")
+    text = f"meshes: one is damaged ({_reason(error)}); check it with mesh.is_valid()"
+    return SurfaceError(text, what="meshes")
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:120]
 
 
 def _is_index(value: Any) -> bool:
-    """Whether it is a whole number ≥ 0."""
     return isinstance(value, int | np.integer) and int(value) >= 0

@@ -210,7 +210,6 @@ class LoopbackServer(ThreadingMixIn, Server):
             return json.dumps(answer, cls=DataEncoder)
 
     def _call(self, name: str, text: str = "") -> Any:
-        """Call a function with the arguments in a text."""
         if name not in self._offered:
             raise OptionError(unknown("function", name, self._offered), what="function", found=name)
         given, function = json.loads(text, cls=MeshDecoder), self._offered[name]
@@ -225,7 +224,6 @@ class MeshDecoder(DataDecoder):
     """Decodes meshes. Any other object stays a dict: COMPAS would import the module that it names."""
 
     def object_hook(self, o: dict[str, Any]) -> Any:
-        """The mesh that a dict describes, or the dict."""
         if MESH not in [o.get("dtype"), *(o.get("inheritance") or ())]:
             return o
         try:

@@ -48,7 +48,6 @@ DEFINE FACET ATTRIBUTE patch INTEGER
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """The datafile of a surface."""
     patches = list(enumerate(surface.patches, 1))
     weights = np.unique(surface.weights[surface.weights != 0.0]).tolist()
     face_tags = []

@@ -34,7 +34,6 @@ class Format:
 
     @property
     def functions(self) -> Any:
-        """The module that reads and writes the format."""
         return import_module(f".{self.module}", __package__)
 
     def carried(self, surface: Surface, scalars: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -98,7 +97,6 @@ READ_ONLY = {suffix: Format("repairing") for suffix in (".off", ".3ds", ".dae", 
 
 
 def format_of(path: Path, known: Mapping[str, Format]) -> Format:
-    """The format of a path by its suffix."""
     suffix = path.suffix.lower()
     if suffix not in known:
         readable = f"{suffix} files are read only; " if suffix in READ_ONLY else ""

@@ -32,7 +32,6 @@ ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
     for name, values in content.scalars.items():
@@ -62,11 +61,11 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     scene.metadata["pcmc"] = content.metadata
     if content.walls is not None:
         scene.metadata[WALLS] = content.walls
+    library = trimesh.exchange.gltf
     if path.suffix.lower() == ".glb":
-        path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
+        path.write_bytes(library.export_glb(scene, include_normals=True))
     else:
-        files = trimesh.exchange.gltf.export_gltf(scene, embed_buffers=True, include_normals=True)
-        path.write_bytes(files["model.gltf"])
+        path.write_bytes(library.export_gltf(scene, embed_buffers=True, include_normals=True)["model.gltf"])
 
 
 def read(path: Path) -> MeshData:
@@ -96,8 +95,7 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=str(error)) from None
     mesh = from_scene(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_")}
+    held = support_kinds(named.pop(SUPPORT[1:])) if SUPPORT in mesh.scalars else None
     scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}
-    support = mesh.scalars.get(SUPPORT)
-    held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))

@@ -83,21 +83,17 @@ class _Model:
         return self.add(kind, GlobalId=compress(uuid.uuid5(SPACE, f"{self.digest} {role}").hex), **values)
 
     def axes(self, point: Iterable[float] = (0.0, 0.0, 0.0)) -> Any:
-        """Axes at a point, not turned."""
         origin = self.add("IfcCartesianPoint", Coordinates=tuple(map(float, point)))
         return self.add("IfcAxis2Placement3D", Location=origin)
 
     def placement(self, relative: Any = None, point: Iterable[float] = (0.0, 0.0, 0.0)) -> Any:
-        """A place without rotation."""
         axes = self.axes(point)
         return self.add("IfcLocalPlacement", PlacementRelTo=relative, RelativePlacement=axes)
 
     def aggregate(self, role: str, whole: Any, parts: list[Any]) -> None:
-        """Parts of a whole."""
         self.rooted("IfcRelAggregates", role, RelatingObject=whole, RelatedObjects=parts)
 
     def add_roof(self) -> Any:
-        """The roof in its storey."""
         context = self.add(
             "IfcGeometricRepresentationContext",
             ContextType="Model",

@@ -29,7 +29,6 @@ _processes: dict[int, ChildProcess] = {}  # by the process that started it: a fo
 
 
 def load_library(name: str, extra: str = "files") -> Any:
-    """The module of that name, or MissingExtra."""
     logging.getLogger(name).addHandler(SILENT)
     try:
         return import_module(name)
@@ -91,7 +90,6 @@ def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
 
 @atexit.register
 def end_process() -> None:
-    """End the process that reads for this one."""
     process = _processes.pop(os.getpid(), None)
     if process is not None:
         process.close()

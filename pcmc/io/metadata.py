@@ -72,8 +72,6 @@ def row_of(patch: Patch) -> tuple[object, ...]:
 
 @dataclass(frozen=True)
 class Metadata:
-    """The same read back."""
-
     patches: Mapping[str, Patch | None] = field(default_factory=dict)  # by name; bare ones are None
     plane: Plane | None = None
     counts: tuple[int, int] | None = None

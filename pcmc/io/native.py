@@ -59,7 +59,6 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 
 
 def read(path: Path) -> MeshData:
-    """All of it."""
     with translated_errors("pcmc"), zipfile.ZipFile(path) as packed:
         size, given = sum(item.file_size for item in packed.infolist()), path.stat().st_size
         most = INFLATED * given + ROOM
@@ -71,31 +70,25 @@ def read(path: Path) -> MeshData:
         meta = json.loads(str(arrays.pop("meta")))
         if not isinstance(meta, dict) or not isinstance(meta["certificate"], dict):
             raise FileError(f"its description is damaged: {str(meta)[:60]!r}", where="meta")
-        if meta["format"] != FORMAT:
-            text = f"expected the format {FORMAT!r}, found {meta['format']!r}"
-            raise FileError(text, where="format", found=meta["format"], expected=FORMAT)
-        newer = meta["version"]
-        if newer > VERSION:
-            text = f"written by a newer pcmc (format {newer}, this one reads up to {VERSION}); update pcmc"
-            raise FileError(text, where="version", found=newer, expected=VERSION)
+        kind, version = meta["format"], meta["version"]
+        if kind != FORMAT:
+            text = f"expected the format {FORMAT!r}, found {kind!r}"
+            raise FileError(text, where="format", found=kind, expected=FORMAT)
+        if version > VERSION:
+            text = f"written by a newer pcmc (format {version}, this one reads up to {VERSION}); update pcmc"
+            raise FileError(text, where="version", found=version, expected=VERSION)
         metadata = parse_metadata(meta["description"])
-        curves = _curves(meta.get("curves", ()), len(arrays["vertices"]))
-        parts = {**_older_parts(meta, arrays), **metadata.parts}
-        return metadata.mesh_data(
-            arrays.pop("vertices"),
-            arrays.pop("faces"),
-            arrays.pop("patch_of_face"),
-            list(metadata.patches),
-            support=arrays.pop("support"),
-            parts=parts,
-            curves=curves,
-            scalars=_under("scalar ", arrays),
-            certificate={**meta["certificate"], **_under("certificate ", arrays)},
-        )
+        X, F, patch, support = (arrays[key] for key in ("vertices", "faces", "patch_of_face", "support"))
+        about: dict[str, Any] = {
+            "parts": {**_older_parts(meta, arrays), **metadata.parts},
+            "curves": _curves(meta.get("curves", ()), len(X)),
+            "scalars": _under("scalar ", arrays),
+            "certificate": {**meta["certificate"], **_under("certificate ", arrays)},
+        }
+        return metadata.mesh_data(X, F, patch, list(metadata.patches), support=support, **about)
 
 
 def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:
-    """The curves of a file with n vertices."""
     curves = list[HeldCurve]()
     try:
         for one in map(HeldCurve.from_plain, rows):

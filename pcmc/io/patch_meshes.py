@@ -115,15 +115,8 @@ def _parsed(text: str) -> tuple[MeshData, Bools, int]:
     """The walls, which of their vertices lie on other patches, and how many of their faces are shown."""
     try:
         values = json.loads(text)
-        walls = checked(
-            MeshData(
-                np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
-                np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
-                np.array(values["patch"], dtype=np.int64),
-                tuple(Patch(*p) for p in values["patches"]),
-                np.array(values["support"], dtype=np.int8),
-            )
-        )
+        X, F, patch, support = (values[key] for key in ("vertices", "faces", "patch", "support"))
+        walls = checked(MeshData(X, F, patch, tuple(Patch(*p) for p in values["patches"]), support))
         above, shown = np.array(values["above"], dtype=bool), int(values["shown"])
         if len(above) != len(walls.vertices):
             raise ValueError

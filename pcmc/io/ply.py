@@ -34,7 +34,6 @@ NAMES = {"u1": "uchar", "i4": "int", "f8": "double"}
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """Little-endian binary."""
     vertex = {c: surface.vertices[:, d].astype("<f8") for d, c in enumerate("xyz")}
     vertex["support"] = support_of(surface).astype("u1")
     face = {"patch": surface.patch_of_face.astype("<i4")}

@@ -272,7 +272,6 @@ def _vertices(mesh: Any) -> Any:
 
 
 def _flat(X: Any, F: Any) -> Any:
-    """(m,) triangles without area."""
     corner = X[F]
     edges = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)
     return np.linalg.norm(_area_vectors(X, F), axis=1) <= FLAT * edges.max(axis=1) ** 2

@@ -59,11 +59,10 @@ def repair(
 ) -> Repaired:
     """Repair the mesh in a file, which stays as it is.
 
-    Polygons are cut into triangles; vertices nearer to each other than ``weld`` become one; repeated
-    triangles, those without area and those at points that are no numbers are left out; edges with three or
-    more triangles of one patch are split (with triangles of three patches they are junctions and stay);
-    triangles of a patch are turned alike, towards z; small holes within a patch are closed. Groups of the
-    file stay patches.
+    Groups stay patches. Polygons are cut into triangles; vertices nearer to each other than ``weld`` become
+    one; repeated triangles, those without area and those at points that are no numbers are left out; edges
+    with three or more triangles of one patch are split (with triangles of three patches they are junctions
+    and stay); triangles of a patch are turned alike, towards z; small holes within a patch are closed.
 
     Parameters
     ----------
@@ -83,7 +82,7 @@ def repair(
 
     >>> import tempfile
     >>> mesh = Path(tempfile.mkdtemp()) / "twice.obj"
-    >>> _ = mesh.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\nf 2 3 1\\n")
+    >>> _ = mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 1\n")
     >>> print(repair(mesh))
     1 repeated triangles left out
     """

@@ -157,7 +157,6 @@ def read(path: Path) -> MeshData:
 
 
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:
-    """Vertices at which a support's point lies."""
     support = np.full(len(X), FREE, dtype=np.int8)
     tree, reach = cKDTree(X), TOLERANCE * bounding_size(X)
     for kind in (SLIDING, FIXED):

@@ -27,7 +27,6 @@ SUPPORT = "support"
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """One layer."""
     try:
         from pxr import Sdf, Usd, UsdGeom, Vt
     except ImportError:

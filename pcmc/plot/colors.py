@@ -38,7 +38,6 @@ class ColorScale:
         return colors
 
     def bar(self, figure: Any, axes: Sequence[Any], label: str) -> None:
-        """Draw the scale below the axes."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
@@ -58,7 +57,6 @@ def color_bar(figure: Any, mappable: Any, axes: Sequence[Any], label: str) -> An
 
 
 def color_map(name: str) -> Any:
-    """The matplotlib colour map of this name."""
     try:
         from matplotlib import colormaps
     except ImportError:
@@ -117,7 +115,6 @@ def _visible(image: Image, color: Floats) -> bool:
 
 
 def add_legend(figure: Any, pictures: Iterable[Picture]) -> None:
-    """The legend at the foot of the figure."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch as Swatch
 

@@ -169,12 +169,11 @@ def heatmap(
     """
     xs, ys = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     shape = (len(ys), len(xs))
-    data = {k: _table("tables", k, v, shape).astype(float) for k, v in tables.items()}
-    if not data:
+    given = {k: v.astype(float) for k, v in _tables("tables", tables, shape).items()}
+    if not given:
         validate.refuse("tables", 0, "at least one table")
-    for name, v in data.items():
-        data[name] = np.where(np.isfinite(v) & ((v > 0.0) | (not log)), v, np.nan)
-    crosses = {k: _table("marks", k, v, shape) for k, v in (marks or {}).items()}
+    data = {k: np.where(np.isfinite(v) & ((v > 0.0) | (not log)), v, np.nan) for k, v in given.items()}
+    crosses = _tables("marks", marks or {}, shape)
     for name in crosses.keys() - data.keys():
         raise OptionError(unknown("table", name, data), what="marks", where=name)
     columns = min(columns, len(data))
@@ -250,7 +249,6 @@ def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Float
 
 
 def new_axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, Any]:
-    """A figure with one pair of axes, their title and labels."""
     figure = new(width, height, pad=8.0)
     axes = style(figure.subplots())
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
@@ -293,11 +291,12 @@ def _curve(
     return px, py
 
 
-def _table(what: str, title: str, values: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[Any]:
-    table = np.asarray(values)
-    if table.shape != shape:
-        validate.refuse(what, table.shape, f"shape {shape}, (len(y), len(x))", where=title)
-    return table
+def _tables(what: str, given: Mapping[str, npt.ArrayLike], shape: tuple[int, int]) -> dict[str, Any]:
+    tables = {title: np.asarray(values) for title, values in given.items()}
+    for title, table in tables.items():
+        if table.shape != shape:
+            validate.refuse(what, table.shape, f"shape {shape}, (len(y), len(x))", where=title)
+    return tables
 
 
 def _norm(values: Floats, log: bool, limits: tuple[float, float] | None) -> Any:

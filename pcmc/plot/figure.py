@@ -99,7 +99,6 @@ def overlap_style(k: int, count: int) -> dict[str, Any]:
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a path that is not a picture's."""
     suffix_of(path, SUFFIXES, "a picture")
 
 
@@ -121,7 +120,6 @@ def finish(figure: Any, path: Path | None) -> Image:
 
 
 def png(image: Image) -> bytes:
-    """The content of a PNG file."""
     from PIL import Image as Pillow
 
     stream = io.BytesIO()
@@ -130,13 +128,10 @@ def png(image: Image) -> bytes:
 
 
 def _vector(figure: Any, kind: str) -> bytes:
-    """The figure as an SVG or a PDF."""
     from matplotlib import rc_context
 
-    nobody: dict[str, Any] = {
-        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-        "svg": {"Date": None},
-    }
+    nobody: dict[str, Any] = {"svg": {"Date": None}}
+    nobody["pdf"] = dict.fromkeys(("CreationDate", "Creator", "Producer"))
     stream = io.BytesIO()
     with rc_context({"svg.hashsalt": "pcmc", "pdf.fonttype": 42}):
         figure.savefig(stream, format=kind, metadata=nobody[kind], dpi=DPI)

@@ -48,11 +48,11 @@ def draw(
     width: int = 900,
     **options: Any,
 ) -> Image:
-    """A picture of a surface, in parallel projection.
+    """A picture of a surface, in parallel projection: an (h,w,3) uint8 array.
 
     Parameters
     ----------
-    path : PNG file to write, or None.
+    path : PNG, SVG or PDF file to write, or None.
     view : "diagonal", "elevation" (along Π), "plan" (onto Π), or (azimuth, elevation) in degrees.
     scalars : (n,) or (m,) values shown as colours, with a scale; NaN is grey. None: patch colours.
     label : what the scalars are, beneath the scale.
@@ -67,25 +67,14 @@ def draw(
     width : of the picture in pixels.
     renderer : "pyvista", "matplotlib", or "auto": pyvista for many triangles where the system has OpenGL.
 
-    Returns
-    -------
-    (h,w,3) uint8 array, the picture.
-
     Raises
     ------
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
     """
-    return panel(
-        [surface],
-        path,
-        views=[view],
-        scalars=None if scalars is None else [scalars],
-        numbers=None if numbers is None else [numbers],
-        titles=[title] if title else (),
-        width=width,
-        **options,
-    )
+    given = {"views": view, "scalars": scalars, "numbers": numbers, "titles": title or None}
+    one: dict[str, Any] = {name: [value] for name, value in given.items() if value is not None}
+    return panel([surface], path, width=width, **one, **options)
 
 
 def panel(

@@ -122,7 +122,6 @@ class StructuralModel:
 
     @property
     def weights(self) -> list[SelfWeight]:
-        """Those of the loads that are the self-weight."""
         single = [load for entry in self.loads for load in acting_together(entry)]
         return [load for load in single if isinstance(load, SelfWeight)]
 
@@ -190,7 +189,6 @@ class StructuralModel:
 
     @cached_array
     def nodes(self) -> Bools:
-        """(n,) the vertices of elements."""
         used = np.zeros(self.surface.n, dtype=bool)
         used[self.standing.faces[self.active]] = True
         for cable in self.standing.cables:
@@ -314,6 +312,12 @@ class Structure:
         about: dict[str, Any] = {"cable_area": self.cable_area, "certificate": certificate, "units": units}
         thickness = self.thickness or 0.0
         return StructuralModel(surface, self.material, thickness, self.loads, anyway=anyway, **about)
+
+
+def expect_model(value: object) -> None:
+    """Refuse anything but a StructuralModel."""
+    if not isinstance(value, StructuralModel):
+        validate.refuse("model", type(value).__name__, "a StructuralModel")
 
 
 def checked_thickness(given: object, surface: Surface) -> float | dict[str, float]:
