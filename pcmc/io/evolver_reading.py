@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -210,7 +211,7 @@ def _planes(
     """
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
     header = Section(file.header, 1, file["top"].known)
-    origin = np.array([header.numbers((c,), 0)[0] for c in given.groups()] if given else np.zeros(3))
+    origin = header.numbers(given.groups(), 0) if given else np.zeros(3)
     used = [number for number, mask in constraints.items() if (mask & (support == SLIDING)).any()]
     rows = re.findall(r"^// plane (\d+) (mirror|support)\b([^\n]*)$", file.header, re.M)
     described = {int(k): (kind, name) for k, kind, name in rows}
@@ -223,10 +224,9 @@ def _planes(
     others = []
     for number in sorted({*used, *described} & set(constraints) - {first}):
         kind, name = described.get(number, ("support", ""))
-        plane = _plane(file["top"], number, origin, needed=True)
-        assert plane is not None
-        plane = replace(plane, name=unquote(name.strip()), mirror=kind == "mirror")
-        others.append((plane, constraints[number]))
+        plane: Any = _plane(file["top"], number, origin, needed=True)
+        about = {"name": unquote(name.strip()), "mirror": kind == "mirror"}
+        others.append((replace(plane, **about), constraints[number]))
     return ground, tuple(others), origin
 
 

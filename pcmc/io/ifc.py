@@ -18,6 +18,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..base.units import NEWTONS, TABLE, Units, length_factor
+from ..base.validate import real
 from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.geometry import file_origin
@@ -31,12 +32,17 @@ SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
 TIME = "2000-01-01T00:00:00"
 NAMES = {name: unit.ifc for name, unit in TABLE.items()}
 NAMES |= {"N": "", "kN": "KILO", "MN": "MEGA", "lbf": "pound-force", "kip": "kip"}
-NUMBERS = {  # in the property set of the certificate, by the name there
-    "Residual": "residual",
-    "CurvatureError": "curvature_error",
-    "TriangleQuality": "quality",
-    "LoadRatio": "load_ratio",
+FINDINGS = {  # in the property set of the certificate, by the name there
+    "Verdict": ("IfcLabel", "verdict"),
+    "Detail": ("IfcText", "detail"),
+    "MorseIndex": ("IfcInteger", "index"),
+    "Residual": ("IfcReal", "residual"),
+    "CurvatureError": ("IfcReal", "curvature_error"),
+    "TriangleQuality": ("IfcReal", "quality"),
+    "LoadRatio": ("IfcReal", "load_ratio"),
+    "LowestEigenvalue": ("IfcReal", "lowest_eigenvalue"),
 }
+TYPES: dict[str, Callable[[Any], Any]] = {"IfcText": str, "IfcInteger": int, "IfcReal": float}
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
@@ -196,21 +202,16 @@ class _Model:
 
 
 def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
-    """The certificate's verdict and numbers, as far as they are there."""
-    found: dict[str, tuple[str, Any]] = {}
-    verdict = certificate.get("verdict")
-    if verdict is not None:
-        found["Verdict"] = "IfcLabel", str(getattr(verdict, "name", verdict)).lower()
-    if certificate.get("detail"):
-        found["Detail"] = "IfcText", str(certificate["detail"])
-    if certificate.get("index") is not None:
-        found["MorseIndex"] = "IfcInteger", int(certificate["index"])
-    values = {name: certificate.get(key) for name, key in NUMBERS.items()}
-    eigenvalues = certificate.get("eigenvalues", ())
-    values["LowestEigenvalue"] = next(iter(eigenvalues), certificate.get("lowest_eigenvalue"))
-    for name, value in values.items():
-        if isinstance(value, int | float | np.number) and np.isfinite(value):
-            found[name] = "IfcReal", float(value)
+    """The certificate's verdict and numbers, as far as they are there and finite."""
+    found, values = dict[str, tuple[str, Any]](), dict(certificate)
+    if len(eigenvalues := values.get("eigenvalues", ())):
+        values["lowest_eigenvalue"] = eigenvalues[0]
+    for name, (kind, key) in FINDINGS.items():
+        value = values.get(key)
+        if name == "Verdict" and value is not None:
+            found[name] = kind, str(getattr(value, "name", value)).lower()
+        elif value not in (None, "") and (kind != "IfcReal" or np.isfinite(real(value))):
+            found[name] = kind, TYPES[kind](value)
     return found
 
 

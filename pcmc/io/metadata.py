@@ -140,13 +140,6 @@ def _damaged(text: str) -> FileError:
 
 def with_parts(data: MeshData) -> MeshData:
     """The mesh with the cables, rooms, lines and planes of its metadata; a note on those that do not fit."""
-    try:
-        return _with_parts(data) if data.parts else data
-    except DAMAGED:
-        raise _damaged(str(dict(data.parts))) from None
-
-
-def _with_parts(data: MeshData) -> MeshData:
     X, parts, lost = data.vertices, data.parts, dict[str, None]()
     keep: Ints = np.arange(len(X))
     group: Ints = keep
@@ -180,25 +173,31 @@ def _with_parts(data: MeshData) -> MeshData:
             if (own := groups(where, what, exact=True)) is not None
         ]
 
-    cables = [
-        Cable(name, pull, keep[ends])
-        for name, pull, where in parts.get("cables", ())
-        if (ends := groups(where, f"cable {name!r} was left out")) is not None
-    ]
-    lines = sliding("lines", "what slides along a line is fixed")
-    planes, support = sliding("planes", off := "what slides on a plane is fixed"), data.support
-    if support is not None and planes and off not in lost:
-        support = support.copy()
-        for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
-            if len(where) and (own := groups(where, off)) is not None:
-                support[np.isin(group, own)] = kind
+    try:
+        cables = [
+            Cable(name, pull, keep[ends])
+            for name, pull, where in parts.get("cables", ())
+            if (ends := groups(where, f"cable {name!r} was left out")) is not None
+        ]
+        lines = sliding("lines", "what slides along a line is fixed")
+        planes, support = sliding("planes", off := "what slides on a plane is fixed"), data.support
+        if support is not None and planes and off not in lost:
+            support = support.copy()
+            for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
+                if len(where) and (own := groups(where, off)) is not None:
+                    support[np.isin(group, own)] = kind
+        rooms = tuple(Room(*row) for row in parts.get("rooms", ()))
+        guides = tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines)
+        on_planes = () if off in lost else tuple((Plane(*row), own) for row, own in planes)
+    except DAMAGED:
+        raise _damaged(str(dict(parts))) from None
     return replace(
         data,
         vertices=X,
         support=support,
         cables=tuple(cables),
-        rooms=tuple(Room(*row) for row in parts.get("rooms", ())),
-        lines=tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines),
-        planes=() if off in lost else tuple((Plane(*row), own) for row, own in planes),
+        rooms=rooms,
+        lines=guides,
+        planes=on_planes,
         notes=(*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else [])),
     )

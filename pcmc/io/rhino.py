@@ -109,9 +109,8 @@ def read(path: Path) -> MeshData:
     metadata, walls, others, start = Metadata(), None, 0, 0
     cables: dict[str, list[Any]] = {}
     for item in arrays["objects"]:
-        layer: dict[str, Any] = {"name": path.stem, "texts": {}}
-        if 0 <= item["layer"] < len(layers):
-            layer = layers[item["layer"]]
+        known = 0 <= item["layer"] < len(layers)
+        layer: Any = layers[item["layer"]] if known else {"name": path.stem, "texts": {}}
         name, texts = layer["name"], layer["texts"]
         in_file, _, own = texts.get(NAME, "").partition("\n")
         name = own if in_file == name else name

@@ -144,7 +144,7 @@ class Section:
         try:
             return numbers(words)
         except ValueError:
-            rows = range(len(words)) if row is None else [row]
+            rows = range(len(words)) if row is None else [row] * len(words)
             fails = (partial(self.error, row=k) for k in rows)
             values = [constant(w, self.known, fail) for w, fail in zip(words, fails, strict=True)]
             return np.array(values)

@@ -7,7 +7,7 @@ import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,17 +27,9 @@ from .patch_meshes import encode_walls
 MADE = ("supports", "balance", "reactions")  # of a certificate, when they are asked for; files have them, too
 
 
-class Solved(Protocol):
-    """The result of a solver, whose certificate is written, too, or of ``repair``."""
-
-    @property
-    def surface(self) -> Surface:
-        """The surface reached."""
-
-
 def write(
     path: str | os.PathLike[str],
-    surface: Surface | Solved,
+    surface: Surface | Any,
     *,
     scalars: Mapping[str, Floats] | None = None,
     certificate: object | None = None,
@@ -69,10 +61,9 @@ def write(
     path = as_path(path)
     check_name(path)
     form, solved = format_of(path, FORMATS), surface
-    surface = solved if isinstance(solved, Surface) else getattr(solved, "surface", solved)
+    surface = getattr(solved, "surface", solved)
     expect_surface(surface)
-    assert isinstance(surface, Surface)
-    if surface is not solved and form.certificate and certificate is None:
+    if form.certificate and certificate is None:
         certificate = getattr(solved, "certificate", None)
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
@@ -123,9 +114,8 @@ def _values(certificate: Any) -> Mapping[str, Any]:
         return certificate or {}
     if not is_dataclass(certificate):
         found = type(certificate).__name__
-        raise FileError(
-            f"certificate: expected a Certificate, found {found}", what="certificate", found=found
-        )
+        text = f"certificate: expected a Certificate, found {found}"
+        raise FileError(text, what="certificate", found=found)
     shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
     shown += [name for name in MADE if hasattr(certificate, name)]
     return {name: getattr(certificate, name) for name in shown}
