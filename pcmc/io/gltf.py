@@ -17,11 +17,11 @@ import numpy as np
 
 from ..base.errors import FileError
 from ..base.files import check_regular
+from ..base.libraries import load_library, translated_errors
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
 from .formats import Content
-from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata
 from .patch_meshes import WALLS, from_scene, patch_meshes

@@ -17,13 +17,13 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.libraries import load_library, read_arrays, require
 from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..base.validate import real
 from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.geometry import file_origin
 from .formats import Content
-from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .patch_meshes import patch_meshes

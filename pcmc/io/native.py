@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 
 from ..base.errors import FileError, PcmcError
+from ..base.libraries import translated_errors
 from ..surface import HeldCurve, Surface
 from .formats import Content
-from .libraries import translated_errors
 from .mesh_data import MeshData, numeric, support_of, within
 from .metadata import DAMAGED, parse_metadata
 

@@ -19,13 +19,13 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
 from ..base.files import as_path, check_regular, system_error
+from ..base.libraries import unreadable
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import topology
 from .formats import FORMATS, READ_ONLY, Format, format_of
-from .libraries import unreadable
 from .mesh_data import MeshData, checked, converted, merged, to_surface, without_unused
 from .metadata import with_parts
 from .patch_meshes import restore_walls

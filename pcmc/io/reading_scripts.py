@@ -1,6 +1,6 @@
 """What VTK, rhino3dm, IfcOpenShell and MeshLab do in a process of their own: read files, and repair.
 
-``libraries`` loads this file by its path: it imports nothing of pcmc, and each function only its library.
+``base.libraries`` loads this file by its path: it imports nothing of pcmc, each function only its library.
 """
 
 from __future__ import annotations

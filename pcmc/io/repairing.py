@@ -17,9 +17,9 @@ import numpy as np
 from ..base import validate
 from ..base.errors import FileError, OptionError, PcmcError
 from ..base.files import as_path
+from ..base.libraries import read_arrays, require, unreadable
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
-from .libraries import read_arrays, require, unreadable
 from .mesh_data import MeshData, converted, to_surface, within
 from .metadata import Metadata
 from .reading import contents, opened

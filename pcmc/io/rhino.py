@@ -18,12 +18,12 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.libraries import load_library, read_arrays, require
 from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
 from ..surface.geometry import bounding_size
 from ..surface.sections import curves_by_kind
 from .formats import Content
-from .libraries import load_library, read_arrays, require
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, parse_metadata
 from .patch_meshes import WALLS, patch_meshes

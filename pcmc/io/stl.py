@@ -13,10 +13,10 @@ import numpy as np
 
 from ..base.arrays import format_rows
 from ..base.errors import FileError
+from ..base.libraries import load_library, translated_errors
 from ..surface import Surface
 from ..surface.geometry import area_vectors, file_origin
 from .formats import Content
-from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata
 from .patch_meshes import from_scene

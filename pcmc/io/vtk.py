@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import FileError
+from ..base.libraries import load_library, read_arrays, require
 from ..surface import Surface
 from .formats import Content
-from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import from_polygons

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra
+from ..base.libraries import require
 from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL, Image
 from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Rendering
@@ -57,10 +57,9 @@ def color_bar(figure: Any, mappable: Any, axes: Sequence[Any], label: str) -> An
 
 
 def color_map(name: str) -> Any:
-    try:
-        from matplotlib import colormaps
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    require("matplotlib", extra="plot")
+    from matplotlib import colormaps
+
     return colormaps[validate.choice("cmap", name, sorted(colormaps))]
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import MissingExtra
 from ..base.files import atomic_write, suffix_of, writing
+from ..base.libraries import require
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
@@ -27,12 +27,11 @@ Path = str | os.PathLike[str]
 
 def new(width: float, height: float, pad: float = 4.0) -> Any:
     """A figure of a size in pixels, drawn by Agg, its parts ``pad`` pixels apart; no global state."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-        from matplotlib.layout_engine import ConstrainedLayoutEngine
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    require("matplotlib", extra="plot")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     gap = pad / DPI
     layout = ConstrainedLayoutEngine(w_pad=gap, h_pad=gap, wspace=0.0, hspace=0.0)
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white", layout=layout)

@@ -17,8 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..base.child_process import ChildError, ChildProcess
-from ..base.errors import FileError, MissingExtra, PcmcError
+from .child_process import ChildError, ChildProcess
+from .errors import FileError, MissingExtra, PcmcError
 
 SECONDS, PACE = 30.0, 1e6  # time limit of a file: this, and one more for so many bytes
 MEMORY = 100  # bytes for each byte of the file, which may be compressed
