@@ -36,11 +36,11 @@ def read(path: Path) -> MeshData:
     if WRITTEN in file.header:
         file["read"]  # its last line: without it the file is cut off
     vertex_ids, X, support, constraints = _vertices(file["vertices"])
-    edges, pattern = file["edges"], r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)"
+    edges, faces, pattern = file["edges"], file["faces"], r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)"
     *columns, edge_rest = edges.columns(pattern, "an edge number and two vertices")
     edge_ids, *joined = map(edges.integers, columns)
     ends = np.stack([edges.places(vertex_ids, end, "vertex") for end in joined], axis=1)
-    face_ids, corners, counts, face_rest = _faces(file["faces"], edge_ids, ends)
+    face_ids, corners, counts, face_rest = _faces(faces, edge_ids, ends)
     F, source, notes = triangulate(X, corners, counts)
     pressure, prescribed, more = _pressures(file, face_ids)
     patch_of_face, patches = _patches(file, face_rest, (pressure, *prescribed.values()))

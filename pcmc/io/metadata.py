@@ -140,6 +140,8 @@ def _damaged(text: str) -> FileError:
 
 def with_parts(data: MeshData) -> MeshData:
     """The mesh with the cables, rooms, lines and planes of its metadata; a note on those that do not fit."""
+    if not data.parts:
+        return data
     X, parts, lost = data.vertices, data.parts, dict[str, None]()
     keep: Ints = np.arange(len(X))
     group: Ints = keep

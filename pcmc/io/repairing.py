@@ -82,7 +82,7 @@ def repair(
 
     >>> import tempfile
     >>> mesh = Path(tempfile.mkdtemp()) / "twice.obj"
-    >>> _ = mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 1\n")
+    >>> _ = mesh.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\nf 2 3 1\\n")
     >>> print(repair(mesh))
     1 repeated triangles left out
     """
