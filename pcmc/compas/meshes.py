@@ -14,7 +14,7 @@ import numpy as np
 from .. import mean_curvature
 from ..base import validate
 from ..base.errors import FileWarning, PcmcError, SurfaceError
-from ..certificate.reactions import support_forces
+from ..certificate.forces import Forces
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
@@ -61,6 +61,10 @@ def to_meshes(surface: Surface) -> list[Any]:
         if field.name not in CARRIED and not empty:
             text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
             raise SurfaceError(text, what=field.name, found=value)
+    for cable in surface.cables:
+        if cable.weight:
+            text = f"cable {cable.name!r}: COMPAS meshes do not carry its weight; write the surface as .pcmc"
+            raise SurfaceError(text, what="weight", where=cable.name, found=cable.weight)
     rows, meshes = _vertex_attributes(surface), []
     for index, patch in enumerate(surface.patches):
         mesh = mesh_class(default_vertex_attributes=MARKS | QUANTITIES, name=patch.name)
@@ -184,7 +188,7 @@ def _plain(value: Any) -> dict[str, Any]:
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
-    support, acting = support_of(surface, planes=True), support_forces(surface)
+    support, acting = support_of(surface, planes=True), Forces.of(surface)
     guide = np.full(surface.n, None)
     for number, (_, along) in enumerate(surface.given_supports.on_line):
         guide[along] = number
@@ -197,6 +201,6 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
         GUIDE: guide.tolist(),
         PLANES: [np.flatnonzero(column).tolist() for column in on_planes.T],
         "mean_curvature": [H if H == H else None for H in curvature],  # JSON has no NaN
-        **dict(zip(("rx", "ry", "rz"), acting.forces.T.tolist(), strict=True)),
+        **dict(zip(("rx", "ry", "rz"), acting.reactions.T.tolist(), strict=True)),
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

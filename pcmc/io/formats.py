@@ -67,6 +67,7 @@ LOST: dict[str, tuple[str, Callable[[Surface, Units], object]]] = {
     "snow": ("snow", lambda surface, _: surface.snows.any()),
     "lines": (LINES, lambda surface, _: surface.given_supports.on_line),
     "cables": ("cables", lambda surface, _: surface.cables),
+    "cable weights": ("weights of cables", lambda surface, _: surface.cable_edges.weight.any()),
     "rooms": ("volumes of rooms (it has the pressures reached)", lambda surface, _: surface.rooms),
     "planes": (PLANES, lambda surface, _: surface.on_planes),
     "unit": ("its unit {unit}", lambda _, units: units),
@@ -76,8 +77,8 @@ LOST: dict[str, tuple[str, Callable[[Surface, Units], object]]] = {
 OURS = ("support", "patch")
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
-    ".fe": Format("evolver", shared=True, loses=("lines", "unit")),
-    ".dmp": Format("evolver", shared=True, loses=("lines", "unit")),
+    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
+    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices")),
     ".stl": Format("stl", separate=True, bare=True, loses=tuple(LOST)),

@@ -14,9 +14,10 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
+from ..base.tolerances import FAR
 from . import checks, supports
 from .checked import checked_parts
-from .geometry import FAR, bounding_size
+from .geometry import bounding_size
 from .guides import Guide, Plane
 from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
@@ -207,6 +208,11 @@ class Surface(supports.Supported):
     snows = _of_patches("snow")  # (k,) s, force per area of the plan
     net_pressures = _of_patches("net_pressure")  # (k,) p - s, the pressure in the energy
     weights = _of_patches("weight")  # (k,) w, force/area
+
+    @cached_property
+    def heavy(self) -> bool:
+        """Whether a patch or a cable has a weight."""
+        return bool(self.weights.any() or self.cable_edges.weight.any())
 
     @cached_property
     def cable_edges(self) -> CableEdges:
