@@ -72,9 +72,9 @@ def draw(
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
     """
-    given = {"views": view, "scalars": scalars, "numbers": numbers, "titles": title or None}
-    one: dict[str, Any] = {name: [value] for name, value in given.items() if value is not None}
-    return panel([surface], path, width=width, **one, **options)
+    given = {"views": view, "scalars": scalars, "numbers": numbers}
+    one: dict[str, Any] = {name: None if value is None else [value] for name, value in given.items()}
+    return panel([surface], path, titles=[title] if title else (), width=width, **one, **options)
 
 
 def panel(
