@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -50,14 +52,15 @@ def read(path: Path) -> MeshData:
     comment = re.search(rf"^{MARK}(.*)$", file.text, re.M)
     metadata = parse_metadata(comment[1] if comment else None)
     X = _vertices(file)
-    corners, counts, place = _faces(file, len(X))
-    if not len(counts):
-        raise FileError("the file has no faces", where="faces", found=0)
     key = next((k for k in ("g", "o", "usemtl") if re.search(rf"^[^\S\n]*{k}\s", file.text, re.M)), "g")
     heads = list(re.finditer(rf"^[^\S\n]*{key}(?:[^\S\n]+([^\n]*))?$", file.text, re.M))
     names = [path.stem, *((head[1] or path.stem).strip() for head in heads)]
     groups = np.array([unquote(name) if comment else name for name in names], dtype=object)
-    starts = np.array([head.start() for head in heads], dtype=np.int64)  # before the first: the file's name
+    starts = _places(heads)  # before the first: the file's name
+    parts = [FACE.findall(file.text, *ends) for ends in pairwise((0, *starts.tolist(), len(file.text)))]
+    corners, counts = _faces(file, list(chain.from_iterable(parts)), len(X))
+    if not len(counts):
+        raise FileError("the file has no faces", where="faces", found=0)
     support = np.full(len(X), FREE, dtype=np.int8)
     points = list(POINT.finditer(file.text))
     for point, group in zip(points, groups[np.searchsorted(starts, _places(points))], strict=True):
@@ -67,7 +70,9 @@ def read(path: Path) -> MeshData:
             raise file.error(problem, offset=point.start(), found=point[0])
         if group in HELD:
             support[numbered.astype(np.int64) - 1] = HELD[group]
-    patch, patches = pd.factorize(groups[np.searchsorted(starts, place)])
+    sizes = np.array([len(part) for part in parts])
+    patch, patches = pd.factorize(groups[sizes > 0])
+    patch = np.repeat(patch, sizes[sizes > 0])
     F, source, notes = triangulate(X, corners, counts)
     metadata.check_counts(len(X), len(F))
     known = support if comment or support.any() else None
@@ -75,19 +80,18 @@ def read(path: Path) -> MeshData:
     return metadata.mesh_data(X, F, patch[source], patches.tolist(), notes, **about)
 
 
-def _places(statements: list[re.Match[str]]) -> Ints:
+def _places(statements: Iterable[re.Match[str]]) -> Ints:
     return np.array([one.start() for one in statements], dtype=np.int64)
 
 
 def _vertices(file: Section) -> Floats:
     coordinates = VERTEX.findall(file.text)
-    lines = list(re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", file.text, re.M))
     try:
-        if len(coordinates) == len(lines):
+        if len(coordinates) == len(re.findall(r"^[^\S\n]*v(?=\s)", file.text, re.M)):
             return numbers([c for row in coordinates for c in row]).reshape(-1, 3)
     except ValueError:
         pass
-    for line in lines:
+    for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", file.text, re.M):
         try:
             [parsed(c) for c in line[0].split()[1:4]][2]
         except (ValueError, IndexError):
@@ -96,23 +100,25 @@ def _vertices(file: Section) -> Floats:
     raise FileError("its vertices cannot be read", where="vertices")
 
 
-def _faces(file: Section, n: int) -> tuple[Ints, Ints, Ints]:
-    """The vertex at each corner of face after face, corners per face, and the faces' places in the text."""
-    faces = list(FACE.finditer(file.text))
-    bare = re.sub(r"/[^\s]*", "", "\n".join(face[1] for face in faces)).split("\n") if faces else []
-    counts, place = np.array([len(face.split()) for face in bare], dtype=np.int64), _places(faces)
+def _faces(file: Section, faces: list[str], n: int) -> tuple[Ints, Ints]:
+    """The vertex at each corner of face after face, and corners per face."""
+    bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
+    counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
     try:
         corner = numbers(" ".join(bare).split(), np.int64)
     except (ValueError, OverflowError):
-        odd = next((one for one in faces if not all(map(CORNER.fullmatch, one[1].split()))), faces[0])
+        every = list(FACE.finditer(file.text))
+        odd = next((one for one in every if not all(map(CORNER.fullmatch, one[1].split()))), every[0])
         raise file.error("expected vertex numbers", offset=odd.start(), found=odd[0]) from None
     if (corner < 0).any():  # counted back from the vertices seen so far
-        seen = np.searchsorted(_places(list(VERTEX.finditer(file.text))), place)
+        vertices, lines = (_places(pattern.finditer(file.text)) for pattern in (VERTEX, FACE))
+        seen = np.searchsorted(vertices, lines)
         corner = np.where(corner < 0, np.repeat(seen, counts) + corner + 1, corner)
     bad = np.flatnonzero((corner < 1) | (corner > n))
     short = np.flatnonzero(counts < 3)
     if len(bad) or len(short):
         number = int(np.searchsorted(np.cumsum(counts), bad[0], side="right") if len(bad) else short[0])
         wrong = f"names a vertex outside 1..{n}" if len(bad) else "has fewer than three corners"
-        raise file.error(f"the face {wrong}", offset=faces[number].start(), found=faces[number][0])
-    return corner - 1, counts, place
+        line = list(FACE.finditer(file.text))[number]
+        raise file.error(f"the face {wrong}", offset=line.start(), found=line[0])
+    return corner - 1, counts
