@@ -6,7 +6,7 @@ import ast
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
@@ -17,7 +17,6 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
-from ..forces.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY
 from ..project import MOST_CHECKED, Outcome, Project
 from ..project.outcome import OnStep
@@ -110,17 +109,11 @@ class Loads:
     def of(self, surface: Surface) -> Surface:
         """The surface with these values; wall pressures follow those of their rooms."""
         sheets = [patch.name for patch in surface.patches if not patch.wall]
-        loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
-        pressures = by_name(loaded, self.pressure, "--pressure")
-        refuse_varied_pressure(surface, map(surface.patch_index, pressures))
-        return surface.retensioned(
-            by_name(loaded, self.tension, "--tension"),
-            pressures,
-            weights=by_name(sheets, self.weight, "--weight"),
-            snows=by_name(loaded, self.snow, "--snow"),
-            cables=by_name([cable.name for cable in surface.cables], self.cable, "--cable"),
-            volumes=by_name([room.name for room in surface.rooms], self.volume, "--volume"),
-        )
+        names = dict.fromkeys(vars(self), [p.name for p in surface.patches if not p.auxiliary] or sheets)
+        names |= {"weight": sheets, "cable": [cable.name for cable in surface.cables]}
+        names["volume"] = [room.name for room in surface.rooms]
+        given = {f"{key}s": by_name(names[key], texts, f"--{key}") for key, texts in vars(self).items()}
+        return projects.with_loads(surface, given)
 
 
 @dataclass(frozen=True)
@@ -133,8 +126,7 @@ class Build:
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
-        roof, file = projects.opened(project, progress, use_cache=self.cache), project.path
-        roof = roof.unfolded() if self.whole else roof
+        roof, file = opened(project, progress, self.whole, use_cache=self.cache), project.path
         if roof.certified and not roof.good and not self.allow_uncertified:
             hint = f"pcmc solve {file} shows them, --allow-uncertified accepts the roof"
             text = f"{file}: the roof misses its targets or its accuracy; {hint}"
@@ -163,6 +155,12 @@ def with_groups(function: Callable[..., int]) -> Callable[..., int]:
 
     vars(run).update(__signature__=inspect.Signature(parameters), __annotations__={})
     return run
+
+
+def opened(project: Project, progress: OnStep, whole: bool, **how: Any) -> Outcome:
+    """The roof of a project; the ``whole`` one if asked for."""
+    roof = projects.opened(project, progress, **how)
+    return replace(roof, unfold=whole or roof.unfold)
 
 
 def load(file: Path, units: str = "") -> Project:

@@ -15,12 +15,7 @@ from ..base import validate
 from ..base.errors import FileError, OptionError
 from ..base.units import Units
 from ..certificate.certificate import require_certified
-from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
-from ..panelling import fewer_families
-from ..panelling.schedule import MIRROR_IMAGES
-from ..report.document import check_suffix as check_report
-from ..structure import write_structure
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -67,7 +62,7 @@ def panels_(
     picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
     change: Annotated[float | None, real("LENGTH", CHANGE)] = None,
-    mirror_images: Annotated[str, option("NAME", MIRRORED)] = MIRROR_IMAGES[0],
+    mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
     walls: Annotated[bool, flag("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
@@ -105,8 +100,7 @@ def panels_(
             def callback(made: int, count: int) -> None:
                 progress(f"round {made}: {count} families")
 
-            shape = roof.shown.surface
-            fewer = fewer_families(shape, tolerance, change, callback=callback, **options)
+            fewer = roof.fewer_families(tolerance, change, callback=callback, **options)
             schedule = fewer.after
         works: list[Any] = []
         writing = partial(write, surface=schedule.surface, units=roof.units)
@@ -114,9 +108,7 @@ def panels_(
             is_table = path.suffix.lower() == CSV
             works += projects.schedule_jobs(path, schedule) if is_table else [(path, writing)]
         if picture is not None:
-            from ..plot import families
-
-            works.append((picture, lambda path: families(schedule, path, view=seen)))
+            works.append((picture, partial(projects.paint_families, schedule=schedule, view=seen)))
         written = projects.write_all(works, progress)
     print(schedule)
     if change is not None:
@@ -146,8 +138,7 @@ def draw_(
       pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
-    for path in output:
-        check_drawing(path)
+    projects.Output(drawings=output)  # refuses what is no drawing
     check_outputs(file, others=output)
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
@@ -181,7 +172,7 @@ def report_(
       pcmc report roof.toml -o roof.pdf
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
-    check_report(output)
+    projects.Output(report=output)  # refuses what is no report
     check_outputs(file, others=[output])
     anyway = build.allow_uncertified
     with working() as progress:
@@ -242,7 +233,7 @@ def structure(
     Example:
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
     """
-    projects.check_model(output)
+    projects.Output(structure=output)  # refuses what is no model
     check_outputs(file, others=[output])
     with working() as progress:
         project = arguments.load(file)
@@ -266,7 +257,7 @@ def structure(
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        projects.write_all([(output, partial(write_structure, model=model))], progress)
+        projects.write_all([projects.model_job(output, model)], progress)
     if model.note:
         print(model.note)
     steps = ", ".join(step.name for step in model.steps)

@@ -58,8 +58,7 @@ def convert(
 def _shown(file: Path, units: str, whole: bool, **how: Any) -> Outcome | None:
     """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
     with working() as progress:
-        roof = projects.opened(load(file, units), progress, **how)
-    roof = roof.unfolded() if whole else roof
+        roof = arguments.opened(load(file, units), progress, whole, **how)
     if roof.result is None:
         return roof
     report(roof)

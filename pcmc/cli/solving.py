@@ -13,7 +13,6 @@ from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..io import write
-from ..meshing.remeshing import remesh, size_note
 from . import NOT_CERTIFIED, OK, reports
 from .arguments import (
     MANY_FILES,
@@ -29,6 +28,7 @@ from .arguments import (
     count,
     flag,
     load,
+    opened,
     option,
     real,
 )
@@ -114,8 +114,7 @@ def solve_(
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
         print("nothing written (use --allow-uncertified to write it)")
-    if check := reports.mesh_check(outcome):
-        print(f"\n{check.brief(outcome.units)}")
+    reports.mesh_check(outcome, brief=True)
     reports.margins(outcome)
     return OK if outcome.good else NOT_CERTIFIED
 
@@ -144,8 +143,8 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        roof = projects.opened(load(file), progress, changed=loads.change, start=start, use_cache=cache)
-        roof = roof.unfolded() if whole else roof
+        how: dict[str, Any] = {"changed": loads.change, "start": start, "use_cache": cache}
+        roof = opened(load(file), progress, whole, **how)
         progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
@@ -190,12 +189,11 @@ def remesh_(
         else:
             progress("remeshing")
             roof = projects.opened(project, progress, start=True)
-            surface = remesh(roof.surface, **stage.options)
+            surface, note = stage.remeshed(roof.surface)
             writing = partial(write, surface=surface, units=roof.units)
             projects.write_all([(path, writing) for path in output], progress)
     if not solve:
-        if note := size_note(surface, edge_length):
-            print(note)
+        print(note, end="\n" if note else "")
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     reports.report(outcome)

@@ -22,7 +22,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import write_structure
+from ..structure import StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from . import cache
 from .checking import in_file
@@ -169,7 +169,7 @@ def run_project(
     if outputs and (outcome.good or anyway):
         jobs = _output_jobs(project, outcome, anyway, progress)
         with output_folder(project.folder or Path()):
-            outcome = outcome.written(write_all(jobs, progress))
+            outcome = replace(outcome, files=write_all(jobs, progress))
     if use_cache and changed is None:
         cache.keep(project, outcome)
     if check_after and project.mesh_check and outcome.wants_mesh_check():
@@ -201,7 +201,7 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
             documents += schedule_jobs(Path(output.panels), schedule)
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
-            documents.append((Path(output.structure), partial(write_structure, model=model)))
+            documents.append(model_job(Path(output.structure), model))
         if output.report is not None:
             listed = {path.name: "project" for path in project.inputs[:1]}
             listed |= {path.name: "drawing or mesh of the roof" for path in project.inputs[1:]}
@@ -279,6 +279,18 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
     tables = (schedule.panels, schedule.families, schedule.edges)
     paths = schedule_paths(path)
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
+
+
+def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:
+    """The file of a structural model, with the function that writes it."""
+    return path, partial(write_structure, model=model)
+
+
+def paint_families(path: Path, schedule: Panels, view: Any) -> None:
+    """Draw panels, coloured by family."""
+    from ..plot import families  # needs the extra plot
+
+    families(schedule, path, view=view)
 
 
 def paint(

@@ -17,11 +17,12 @@ from ..base.files import PathLike, suffix_of
 from ..base.units import Units, expect_length
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.sheet import FORMATS
-from ..meshing.remeshing import check_lengths
+from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..plot.figure import SUFFIXES, check_suffix
 from ..plot.scene import VIEWS
 from ..report.document import check_suffix as check_report
 from ..structure.model import Structure
+from ..surface import Surface
 
 PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of a mesh
 BOUNDARY, GROUND = "boundary", "ground"
@@ -96,12 +97,16 @@ class Remeshing:
 
     def __post_init__(self) -> None:
         validate.choice("when", self.when, WHEN)
-        check_lengths(**self.options)
+        check_lengths(**self._lengths)
 
     @property
-    def options(self) -> dict[str, Any]:
-        """The arguments of ``pcmc.meshing.remeshing.remesh``."""
+    def _lengths(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "when"}
+
+    def remeshed(self, surface: Surface) -> tuple[Surface, str]:
+        """The surface with these triangles, and a note where they had to be finer; "" for none."""
+        fine = remesh(surface, **self._lengths)
+        return fine, size_note(fine, self.edge_length)
 
 
 @dataclass(frozen=True)

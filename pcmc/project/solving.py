@@ -15,7 +15,6 @@ from ..certificate.balance import unbalanced
 from ..existence import solve
 from ..forces.pinching import standing_part
 from ..io import metres_note
-from ..meshing.remeshing import remesh, size_note
 from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
@@ -102,8 +101,8 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
         for stage in project.remeshing:
             if stage.when == "before":
                 progress("remeshing")
-                surface = remesh(surface, **stage.options)
-                notes.append(size_note(surface, stage.edge_length))
+                surface, note = stage.remeshed(surface)
+                notes.append(note)
         after = [stage for stage in project.remeshing if stage.when == "after"]
         if project.wanted.accuracy and not after and not project.targets:
             outcome = _solve_to_accuracy(project, surface, progress)
@@ -113,9 +112,9 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
         for stage in after:
             if outcome.good:
                 progress("remeshing")
-                before, surface = outcome, remesh(outcome.surface, **stage.options)
+                before, (surface, note) = outcome, stage.remeshed(outcome.surface)
                 outcome = _again(project, surface, progress)
-                notes += [size_note(surface, stage.edge_length), *outcome.notes]
+                notes += [note, *outcome.notes]
                 notes += _met_before(project.targets, before, outcome)
         if project.wanted.accuracy and outcome.good:
             accurate = _solve_to_accuracy(project, outcome.surface, progress)

@@ -155,8 +155,16 @@ class _Source(NamedTuple):
             kind, part = known[name]
             given[kind][part] = values[name]
         with in_file(self.path, OptionError):
-            refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
-            return surface.retensioned(**given)
+            return with_loads(surface, given)
+
+
+def with_loads(surface: Surface, given: Mapping[str, Mapping[str, float]]) -> Surface:
+    """The surface with other values by kind and name, as of ``Surface.retensioned``.
+
+    OptionError for the pressure of a patch over a room of prescribed volume, which is a result.
+    """
+    refuse_varied_pressure(surface, map(surface.patch_index, given.get("pressures", ())))
+    return surface.retensioned(**given)
 
 
 def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
