@@ -1,7 +1,4 @@
-"""The commands panels, draw, report and structure: from the shape to what is built.
-
-Each returns the exit code.
-"""
+"""The commands panels, draw, report and structure. Each returns the exit code."""
 
 from __future__ import annotations
 

@@ -60,19 +60,11 @@ class Drawing:
 
 
 def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawing:
-    """The plan in a .dxf or .3dm drawing.
+    """The plan in a .dxf or .3dm drawing, in ``units``, such as "m", or in its own.
 
-    Parameters
-    ----------
-    units : the unit of length wanted, such as "m"; "" for the drawing's own.
-    gap : gaps between ends up to this length are closed, in the unit wanted; by default a thousandth of the
-        outline's diagonal.
-
-    Raises
-    ------
-    FileError : for a file that cannot be read.
-    PlanError : for a drawing that is no plan; ``what`` is the layer, ``where`` the place.
-    MissingExtra : without the library that reads it.
+    ``gap``: gaps up to this length are closed; by default a thousandth of the outline's diagonal.
+    FileError for a file that cannot be read, PlanError for a drawing that is no plan (``what`` is the layer,
+    ``where`` the place), MissingExtra without the library that reads it.
     """
     content = read_strokes(path, units)
     try:

@@ -148,9 +148,8 @@ def meet_lines(
 ) -> tuple[dict[str, Curve], list[str]]:
     """The curves with ends moved that just miss each other or a line, and notes; ``what`` names them.
 
-    Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge that is as near.
-    This point, and each other end, is moved onto the nearest line that it just misses. Only the course in
-    plan counts.
+    Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge. This point, and each
+    other end, is moved onto the nearest line that it just misses. Only the course in plan counts.
     """
     names = [name for name, curve in curves.items() if not curve.closed]
     if not names:
@@ -185,10 +184,8 @@ def meet_lines(
 def meet_edges(
     supports: Sequence[Floats | Curve], edges: Sequence[Curve], tolerance: float
 ) -> tuple[list[Floats | Curve], list[str]]:
-    """Points (3,), and curves by their ends and joints, moved in plan onto edges that they just miss; notes.
-
-    A point within ``tolerance`` of a corner of an edge goes there, otherwise onto the nearest edge as near.
-    """
+    """Points (3,), and curves by their ends and joints, moved in plan onto corners and edges that they just
+    miss; notes."""
     rims, corners = _rims(edges)
     joints = [
         s.at(np.arange(len(s.pieces) + (not s.closed), dtype=float)) if isinstance(s, Curve) else s[None]

@@ -94,14 +94,13 @@ def load(path: PathLike, *, units: str = "") -> Project:
 
     Raises
     ------
-    FileError : if the file cannot be read or is not TOML; for an unknown key (the message names its line and
-        the nearest known key), a missing key or a bad value. ``what`` is the key.
-    PlanError : for a drawing that is no plan; ``what`` is its layer.
+    FileError : the file is no TOML, or a key is unknown, missing or bad; ``what`` is the key.
+    PlanError : a drawing is no plan; ``what`` is its layer.
 
     Warns
     -----
-    FileWarning : for what was changed and left out of a drawing, for a plan whose size is unlikely in its
-        unit, and for a roof held at single points inside.
+    FileWarning : for what was changed and left out of a drawing, a plan whose size is unlikely in its unit,
+        and a roof held at single points inside.
     """
     path = as_path(path)
     if not is_project(path):
@@ -169,10 +168,8 @@ def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
 def project_of(
     path: Path, data: Mapping[str, Any], text: str = "", redrawn: Callable[[Plan], Plan] | None = None
 ) -> Project:
-    """The project with the given data, which were read from a text. Errors as in ``load``.
-
-    ``redrawn`` is applied to the plan, before heights and named points of it become targets.
-    """
+    """The project with the given data, read from a text; ``redrawn`` changes its plan before heights become
+    targets. Errors as in ``load``."""
     given, mesh, rises, drawing, chosen = data, None, list[Rise](), None, Chosen()
     with in_file(path, FileError):
         if "mesh" in data:

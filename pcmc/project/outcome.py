@@ -277,10 +277,7 @@ class Outcome:
         return self.certificate.index is not None and (small if asked is None else asked)
 
     def check_mesh(self, progress: OnStep | None = None) -> MeshCheck | None:
-        """The mesh check of what is shown, made once; None where it fails, and ``mesh_failure`` says why.
-
-        Corners of the plan stay corners.
-        """
+        """The mesh check of what is shown, made once; None where it fails, see ``mesh_failure``."""
         from ..accuracy import check_mesh  # takes long to import
 
         def check() -> MeshCheck | None:

@@ -25,10 +25,7 @@ SHARPER = " # tension of the wall; more gives a sharper valley"
 
 
 def drawing_reference(drawing: Path, project: Path) -> str:
-    """The name by which a project refers to its drawing, which lies in the project's folder or below it.
-
-    FileError for a drawing elsewhere; the message has the line to type.
-    """
+    """The name by which a project refers to its drawing; FileError for one outside the project's folder."""
     try:
         name = Path(os.path.relpath(drawing, project.parent))
     except ValueError:  # another drive
@@ -51,10 +48,8 @@ def project_text(
 ) -> tuple[str, Drawing]:
     """The text of the project for a drawing, .dxf or .3dm, and the drawing.
 
-    The project is in ``units``, by default those of the drawing; gaps between lines up to the length ``gap``
-    are closed. With ``refer`` it refers to the drawing by name, so that it follows it, instead of holding its
-    lines; ``folder`` is that of the project, by default the drawing's. FileError or PlanError for a drawing
-    that cannot be read, is no plan, or is outside that folder; MissingExtra without the library for it.
+    ``units``: by default the drawing's. ``gap``: gaps up to it are closed. ``refer``: by name, instead of
+    its lines; ``folder`` is the project's, by default the drawing's. FileError, PlanError, MissingExtra.
     """
     from ..plan.proposal import proposed
 
@@ -139,10 +134,7 @@ def proposal_text(project: Project) -> str:
 
 
 def _curve(curve: Any, closed: bool = False) -> str:
-    """A curve, or a point that stands for one, in TOML: a line for each of its parts.
-
-    Where every curve is ``closed``, a polyline need not say it.
-    """
+    """A curve, or a point, in TOML, a line for each part; where all are ``closed``, none says it."""
     from ..surface.curve_data import curve_data
 
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]

@@ -49,8 +49,7 @@ def opened(
     """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
 
     ``units`` is the unit of length that the roof is to be in; with ``start`` a project has its start shape,
-    which is not solved; ``changed`` is applied to the surface of the file, or to the start shape. The others
-    are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
+    not solved. The others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
 
     >>> roof = opened("notebooks/roof.toml", start=True)
     >>> roof.result is None, roof.certificate.certified
@@ -149,12 +148,10 @@ def run_project(
     use_cache: bool = True,
     check_after: bool = True,
 ) -> Outcome:
-    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
+    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface, solved in any case.
 
-    The mesh check comes after the files are written, so that Ctrl-C during it leaves them. Where a report is
-    among them, it comes before, unless ``mesh_check`` is false or the mesh is large. Without ``check_after``
-    the caller makes it. A good roof is kept in the cache, unless it was changed or ``use_cache`` is false; it
-    is solved in any case.
+    The mesh check comes last, so that Ctrl-C during it leaves the files; before a report, which shows it.
+    Without ``check_after`` the caller makes it.
     """
     progress = progress or ignore
     project = project if project.folder is not None else project.in_folder(project.path.parent)
@@ -178,10 +175,7 @@ def run_project(
 
 
 def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnStep) -> FileJobs:
-    """The project's files, each with the function that writes it.
-
-    A document of a roof that is not certified is marked.
-    """
+    """The project's files, each with the function that writes it; documents tell if it is not certified."""
     output, jobs = project.output, surface_files(outcome, project.output.files)
     kept = [] if output.picture is None else [Path(output.picture)]
     for picture in kept:
@@ -224,10 +218,9 @@ def vertex_fields(surface: Surface, certificate: Certificate) -> dict[str, Float
 
 
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
-    """The files of a roof with all that their formats hold, for ``write_all``.
+    """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
 
-    ``colour`` names the scalar that colours vertices. The fields of a surface that was not solved are those
-    of its file, and are missed where a format lacks them; fields and certificate of another nobody asked for.
+    Scalars of a surface that was not solved are those of its file.
     """
     surface, certificate, data = *outcome.shown, outcome.data
     about: dict[str, Any] = {"units": outcome.units, "colour": colour}
@@ -251,10 +244,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
 
 
 def write_all(jobs: FileJobs, progress: OnStep = ignore) -> list[Path]:
-    """Write files, each by its own function of a path; all of them appear together, or none.
-
-    The functions write to temporary files; errors and warnings name the final ones.
-    """
+    """Write files, each by its own function of a path: all appear together, or none."""
     paths = [path for path, _ in jobs]
     check_outputs(paths)
     with atomic_writes(paths) as temporaries:
@@ -296,10 +286,7 @@ def paint_families(path: Path, schedule: Panels, view: Any) -> None:
 def paint(
     surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
 ) -> None:
-    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows.
-
-    Several views stand side by side; reactions have one.
-    """
+    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
     # needs the extra plot, which a project without a picture does not
     from ..plot import draw, panel, reactions
 
@@ -322,10 +309,8 @@ def paint(
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
-    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``.
-
-    The folder ``made`` may be missing. A link to an input, and another way to write its path, is the input.
-    """
+    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``, also
+    by links and other ways to write them. The folder ``made`` may be missing."""
     seen, read = set(), [path for path in inputs if path.exists()]
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))

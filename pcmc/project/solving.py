@@ -69,10 +69,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
 
 
 def _check_wishes(project: Project, surface: Surface) -> None:
-    """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work.
-
-    The advice after it names a remedy that was tried.
-    """
+    """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
     with in_file(project.path):
         if project.output.structure is not None and project.structure is not None:
             project.structure.check(surface)
@@ -93,8 +90,7 @@ def _check_wishes(project: Project, surface: Surface) -> None:
 def solve_project(project: Project, surface: Surface, progress: OnStep = ignore) -> Outcome:
     """Solve a surface with the project's options, remesh it, meet its targets; write nothing.
 
-    A surface that is not certified, or misses a target, is not remeshed. The accuracy comes last; targets
-    are met once more on its mesh.
+    Only a good roof is remeshed. The accuracy comes last; targets are met once more on its mesh.
     """
     notes = list[str]()
     with in_file(project.path):
@@ -152,8 +148,7 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
 def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     """Solve the surface, or meet its targets, and certify it.
 
-    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
-    from a roof that is certified the search starts again, any other says why there is none.
+    If the search finds no start, it starts again from the roof without targets, if that is certified.
     """
     if not project.targets:
         return _solve(project, surface, report)
