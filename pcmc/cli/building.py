@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -208,18 +208,25 @@ def _ends(text: str) -> Any:
     return (a, b), (c, d)
 
 
+@dataclass(frozen=True)
+class Model:
+    """What the command line says of a structural model, instead of the project."""
+
+    thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None
+    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None
+    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None
+    density: Annotated[float | None, real("VALUE", DENSITY)] = None
+    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None
+    snow: Annotated[float | None, real("VALUE", SNOW)] = None
+    wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
+    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None
+
+
 def structure(
     *,
     file: Input,
     output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
-    thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None,
-    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None,
-    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None,
-    density: Annotated[float | None, real("VALUE", DENSITY)] = None,
-    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None,
-    snow: Annotated[float | None, real("VALUE", SNOW)] = None,
-    wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None,
-    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None,
+    given: Model,
     build: Build,
 ) -> int:
     """Write a structural model for CalculiX: prestressed membranes, supports, loads.
@@ -236,20 +243,13 @@ def structure(
         project = arguments.load(file)
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
-        thick = arguments.by_name(patches, thickness, "--thickness")
+        thick = arguments.by_name(patches, given.thickness, "--thickness")
         even = set(thick) == set(patches) and len(set(thick.values())) == 1  # one number, not one by patch
-        given = {
-            "thickness": thick[patches[0]] if even else thick or None,
-            "young": young,
-            "poisson": poisson,
-            "density": density,
-            "gravity": gravity,
-            "snow": snow,
-            "wind": arguments.by_name(patches, wind, "--wind") if wind else None,
-            "cable_area": cable_area,
-        }
-        values = {} if project.structure is None else asdict(project.structure)
-        wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
+        values: dict[str, Any] = {} if project.structure is None else asdict(project.structure)
+        values |= {name: value for name, value in vars(given).items() if value not in (None, [])}
+        values |= {"thickness": thick[patches[0]] if even else thick} if thick else {}
+        values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
+        wanted = projects.Structure(**values)
         wanted.check(start)
         roof = build.roof(project, progress)
         progress("certifying")

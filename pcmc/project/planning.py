@@ -121,13 +121,10 @@ def proposal_text(project: Project) -> str:
     'proposed: tension 3.2, edges of 0.28'
     """
     assert project.plan is not None
-    tensions = sorted({area.tension for area in project.plan.patches})
-    walls = sorted(
-        {divider.wall for divider in project.plan.dividers if isinstance(divider.wall, int | float)}
-    )
-    parts = [f"tension {' or '.join(f'{value:g}' for value in tensions)}"]
-    parts += [f"walls of {' or '.join(f'{value:g}' for value in walls)}"] if walls else []
-    parts.append(f"edges of {project.plan.edge_length:g}")
+    walls = {divider.wall for divider in project.plan.dividers if isinstance(divider.wall, int | float)}
+    values = {"tension": {area.tension for area in project.plan.patches}, "walls of": walls}
+    values["edges of"] = {project.plan.edge_length}
+    parts = [f"{what} {' or '.join(f'{v:g}' for v in sorted(own))}" for what, own in values.items() if own]
     name = project.path.with_suffix(".toml").name
     change = f"to change them: pcmc plan {project.path.name} -o {name}"
     return f"proposed: {', '.join(parts)}; {change}"

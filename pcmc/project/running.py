@@ -177,10 +177,9 @@ def run_project(
 def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnStep) -> FileJobs:
     """The project's files, each with the function that writes it; documents tell if it is not certified."""
     output, jobs = project.output, surface_files(outcome, project.output.files)
-    kept = [] if output.picture is None else [Path(output.picture)]
-    for picture in kept:
+    if output.picture is not None:
         painting = partial(paint, views=output.all_views, colour=output.colour, units=outcome.units)
-        jobs.append((picture, partial(painting, outcome.shown.surface)))
+        jobs.append((Path(output.picture), partial(painting, outcome.shown.surface)))
     if not output.documents:
         return jobs
     if output.report is not None and outcome.wants_mesh_check():
@@ -197,10 +196,10 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
             model = outcome.model(project.structure, anyway)
             documents.append(model_job(Path(output.structure), model))
         if output.report is not None:
-            listed = {path.name: "project" for path in project.inputs[:1]}
-            listed |= {path.name: "drawing or mesh of the roof" for path in project.inputs[1:]}
-            listed |= {Path(file).name: "surface" for file in output.files}
-            listed |= {picture.name: "picture" for picture in kept}
+            listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
+            listed[project.path.name] = "project"
+            listed |= {path.name: "surface" for path, _ in jobs}
+            listed |= {} if output.picture is None else {Path(output.picture).name: "picture"}
             listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
             report = outcome.report(output, files=listed, anyway=anyway)
             documents.append((Path(output.report), report.write))
@@ -291,21 +290,19 @@ def paint(
     from ..plot import draw, panel, reactions
 
     check_picture(views, colour)
-    look: dict[str, Any] = {"legend": True}
-    scalars = None
     if colour == "reactions":
         reactions(surface, path, view=views[0], units=units)
         return
+    look: dict[str, Any] = {"legend": True}
     if colour == "curvature":
-        scalars, look = mean_curvature(surface), {"label": f"mean curvature, {units.curvature}"}
+        look = {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
     elif colour == "error":
-        scalars, look = curvature_error(surface), {"label": "curvature error"}
+        look = {"scalars": curvature_error(surface), "label": "curvature error"}
     if len(views) == 1:
-        draw(surface, path, view=views[0], scalars=scalars, **look)
+        draw(surface, path, view=views[0], **look)
     else:
-        count = len(views)
-        each = None if scalars is None else [scalars] * count
-        panel([surface] * count, path, views=views, scalars=each, **look)
+        look |= {"scalars": [look["scalars"]] * len(views)} if "scalars" in look else {}
+        panel([surface] * len(views), path, views=views, **look)
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:

@@ -25,7 +25,7 @@ from .settings import AccuracyWanted
 from .start import start_of
 
 if TYPE_CHECKING:
-    from ..design import Design, Target
+    from ..design import Target
 
 Changed = Callable[[Surface], Surface]
 
@@ -46,13 +46,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         notes += metres_note(project.output.files, start.units.length)
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas and volumes are those of the part between the mirror planes")
-    about: dict[str, Any] = {
-        "units": start.units,
-        "unfold": project.output.whole,
-        "project": project,
-        "data": data,
-    }
-    outcome = replace(solved, notes=notes, **about)
+    outcome = replace(solved, notes=notes, units=start.units, unfold=project.output.whole, data=data)
     if outcome.good:
         return outcome
     notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
@@ -165,7 +159,8 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
 
 def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
     solver = solve if project.search else solvers.solve
-    return _certified(solver(surface, project.method, reporter(report), **project.options), report)
+    result = solver(surface, project.method, reporter(report), **project.options)
+    return _certified(result, report, result.status is Status.STOPPED)
 
 
 def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -177,17 +172,16 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     if project.target_tolerance is not None:
         options["tolerance"] = project.target_tolerance
     design = meet(surface, project.targets, project.vary, **options)
-    if design.status is DesignStatus.STOPPED:  # by Ctrl-C, which ends the command
-        raise KeyboardInterrupt
-    return _certified(design.result, report, design)
+    return _certified(design.result, report, design.status is DesignStatus.STOPPED, design=design)
 
 
-def _certified(result: Result, report: OnStep, design: Design | None = None) -> Outcome:
-    if design is None and result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+def _certified(result: Result, report: OnStep, stopped: bool, **found: Any) -> Outcome:
+    """The outcome of a search, unless Ctrl-C ``stopped`` it, which ends the command."""
+    if stopped:
         raise KeyboardInterrupt
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
-    return Outcome(result, design=design)
+    return Outcome(result, **found)
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -202,10 +196,8 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
     corners = Outcome(None, start=surface, project=project).corners
     wanted = vars(project.wanted) | dict(project.options)
     accurate = solve_to_accuracy(surface, corners=corners, callback=callback, **wanted)
-    if accurate.status is AccuracyStatus.STOPPED:  # by Ctrl-C, which ends the command
-        raise KeyboardInterrupt
-    accurate.result.certificate  # noqa: B018 — computed here, while the progress is shown
-    return Outcome(accurate.result, accurate=accurate)
+    stopped = accurate.status is AccuracyStatus.STOPPED
+    return _certified(accurate.result, report, stopped, accurate=accurate)
 
 
 def _newton_alone(project: Project, act: str) -> None:
