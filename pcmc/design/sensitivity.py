@@ -22,6 +22,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
+from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
 from ..forces.pinching import place_wall_rows
 from ..stability.bordered import solve_preconditioned
@@ -29,7 +30,6 @@ from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..surface import Surface
 from ..surface.values import rates_of
-from .quantities import Measurement
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 ACCURACY = 1e-9  # relative residual to which J s = b is solved

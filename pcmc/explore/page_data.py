@@ -14,11 +14,10 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
+from ..certificate.forces import Forces
 from ..certificate.quantities import dimension_of
-from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
-from ..design.quantities import MEASURES
-from ..design.targets import NAMED
+from ..design.targets import MEASURES, NAMED
 from ..forces.curvature import curvature_error, mean_curvature
 from ..margins.varied import named
 from ..panelling.distance import difference
@@ -175,7 +174,7 @@ def fields(state: SessionState, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     shown = surface if whole is None else whole.surface
-    acting = certificate.acting if whole is None else support_forces(shown)
+    acting = certificate.acting if whole is None else Forces.of(shown)
     arrays: Arrays = {
         "vertices": shown.vertices - origin,
         "curvature": mean_curvature(shown, "variational"),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
-from ..certificate.balance import balance_sentence
+from ..certificate.supports import balance_sentence
 from ..panelling import Panels
 from .tables import MOST_FAMILIES, one, small
 

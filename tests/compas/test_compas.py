@@ -25,7 +25,7 @@ from tents import tent
 import pcmc
 from generators import two_squares
 from pcmc.base.errors import FileWarning, MissingExtra, OptionError, SurfaceError
-from pcmc.certificate.reactions import reactions
+from pcmc.certificate.forces import reactions
 
 compas_data = pytest.importorskip("compas.data")
 rooms = pytest.importorskip("pcmc.compas")
