@@ -104,16 +104,31 @@ class Loads:
     @property
     def change(self) -> Callable[[Surface], Surface] | None:
         """What gives a surface these values; None if there are none."""
-        return self.of if any(vars(self).values()) else None
+        return self.of if any(getattr(self, f.name) for f in fields(Loads)) else None
 
     def of(self, surface: Surface) -> Surface:
         """The surface with these values; wall pressures follow those of their rooms."""
         sheets = [patch.name for patch in surface.patches if not patch.wall]
-        names = dict.fromkeys(vars(self), [p.name for p in surface.patches if not p.auxiliary] or sheets)
-        names |= {"weight": sheets, "cable": [cable.name for cable in surface.cables]}
-        names["volume"] = [room.name for room in surface.rooms]
-        given = {f"{key}s": by_name(names[key], texts, f"--{key}") for key, texts in vars(self).items()}
+        loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
+        names = {"tension": loaded, "pressure": loaded, "weight": sheets, "snow": loaded}
+        names |= {"cable": [cable.name for cable in surface.cables]}
+        names |= {"volume": [room.name for room in surface.rooms]}
+        given = {f"{key}s": by_name(own, getattr(self, key), f"--{key}") for key, own in names.items()}
         return projects.with_loads(surface, given)
+
+
+@dataclass(frozen=True)
+class Shown(Loads):
+    """What of a file is shown: with other values, designed or not."""
+
+    start: Start = False
+    cache: Cache = True
+
+    def roof(self, project: Project, progress: OnStep, whole: bool) -> Outcome:
+        """The roof of a project; the ``whole`` one if asked for."""
+        how: dict[str, Any] = {"changed": self.change, "start": self.start, "use_cache": self.cache}
+        roof = projects.opened(project, progress, **how)
+        return replace(roof, unfold=whole or roof.unfold)
 
 
 @dataclass(frozen=True)
@@ -126,7 +141,7 @@ class Build:
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
-        roof, file = opened(project, progress, self.whole, use_cache=self.cache), project.path
+        roof, file = Shown(cache=self.cache).roof(project, progress, self.whole), project.path
         if roof.certified and not roof.good and not self.allow_uncertified:
             hint = f"pcmc solve {file} shows them, --allow-uncertified accepts the roof"
             text = f"{file}: the roof misses its targets or its accuracy; {hint}"
@@ -155,12 +170,6 @@ def with_groups(function: Callable[..., int]) -> Callable[..., int]:
 
     vars(run).update(__signature__=inspect.Signature(parameters), __annotations__={})
     return run
-
-
-def opened(project: Project, progress: OnStep, whole: bool, **how: Any) -> Outcome:
-    """The roof of a project; the ``whole`` one if asked for."""
-    roof = projects.opened(project, progress, **how)
-    return replace(roof, unfold=whole or roof.unfold)
 
 
 def load(file: Path, units: str = "") -> Project:

@@ -22,13 +22,12 @@ from .arguments import (
     Input,
     Loads,
     MeshCheck,
-    Start,
+    Shown,
     Whole,
     check_outputs,
     count,
     flag,
     load,
-    opened,
     option,
     real,
 )
@@ -122,11 +121,9 @@ def solve_(
 def certify_(
     *,
     file: Input,
-    loads: Loads,
+    what: Shown,
     meshes: Annotated[int | None, count(MESHES)] = None,
     margin: Annotated[list[str] | None, option("WHAT", MARGIN)] = None,
-    start: Start = False,
-    cache: Cache = True,
     whole: Annotated[bool, flag("--whole", WHOLE_INDEX)] = False,
     verify: Verify = False,
 ) -> int:
@@ -143,8 +140,7 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        how: dict[str, Any] = {"changed": loads.change, "start": start, "use_cache": cache}
-        roof = opened(load(file), progress, whole, **how)
+        roof = what.roof(load(file), progress, whole)
         progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
@@ -193,7 +189,8 @@ def remesh_(
             writing = partial(write, surface=surface, units=roof.units)
             projects.write_all([(path, writing) for path in output], progress)
     if not solve:
-        print(note, end="\n" if note else "")
+        if note:
+            print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     reports.report(outcome)
