@@ -20,10 +20,11 @@ from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
+from ..surface.geometry import bounding_size
 from ..surface.pieces import Piece, to_space
 from .draft import Draft, drafted
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
-from .lines import SNAP, Kind, PlanLine
+from .lines import EXACT, SNAP, Kind, PlanLine
 from .parts import PatchSpec
 from .walls import Roof, rooms_of, upright_planes, walls_of
 
@@ -35,7 +36,6 @@ FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper a
 SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room
 REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
-EXACT = 1e-9  # of the size: a vertex this near to its curve is on it
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
@@ -298,7 +298,7 @@ def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> Hel
     part = part.mapped(plane.axes.T, np.array(plane.point))
     there = part.at(t)
     away = np.linalg.norm(X[V] - there, axis=1)
-    near = EXACT * float(np.linalg.norm(np.ptp(X, axis=0)))
+    near = EXACT * bounding_size(X)
     if away[1:-1].max(initial=0.0) > near or away.max() > REACH * draft.plan.edge_length:
         return None
     pieces = list(part.pieces)

@@ -14,7 +14,7 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError, SurfaceError
 from ..meshing.planar import SIDES, PlanarMesh, signed_areas, triangulate
 from ..surface.curves import Curve
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import bounding_size, segment_lengths
 from ..surface.pieces import point_text, to_local, two_digits
 from ..surface.topology import components
 from .arrangement import Arrangement, Chain, arrange, hole_points
@@ -110,8 +110,7 @@ def _arranged(plan: Plan) -> tuple[list[PlanLine], list[Curve], Arrangement]:
     _check_size(plan, [*lines, *supports])
     tree, on_edge = LineTree([line for line in lines if line.bounds]), []
     for line in supports:
-        samples = line.curve.samples(0.5 * plan.edge_length)[:, :2]
-        if all(tree.at(samples, SNAP * plan.edge_length)):
+        if tree.leaves(line.curve, 0.5 * plan.edge_length, SNAP * plan.edge_length) is None:
             on_edge.append(line.curve)
         else:
             lines.append(line)
@@ -135,7 +134,7 @@ def _check_size(plan: Plan, lines: Sequence[PlanLine]) -> None:
         problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
         raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
     _check_count(plan, lines[0].xy, 0)
-    size = float(np.linalg.norm(np.ptp(lines[0].xy, axis=0)))
+    size = bounding_size(lines[0].xy)
     if plan.edge_length > size:
         problem = (
             f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to corner"

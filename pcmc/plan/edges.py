@@ -15,15 +15,15 @@ from ..base.errors import PlanError
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
+from ..surface.geometry import bounding_size
 from ..surface.pieces import point_text, to_local, to_space
 from .arrangement import Arrangement
-from .lines import SNAP, Kind, LineTree, PlanLine
+from .lines import EXACT, SNAP, Kind, LineTree, PlanLine
 from .parts import cable_label
 
 if TYPE_CHECKING:
     from .plan import Plan
 
-ON_MIRROR = 1e-9  # of the plan's size: a boundary this near to a mirror is on it
 NONE = -1  # the cable of an edge without one
 
 
@@ -95,13 +95,12 @@ def check_lines(plan: Plan, lines: Sequence[PlanLine]) -> None:
     """Refuse a cable that leaves the boundary, and a mirror that the plan crosses."""
     edges = LineTree([line for line in lines if line.bounds])
     for number, part in enumerate(plan.cables, start=1):
-        points = part.curve.local(plan.plane).samples(0.5 * plan.edge_length)[:, :2]
-        for xy, places in zip(points, edges.at(points, SNAP * plan.edge_length), strict=True):
-            if not places:
-                name = cable_label(part, number)
-                problem = f"{name} is at {point_text(xy)} on no edge of the outline or of a hole; draw it"
-                problem += " along one, or give a divider cable = where it crosses the roof"
-                raise PlanError(problem, what=name, where=tuple(xy.tolist()))
+        xy = edges.leaves(part.curve.local(plan.plane), 0.5 * plan.edge_length, SNAP * plan.edge_length)
+        if xy is not None:
+            name = cable_label(part, number)
+            problem = f"{name} is at {point_text(xy)} on no edge of the outline or of a hole; draw it"
+            problem += " along one, or give a divider cable = where it crosses the roof"
+            raise PlanError(problem, what=name, where=tuple(xy.tolist()))
     for number, distance in enumerate(_mirror_distances(plan, lines[0].xy), start=1):
         if distance.min() < 0.0 < distance.max():
             smaller = np.argmin(distance) if distance.max() > -distance.min() else np.argmax(distance)
@@ -117,7 +116,7 @@ def _mirror_distances(plan: Plan, points: Floats) -> list[Floats]:
         a, b = mirror.local(plan.plane).at([0.0, 1.0])[:, :2]
         along = (b - a) / np.linalg.norm(b - a)
         distance = (points - a) @ [-along[1], along[0]]
-        distances.append(np.where(np.abs(distance) <= ON_MIRROR * _size(points), 0.0, distance))
+        distances.append(np.where(np.abs(distance) <= EXACT * bounding_size(points), 0.0, distance))
     return distances
 
 
@@ -168,7 +167,7 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
 
     Between supports an edge changes its height in proportion to the length."""
     heights, change = drawn.heights.copy(), np.zeros(len(drawn.heights))
-    size, rim = _size(drawn.points), np.unique(edges.ends)
+    size, rim = bounding_size(drawn.points), np.unique(edges.ends)
     loose = np.setdiff1d(rim, edges.vertices("fixed", "sliding"))
     required = iter(drawn.required.tolist())
     for support in plan.supports:
@@ -185,7 +184,7 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
             continue
         heights[vertices] = np.where(np.isnan(heights[vertices]), given, heights[vertices])
         steps = given - heights[vertices]
-        wrong = np.flatnonzero((np.abs(steps) > ON_MIRROR * size) & ~np.isin(vertices, loose))
+        wrong = np.flatnonzero((np.abs(steps) > EXACT * size) & ~np.isin(vertices, loose))
         if len(wrong):
             xy, height, there = (a[wrong[0]] for a in (drawn.points[vertices], given, heights[vertices]))
             problem = f"the support at {point_text(xy)} is at height {height:g}, but the edge or line there"
@@ -217,7 +216,3 @@ def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequ
                 problem = f"patch {name!r} has the {key} {value:g} and a free edge with a cable, which closes"
                 problem += f" no space for it; give the patch {instead}, or hold that edge"
                 raise PlanError(problem, what=key, where=name, found=value)
-
-
-def _size(points: Floats) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -182,11 +182,13 @@ def project_of(
         data, drawing, chosen = with_drawing(path, data)
     stages = data.get("remesh", [])
     with in_file(path, FileError):
-        solving = _solving(data.get("solve", {}))
-        output = _output(data.get("output", {}))
-        units = Units(data.get("units", ""), data.get("force", ""))
+        values = _solving(data.get("solve", {}))
+        output, units = _output(data.get("output", {})), Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
         output.check(units, structure)
+        values |= {"output": output, "units": units, "structure": structure, "drawing": drawing}
+        stages = stages if isinstance(stages, list) else [stages]
+        values["remeshing"] = [section_of(Remeshing, "remesh", stage) for stage in stages]
         plan, targets, vary = None, list["Target"](), list["Parameter"]()
         if mesh is None:
             plan = plan_from(data["plan"])
@@ -196,27 +198,9 @@ def project_of(
             if plan is not None:
                 _check_sought_once(rises, sought, plan)
             targets, vary = [*own, *targets], [*sought, *vary]
-        return Project(
-            path=path,
-            plan=plan,
-            mesh=mesh,
-            text=text,
-            data=given,
-            units=units,
-            **solving,
-            remeshing=[
-                section_of(Remeshing, "remesh", stage)
-                for stage in (stages if isinstance(stages, list) else [stages])
-            ],
-            targets=targets,
-            vary=vary,
-            target_tolerance=data.get("targets", {}).get("tolerance"),
-            structure=structure,
-            output=output,
-            drawing=drawing,
-            rises=rises,
-            chosen=chosen,
-        )
+            values["target_tolerance"] = data["targets"].get("tolerance")
+        values |= {"targets": targets, "vary": vary, "rises": rises, "chosen": chosen}
+        return Project(path, plan, mesh, text, given, **values)
 
 
 def _solving(table: Mapping[str, Any]) -> dict[str, Any]:
