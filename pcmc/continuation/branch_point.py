@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..base.tolerances import NULL_MODE
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from .correction import BorderedMatrix, NotOnBranch, correct, fixed_arclength
@@ -27,7 +28,6 @@ from .options import FollowOptions
 from .state import BranchMesh, BranchState
 
 TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
-NULL = 0.05  # of the next eigenvalue: how far from 0 that of the mode may be
 DRIFT = 1e-6  # of the size: mean displacement of a mode of size 1 below which it has no direction
 ALONG = 0.5  # cosine between mode and branch from which the branch itself turns: a fold
 
@@ -141,7 +141,7 @@ def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int
         values, modes = soft_modes(at, 2)
     except NotOnBranch as reason:
         raise OptionError(f"event {row}: {reason}", what="event", where=row) from None
-    if len(values) > 1 and not abs(values[0]) <= NULL * abs(values[1]):
+    if len(values) > 1 and not abs(values[0]) <= NULL_MODE * abs(values[1]):
         message = (
             f"no mode turns at event {row}: the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"
         )

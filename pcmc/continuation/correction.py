@@ -24,14 +24,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import BRANCH_END, ON_BRANCH
 from ..stability.bordered import BorderedFactor, solve_preconditioned
 from ..stability.factorisation import SingularMatrix
 from .state import BranchMesh, BranchState
 
 ITERATIONS = 12  # most Newton steps of a correction
 SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
-LEAST_QUALITY = 0.02  # triangle quality below which no point is accepted
-CONSTRAINT_TOLERANCE = 1e-9  # |g| that counts as zero
 
 
 class NotOnBranch(ArithmeticError):
@@ -140,12 +139,12 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
     for iteration in range(1, ITERATIONS + 2):
         if not mesh.line.allows(at.parameter):
             raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
-        if iteration > 1 and at.quality < LEAST_QUALITY:
+        if iteration > 1 and at.quality < BRANCH_END:
             raise MeshCollapsed("triangles collapse")
         if iteration > 1 and mesh.reaches_plane(at.X).any():
             raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method
         g = constraint.value(at)
-        if at.residual <= tolerance and abs(g) <= CONSTRAINT_TOLERANCE:
+        if at.residual <= tolerance and abs(g) <= ON_BRANCH:
             return at
         error = at.residual + abs(g)
         slow = 0 if error < SLOW * last else slow + 1

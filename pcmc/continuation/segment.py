@@ -14,13 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.tolerances import EVENT_ACCURACY, FOLD_ACCURACY, GOAL_ACCURACY
 from ..forces.functional import patch_volumes
 from .branch_point import BranchPoint, branch_point
 from .state import BranchState
-
-EVENT_ACCURACY = 2e-5  # arclength to which events are located, and so λ relative to its scale
-FOLD_ACCURACY = 1e-3  # the same for folds, over the segment's length: λ hardly changes with t there
-GOAL_ACCURACY = 1e-12  # arclength to which goals are met
 
 
 def crosses_goal(before: BranchState, after: BranchState, goals: Mapping[str, float]) -> bool:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from ..base.errors import NoBranch, SurfaceError
 from ..base.interrupts import stop_requested
+from ..base.tolerances import EVENT_ACCURACY, START_RESIDUAL
 from ..forces.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
@@ -34,10 +35,9 @@ from .correction import (
 )
 from .direction import ParameterLine
 from .options import Ending, FollowOptions
-from .segment import EVENT_ACCURACY, Segment, crosses_goal
+from .segment import Segment, crosses_goal
 from .state import BranchMesh, BranchState
 
-START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
 QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
 CLEARLY_BETTER = 1.02  # ratio of the qualities of a redistributed mesh and the old one
 CONTACT_STEP = 0.02  # length of a step at which a new contact, solved for by itself, is near enough

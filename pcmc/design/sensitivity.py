@@ -21,7 +21,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
-from ..certificate.certificate import TOLERANCE
+from ..base.tolerances import AT_REST
 from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
 from ..forces.pinching import place_wall_rows
@@ -137,10 +137,10 @@ def _slopes(
 
 def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tuple[Floats, Floats]]:
     """dX/dλ (n,3) and dδ/dλ (r,) while values change at these rates."""
-    if at.residual_with_pull > TOLERANCE:
+    if at.residual_with_pull > AT_REST:
         found = at.residual_with_pull
         message = f"sensitivities: the surface is not at rest (residual {found:.1e}); solve it first"
-        raise SurfaceError(message, what="surface", found=found, expected=TOLERANCE)
+        raise SurfaceError(message, what="surface", found=found, expected=AT_REST)
     try:
         inverse = at.factorised(soften=False).bordered
     except SingularMatrix:

@@ -15,6 +15,7 @@ import numpy as np
 from .. import solvers
 from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
+from ..base.tolerances import HOMOTOPY_END, SOUND
 from ..certificate.balance import load_name, load_ratio
 from ..certificate.neck import held_groups
 from ..certificate.proof import Attempt
@@ -25,8 +26,6 @@ from ..surface import Surface
 from .starts import low_start
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
-SOUND = 0.2  # triangle quality from which a turn counts as the surface's, not the mesh's
-LEAST_QUALITY = 0.1  # triangle quality at which a branch is given up
 MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
 LOADS = (0.5, 0.2, 0.05, 0.01)  # of the loads, or of what the boundary carries, at which to begin
 DISTANCES = (0.5, 0.25, 0.1, 0.03)  # of the distance between held curves, at which to begin
@@ -198,7 +197,7 @@ def until_turned(
         if extra is not None:
             extra(progress)
         slack = BACK * farthest if back is None else back
-        if progress.row["parameter"] < farthest - slack or progress.row["quality"] < LEAST_QUALITY:
+        if progress.row["parameter"] < farthest - slack or progress.row["quality"] < HOMOTOPY_END:
             raise StopIteration
 
     return watch

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..base.arrays import Bools
 from ..base.interrupts import stop_requested
+from ..base.tolerances import AT_REST
 from ..certificate.balance import (
     describe_growing,
     growing_part,
@@ -17,7 +18,6 @@ from ..certificate.balance import (
     unheld,
 )
 from ..certificate.cables import weak_cable
-from ..certificate.certificate import TOLERANCE
 from ..certificate.neck import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..forces.pinching import standing_part
@@ -121,7 +121,7 @@ def _name(result: Result) -> str:
 def _failed(first: Result, proofs: list[Proof], tried: list[Attempt], evaluations: int) -> Result:
     """The first result, with the proofs or what was tried."""
     neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
-    if first.rows[-1]["residual"] <= TOLERANCE:  # a coarse mesh may rest where no smooth surface does
+    if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
         proofs = []
     status, folds = first.status, [attempt for attempt in tried if attempt.folds]
     if proofs:

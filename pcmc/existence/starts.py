@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import FAILED, ON, PARALLEL
 from ..certificate.forces import load
 from ..forces.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
@@ -16,7 +17,6 @@ from ..surface.geometry import cross_2d
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
 WIDE = 1.5  # of that extent: a plan that is wider is not kept
-SOUND = 0.05  # quality of the plan's triangles above which the plan is kept
 
 
 def low_start(surface: Surface) -> Surface | None:
@@ -46,7 +46,7 @@ def low_start(surface: Surface) -> Surface | None:
     turns = np.sign(cross_2d(corners[:, 1], corners[:, 2]))
     plan = triangle_quality(place * [1.0, 1.0, 0.0], faces)
     extent, span = _diagonal(place[roof]), _diagonal(place[held]) or _diagonal(place[roof])
-    kept = np.abs(turns.sum()) == len(turns) and plan.min() > SOUND and extent < WIDE * span
+    kept = np.abs(turns.sum()) == len(turns) and plan.min() > FAILED and extent < WIDE * span
     low = place.copy()
     if not kept and surface.on_planes:
         return None  # spread anew, its boundary would leave the planes
@@ -74,10 +74,10 @@ def low_start(surface: Surface) -> Surface | None:
 def _spans_a_surface(surface: Surface) -> bool:
     """Whether its fixed vertices do not lie on one line, and no plane besides Π holds heights."""
     points, normal = surface.vertices[surface.fixed], np.array(surface.plane.normal)
-    if len(points) < 3 or any(abs(normal @ plane.normal) > 1e-9 for plane, _ in surface.on_planes):
+    if len(points) < 3 or any(abs(normal @ plane.normal) > PARALLEL for plane, _ in surface.on_planes):
         return False
     lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(lengths[1] > 1e-9 * lengths[0])
+    return bool(lengths[1] > ON * lengths[0])
 
 
 def _diagonal(place: Floats) -> float:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.tolerances import EXCESS
 from ..surface import Surface
 from .functional import energy_and_gradient
 from .pinching import Walls
-
-SLACK = 1e-9  # of the capacity: an excess below is rounding
 
 
 def pull_and_capacity(
@@ -43,7 +42,7 @@ def excess_pull(surface: Surface, walls: Walls, resting: Bools) -> Floats:
     Zero at equilibrium: a junction that is pulled harder stands off Π. Signed as the pull is.
     """
     pull, capacity = pull_and_capacity(surface, walls, resting)
-    beyond = np.where(np.abs(pull) > capacity * (1.0 + SLACK), np.abs(pull) - capacity, 0.0)
+    beyond = np.where(np.abs(pull) > capacity * (1.0 + EXCESS), np.abs(pull) - capacity, 0.0)
     return np.copysign(beyond, pull)
 
 

@@ -14,11 +14,11 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.checks import lying
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
-FLAT = 1e-9  # of the size: with its top edge at most this high, a wall's heights show no rows
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
 
 
@@ -97,7 +97,7 @@ def wall_rows(
         top = np.linalg.norm(drop, axis=1)
         share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
         whole = top**2
-    stands = np.abs(top) > FLAT * surface.size
+    stands = np.abs(top) > ON * surface.size
     relative = np.divide(share, whole, out=zero, where=stands)
     relative = np.clip(relative, 0, 1)
     if not stands.all():

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..certificate.verdict import COLLAPSED, NOISE
+from ..base.tolerances import COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
@@ -22,13 +22,10 @@ from .steps import Stepper
 TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
-ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
-POOR = 0.15  # triangle quality that explains why no step helps
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
 SLOW_DESCENT_STEPS = (3, 30)  # that hardly lower E: when a saddle that slips is accepted, when any
 NEAR_SADDLE = 1e-3  # residual near a saddle
 MIN_ENERGY_DROP = 1e-6  # of Σ α A: by less E is hardly lowered in these steps
-SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
 
 
 @dataclass(frozen=True)
@@ -186,7 +183,7 @@ class NewtonRun:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
         residual = self.state.at.residual
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        rounded = max(ROUNDED, NOISE * self.state.rounding)
+        rounded = max(ROUNDED_REST, NOISE * self.state.rounding)
         return residual <= self.options.tolerance or (residual <= rounded and no_progress)
 
     def _leave_rest(self) -> bool:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import SurfaceError
+from ..base.tolerances import POOR
 from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..forces.functional import energy
 from ..forces.pinching import find_walls
@@ -26,7 +27,7 @@ from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import descent_mode
 from ..surface import Surface
-from .attempt import DESCENTS, POOR, SLOW_DESCENT_STEPS, Log, NewtonOptions, NewtonRun
+from .attempt import DESCENTS, SLOW_DESCENT_STEPS, Log, NewtonOptions, NewtonRun
 from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]

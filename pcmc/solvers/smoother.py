@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csr_array, triu
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import PARALLEL
 from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.second_variation import assemble
@@ -24,7 +25,6 @@ from ..surface.supports import apply_supports
 from ..surface.topology import SHEET
 
 FLOOR = 1e-2  # of the largest tension it is connected with: the least tension of any patch in L_α
-ACROSS = 1e-9  # sine or cosine of an angle up to which directions count as parallel or at right angles
 SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports, too
 
 
@@ -74,7 +74,7 @@ def _axes(surface: Surface) -> Floats:
     normal = np.array(surface.plane.normal)
     for plane, _ in surface.on_planes:
         first = np.array(plane.normal)
-        if abs(first @ normal) <= ACROSS:
+        if abs(first @ normal) <= PARALLEL:
             first -= (first @ normal) * normal
             first /= np.linalg.norm(first)
             return np.stack([first, np.cross(normal, first), normal])
@@ -93,7 +93,7 @@ def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list
     for axis in axes:
         stopped = held.copy()
         for plane, mask in planes:
-            if np.linalg.norm(np.cross(axis, plane.normal)) <= ACROSS:
+            if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL:
                 stopped |= mask
         masks.append(used & ~stopped)
     number = [next(k for k in range(3) if np.array_equal(masks[k], mask)) for mask in masks]

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.tolerances import ROOM_VOLUME
 from ..forces.functional import energy_at
 from ..forces.loose_parts import rounding_left
 from ..forces.pinching import (
@@ -39,7 +40,6 @@ DAMPING = 0.25  # factor on both, each time that the vertex is lifted again
 RETRY = 2 / 3  # of the quality aimed at: below this redistribution is tried again after it has failed
 REDISTRIBUTIONS = 60  # the most of them
 VOLUME_STEPS = 4  # the most corrections of the volumes after a move
-VOLUME_LEFT = 1e-10  # of a volume: corrected up to here
 RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 
 
@@ -124,7 +124,7 @@ class SolverState:
         area = vertex_area_vectors(X, self.at.classes.faces)[1]
         for _ in range(VOLUME_STEPS):
             left = wanted - volumes_at(surface, X)
-            if (np.abs(left) <= VOLUME_LEFT * np.abs(self.at.wanted_volumes)).all():
+            if (np.abs(left) <= ROOM_VOLUME * np.abs(self.at.wanted_volumes)).all():
                 break
             G = volume_gradients_at(surface, X)
             even = G / np.where(area > 0.0, area, 1.0)[:, None]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import DIFFERENCE_ROUNDING
 from ..meshing.quality import edge_lengths
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium, SecondVariation
@@ -23,7 +24,6 @@ LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
 REFRESH = 6  # descent steps between two factorisations of the Laplacian
 GROWTH = 0.5  # of a room's volume: the most that a step adds to it or takes away
 DRIFT = 0.1  # of an edge: the most that a step moves along a rigid motion that no support resists
-ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
 class Stepper:
@@ -78,7 +78,7 @@ class Stepper:
                     self.second = None
                 self.kind = "newton" if second.stiffness == 0.0 else "shifted"
                 return True
-            if state.at.residual <= ROUNDING:
+            if state.at.residual <= DIFFERENCE_ROUNDING:
                 break
             state.change_pressures(-t * pressures)
             state.go_to(at.X)
