@@ -56,10 +56,7 @@ class Strokes:
 def read_strokes(path: Path, units: str = "") -> Strokes:
     """All strokes of a drawing, in ``units``, such as "m", or in its own unit.
 
-    Raises
-    ------
-    FileError : for a file that is no drawing, damaged or too large, and for coordinates that are no numbers.
-    MissingExtra : without the library that reads it.
+    FileError for a file that is no drawing, damaged or too large; MissingExtra without the library.
     """
     check_regular(path)
     suffix = path.suffix.lower()
