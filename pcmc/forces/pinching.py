@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
@@ -239,6 +239,7 @@ class StandingPart:
         return self.surface.faces[~self.walls.pinchable[self.surface.patch_of_face]]
 
 
+@kept_with_owner
 def standing_part(surface: Surface) -> StandingPart:
     """The part of a surface that stands, by its positions. Computed once per surface.
 
@@ -248,12 +249,8 @@ def standing_part(surface: Surface) -> StandingPart:
     >>> standing_part(square).surface is square
     True
     """
-    part: StandingPart | None = vars(surface).get("standing_part")
-    if part is None:
-        walls = find_walls(surface)
-        part = StandingPart.of(surface, walls, resting_vertices(surface, walls))
-        vars(surface)["standing_part"] = part  # where a cached property would put it
-    return part
+    walls = find_walls(surface)
+    return StandingPart.of(surface, walls, resting_vertices(surface, walls))
 
 
 def top_spacing(surface: Surface, walls: Walls) -> Floats:
