@@ -95,7 +95,6 @@ class BoundaryLine(ParameterLine):
         return abs(self.value) or 1.0
 
     def surface_at(self, surface: Surface, value: float) -> Surface:
-        """The surface itself."""
         return surface
 
     def boundary(self, value: float) -> Floats:

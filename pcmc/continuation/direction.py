@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -24,6 +25,17 @@ from ..surface.supports import apply_supports
 from ..surface.values import KINDS, part_index, part_values, rates_of
 
 VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
+
+
+@runtime_checkable
+class Named(Protocol):
+    """What names the parts whose value varies, and one of ``VARIED``, such as ``pcmc.Parameter``."""
+
+    @property
+    def key(self) -> str: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)

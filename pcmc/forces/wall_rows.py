@@ -1,7 +1,4 @@
-"""The rows of a wall: where its vertices lie below its top edge, so that they follow when it moves.
-
-And walls whose bottom is held on Π: which can pinch, and the vertices that their junctions come down on.
-"""
+"""Rows of a wall: where its vertices lie below its top edge; and which walls with held bottoms can pinch."""
 
 from __future__ import annotations
 
@@ -72,15 +69,17 @@ class WallRows:
 
 
 def wall_rows(
-    surface: Surface, vertices: Ints, top_edges: Ints, wall_edges: Ints, foot: Ints | None = None
+    surface: Surface, roof_vertex: Bools, top_edges: Ints, wall_edges: Ints, foot: Ints | None
 ) -> WallRows:
-    """The rows of one wall: its ``vertices`` below the nearest of its ``top_edges`` (k,2), seen along n.
+    """The rows of one wall: its vertices below the nearest of its ``top_edges`` (k,2), seen along n.
 
     ``foot`` (n,) gives the held bottom vertex below each top vertex, if the bottom is held.
 
     Where the top edge lies on the bottom its height shows nothing. There ρ is that of the vertex's row: steps
     along ``wall_edges`` from the foot, over those from foot to top.
     """
+    vertices = np.unique(wall_edges)
+    vertices = vertices[~roof_vertex[vertices]]
     X, height = surface.vertices, surface.plane.height(surface.vertices)
     flat = X - height[:, None] * np.array(surface.plane.normal)
     ends, fraction = _nearest(flat, vertices, top_edges)
@@ -163,7 +162,7 @@ def held_walls(
 ) -> list[tuple[int, Ints, Ints, Ints]]:
     """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
 
-    All that have one top edge to either side of each junction vertex; none unless a junction rests on one.
+    These have one top edge to either side of each junction vertex; none unless a junction rests on one.
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
@@ -193,8 +192,7 @@ def held_walls(
 def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
-    Both edges (k,2) start from the corners where the wall ends, which are their own feet. The vertices so
-    many steps from each corner along the top and along the bottom make a pair.
+    As many steps along the top and along the bottom from each corner, where the wall ends, make a pair.
     """
     tops, bottoms = np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)

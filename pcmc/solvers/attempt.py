@@ -62,18 +62,19 @@ class NewtonOptions:
         validate.number("inflation", self.inflation, above=1.0)
 
 
+@dataclass
 class Log:
     """What all attempts of a solve share: the callback, and the counts of their work."""
 
-    def __init__(self, callback: Callback | None) -> None:
-        self.callback = callback
-        self.evaluations = self.factorisations = 0
+    callback: Callback | None
+    evaluations: int = 0
+    factorisations: int = 0
 
 
 class NewtonRun:
     """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
-    ``rows`` are the history up to here, with those of the runs ``before``; ``status`` is why the run ended.
+    ``rows`` are its history, after those of the runs ``before``; ``status`` is why it ended.
     """
 
     def __init__(
@@ -163,7 +164,7 @@ class NewtonRun:
             self.log.callback(Progress(len(self.rows) - 1, state.result_surface, row))
 
     def _step(self) -> None:
-        """One step: along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
+        """Along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
         stepper = self.stepper
         if stepper.saddle_near() and stepper.leave_saddle():
             self.smooth_steps = 0
@@ -203,10 +204,7 @@ class NewtonRun:
         return False
 
     def _descends_slowly(self) -> bool:
-        """Whether the way down from a saddle hardly lowers E: often it only spoils triangles.
-
-        True once for each number of steps in ``SLOW_DESCENT_STEPS``.
-        """
+        """Whether ``patience`` steps down from a saddle hardly lowered E: often they only spoil triangles."""
         state = self.state
         down = self.stepper.kind in DOWN and state.at.residual <= NEAR_SADDLE
         if self.patience == np.inf or not down:

@@ -54,9 +54,6 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
 class Evaluator:
     """E and ∇E of ``surface`` with its vertices at other positions; ``count`` is the number of calls.
 
-    A run has converged at ``tolerance`` (see ``converged_below``), and diverged where the bounding box is
-    more than ``inflation`` times that of the surface.
-
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

@@ -172,8 +172,6 @@ passes through to the caller of ``solve``, and so does StopIteration out of ``ne
 def until_stopped(run: Callable[[], Status]) -> Status:
     """The status that ``run`` returns; STOPPED where StopIteration or Ctrl-C ends it.
 
-    All solvers run within this call: a request to stop becomes a status here and nowhere else.
-
     >>> until_stopped(lambda: Status.CONVERGED).name
     'CONVERGED'
     """

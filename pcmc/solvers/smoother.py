@@ -2,9 +2,8 @@
 
     L_α d = - B Bᵀ ∇E
 
-d is the gradient of E in the H¹ metric (Pinkall and Polthier 1993 minimise area this way). A step of length
-1 along d lowers the residual by about the same factor on every mesh, and moves neighbours together: the
-sheets around a junction follow it.
+(Pinkall and Polthier 1993 minimise area this way). A step of length 1 along d lowers the residual by about
+the same factor on every mesh, and moves neighbours together: the sheets around a junction follow it.
 """
 
 from __future__ import annotations
@@ -31,10 +30,8 @@ SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports,
 class Smoother:
     """L_α at one shape, factorised.
 
-    Fixed vertices hold all coordinates, sliding ones only that normal to their plane; so the coordinates
-    along Π have one factorisation, the normal one another: ``factorisations`` counts those of each
-    ``refresh``. Planes at right angles have coordinates of their own; on an oblique one the part along it is
-    taken.
+    Fixed vertices hold all coordinates, sliding ones only that normal to their plane: ``factorisations``
+    counts the different ones. On planes oblique to the coordinates the part along them is taken.
     """
 
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
@@ -126,12 +123,11 @@ def _laplacian(
 
 
 class HarmonicExtension:
-    """Lets the inside of the sheets follow the motion of their curves.
+    """Lets the inside of the sheets follow the motion of their curves, or of ``prescribed`` (n,) vertices.
 
-    The motion of curves and points is extended harmonically into the sheets: L w = 0 inside, w given on
-    the curves, L with equal tensions. With the inside i and the curves c,  L_ii w_i = -L_ic w_c. Each sheet
-    vertex takes the part of w along its sheet, which does not change the shape, as far as its support lets
-    it. ``prescribed`` (n,) are the vertices where w is given, in place of the curves and the fixed ones.
+    The motion is extended harmonically into the sheets, L with equal tensions: with the inside i and the
+    curves c,  L_ii w_i = -L_ic w_c. Each sheet vertex takes the part of w along its sheet, which does not
+    change the shape, as far as its support lets it.
     """
 
     def __init__(

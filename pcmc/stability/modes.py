@@ -59,8 +59,7 @@ def count_soft(
 ) -> tuple[Spectrum, SecondVariation | None]:
     """The counts for two bands in units of α, 1/length², and a factor for the modes; None if there is none.
 
-    One factorisation where nothing is near or negative, or none if ``clear_of_zero`` is known; two where
-    nothing is near, else up to seven.
+    One factorisation where nothing is near or negative, two where nothing is near, else up to seven.
     """
     wide = _wide(at, near)
     above = clear or _factorised(at, wide)
@@ -119,8 +118,8 @@ def _dense(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
 def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) -> Floats:
     """The eigenvectors (s,k), those of equal eigenvalues as the projections of fixed displacements.
 
-    Any basis of their space is as good, and rounding alone would choose one: a symmetric saddle would lean
-    to another side on each processor. ``root`` (s,) are the roots of the masses.
+    Rounding alone would choose a basis of their space, another one on each processor. ``root`` (s,) are the
+    roots of the masses.
     """
     vectors = vectors.copy()
     ends = np.flatnonzero(np.diff(values) > SAME_EIGENVALUE * np.abs(values).max(initial=0.0)) + 1
@@ -139,11 +138,7 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
 
     The search takes in all negative ones, so the first is the lowest of all. Modes have unit mass:
     Σ M |v|² = 1. Rigid motions are left out; rooms keep their prescribed volumes. The factor may be that of
-    A - σM for a small σ; the eigenvalues are those of A.
-
-    Raises
-    ------
-    SingularMatrix : the iteration does not converge.
+    A - σM for a small σ; the eigenvalues are those of A. SingularMatrix if the iteration does not converge.
     """
     size, root = len(system.of.mass), np.sqrt(system.of.mass)
     k = max(count + 1, system.negative + 2)
