@@ -30,7 +30,7 @@ def pytest_sessionstart():
 
     Some tests raise SIGINT, and a process that they start inherits whether it is ignored.
     """
-    missing = [name for name in ("evolver", "ccx", "chromium") if shutil.which(name) is None]
+    missing = [name for name in ("evolver", "ccx", "chromium", "pdftotext") if shutil.which(name) is None]
     if missing and os.environ.get("CI"):
         pytest.exit(f"not installed here, so its tests would be skipped: {', '.join(missing)}", returncode=1)
     signal.signal(signal.SIGINT, signal.default_int_handler)

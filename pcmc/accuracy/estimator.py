@@ -26,10 +26,9 @@ from math import sqrt
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..certificate.reactions import held_boundary, support_forces
+from ..certificate.forces import Forces, held_boundary
+from ..certificate.measures import MEASURES, largest_pull
 from ..certificate.tables import names_of
-from ..design.quantities import largest_pull
-from ..design.targets import Target, measure
 from ..forces.functional import energy_and_gradient
 from ..meshing.sizes import limit_growth, triangles_for
 from ..stability.equilibrium import Equilibrium, SecondVariation
@@ -174,8 +173,9 @@ def _interpolation_error(coarse: Surface, field: Floats) -> Floats:
 def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     """(n,3) the derivative of a quantity by the positions."""
     if quantity in ("height", "area", "volume"):
-        return measure(surface, Target({"height": "apex"}.get(quantity, quantity), of or None)).by_position
-    acting, vertices = support_forces(surface), _held_vertices(surface, of)
+        quantity = {"height": "apex"}.get(quantity, quantity)
+        return MEASURES[quantity].measure(surface, of or None).by_position
+    acting, vertices = Forces.of(surface), _held_vertices(surface, of)
     if quantity == "reaction per length":
         inside = np.isin(surface.topology.edges, vertices).all(axis=1)
         return largest_pull(acting, inside & acting.along_patch(None)).by_position

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, maxi
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from .reactions import held_boundary
+from .forces import held_boundary
 
 PINCHED = 0.1  # of the held curves' length: a neck shorter than this has pinched off
 UNITS = 500_000_000  # of the length of all edges: the flow counts in whole numbers

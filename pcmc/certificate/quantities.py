@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import OptionError, unknown
+from ..forces.cables import pull_along
 from ..forces.volume_below import volumes_below
 from ..surface import Surface
 from .cables import chord
@@ -123,7 +124,8 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
     for cable in surface.cables:
         ends = surface.vertices[cable.edges]
         length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-        add(cable.name, "cable", {"force": cable.tension, "length": length})
+        pull = float(pull_along(surface, cable, cable.edges.ravel()).max())
+        add(cable.name, "cable", {"force": pull, "length": length})
         with suppress(OptionError):  # a closed cable has no sag
             out = chord(surface, cable.name)[2]
             add(cable.name, "cable", {"sag": float(np.linalg.norm(out, axis=1).max())})

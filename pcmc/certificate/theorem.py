@@ -196,6 +196,8 @@ def _refuse(part: StandingPart, space: MotionSpace, rigid: Floats) -> None:
         raise _Unproved("no vertex can move")
     if any(space.dimension[along].any() for _, along in surface.on_circle):
         raise _Unproved("vertices slide along a circle, and the frozen frames are straight")
+    if surface.cable_edges.weight.any():
+        raise _Unproved("a cable has a weight, for which no bounds are known")
     n = np.array(surface.plane.normal)
     level = (
         not len(rigid) or max(np.abs(rigid[:, 0] @ n).max(), np.abs(np.cross(rigid[:, 1], n)).max()) < LEVEL

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import FileWarning, PcmcError, SurfaceError
-from ..certificate.reactions import reactions
+from ..certificate.forces import reactions
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import standing_part
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
@@ -64,6 +64,10 @@ def to_meshes(surface: Surface) -> list[Any]:
         if field.name not in CARRIED and not empty:
             text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
             raise SurfaceError(text, what=field.name, found=value)
+    for cable in surface.cables:
+        if cable.weight:
+            text = f"cable {cable.name!r}: COMPAS meshes do not carry its weight; write the surface as .pcmc"
+            raise SurfaceError(text, what="weight", where=cable.name, found=cable.weight)
     rows, meshes = _vertex_attributes(surface), []
     for index, patch in enumerate(surface.patches):
         mesh = mesh_class(default_vertex_attributes=MARKS | QUANTITIES, name=patch.name)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..design import Parameter
+from ..certificate.parameters import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
 from .boundary_motion import BoundaryMotion

@@ -89,7 +89,7 @@ def branch_point(at: BranchState, before: Tangent | float) -> BranchPoint:
         matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
     else:
         matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
-    s, slope = matrix.solve(np.zeros(len(at.defects)), sense, TANGENT_ACCURACY)
+    s, slope = matrix.solve(np.zeros(len(at.rest.defects)), sense, TANGENT_ACCURACY)
     size = at.rest.space.size
     tangent, length = Tangent.along(at.motion(s[:size], slope), slope, at.area_weights, scale)
     rates = at.rest.volume_units * s[size:] / length

@@ -11,12 +11,9 @@ with it, and derivatives by λ are total ones.) A Newton step solves
     [ cᵀ  d ] [ δλ]  =  [ -g ]        c = Bᵀ ∂g/∂X,  d = ∂g/∂λ
 
 by GMRES. J is applied, not assembled: s moves the vertices by Bs, the insides of the sheets follow
-their junctions, and the bases B turn (``linearise``). The preconditioner has H = Bᵀ(∂²E)B in the place
-of J, by block elimination on a factorisation of H. At a fold J is singular; the bordered matrix is not.
-
-Rooms of prescribed volume add the unknown δ of each and the equation V(X) = V̄(λ): then s stands for both, and
-[J, -C; Cᵀ, 0] with C = Bᵀ ∂V/∂X for J.
-(Keller 1977 for the arclength; Govaerts 2000, ch. 3, for the elimination.)
+their junctions, and the bases B turn (``linearise``). At a fold J is singular; the bordered matrix is not
+(``stability.bordered``; Keller 1977 for the arclength). Rooms of prescribed volume add the unknown δ of each
+and the equation V(X) = V̄(λ): then s stands for both, and ``Equilibrium.times`` for J.
 """
 
 from __future__ import annotations
@@ -25,9 +22,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
+from ..stability.bordered import BorderedFactor, solve_preconditioned
 from ..stability.factorisation import SingularMatrix
 from .state import BranchMesh, BranchState
 
@@ -115,26 +112,14 @@ class BorderedMatrix:
 
     def solve(self, right: Floats, last: float, accuracy: float) -> tuple[Floats, float]:
         """(s, δλ) with  J s + f δλ = right (N+r,),  ⟨row, motion⟩ + rate δλ = last."""
-        size, inverse, space = len(right) + 1, self.second.bordered, self.at.rest.space
-        behind = inverse.solve(self.at.parameter_derivative)
-        c = np.append(space.to_coordinates(self.row), np.zeros(len(right) - space.size))
-        pivot = self.rate - float(c @ behind)
-        if not np.isfinite(pivot) or pivot == 0.0:
+        at, unit = self.at, self.unit
+        c = np.append(at.rest.space.to_coordinates(self.row), np.zeros(len(right) - at.rest.space.size))
+        f = at.parameter_derivative[:, None]
+        inverse = BorderedFactor(self.second.bordered, f, unit * c[None], unit * self.rate)
+        if not np.isfinite(inverse.schur).all() or not inverse.schur.any():
             raise NotOnBranch("the bordered matrix is singular: branches meet here")
-
-        def eliminate(z: Floats) -> Floats:
-            s = inverse.solve(z[:-1])
-            change = (z[-1] / self.unit - float(c @ s)) / pivot
-            return np.append(s - behind * change, change)
-
-        z, _ = gmres(
-            LinearOperator((size, size), self._times, dtype=float),
-            np.append(right, last * self.unit),
-            M=LinearOperator((size, size), eliminate, dtype=float),
-            rtol=accuracy,
-            restart=20,
-            maxiter=2,
-        )
+        right = np.append(right, last * unit)
+        z, _ = solve_preconditioned(self._times, inverse.solve, right, accuracy, restart=20, cycles=2)
         return z[:-1], float(z[-1])
 
     def _times(self, z: Floats) -> Floats:
@@ -142,11 +127,8 @@ class BorderedMatrix:
         at, size = self.at, self.at.rest.space.size
         d = at.moved(at.motion(z[:size])) - at.aligned
         along = float((self.row * d).sum())
-        change = at.rest.jacobian.times(d)
-        if at.mesh.surface.rooms:
-            pressed = at.rest.volume_columns @ (at.rest.volume_units * z[size:-1])
-            change = np.append(change - pressed, np.einsum("rnd,nd->r", at.room_gradients, d))
-        return np.append(change + at.parameter_derivative * z[-1], self.unit * (along + self.rate * z[-1]))
+        change = at.rest.times(d, z[size:-1]) + at.parameter_derivative * z[-1]
+        return np.append(change, self.unit * (along + self.rate * z[-1]))
 
 
 def correct(start: BranchState, constraint: Constraint, tolerance: float) -> BranchState:
@@ -171,7 +153,7 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
             break
         last = error
         matrix = BorderedMatrix(at, constraint.gradient(at), constraint.rate)
-        s, change = matrix.solve(-at.defects, -g, 1e-3)
+        s, change = matrix.solve(-at.rest.defects, -g, 1e-3)
         size = at.rest.space.size
         step = at.motion(s[:size], change)
         if not np.abs(step).max() < mesh.full.size:

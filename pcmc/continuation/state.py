@@ -117,17 +117,6 @@ class BranchState:
         return self.rest.residual
 
     @cached_property
-    def defects(self) -> Floats:
-        """(N+r,) r, and the defects V - V̄ of the rooms' volumes in units of force."""
-        rest = self.rest
-        return np.append(rest.forces, rest.volume_units * rest.volume_defects)
-
-    @cached_property
-    def room_gradients(self) -> Floats:
-        """(r,n,3) the gradients of the rooms' volumes, in units of force."""
-        return self.rest.volume_units[:, None, None] * self.rest.volume_gradients
-
-    @cached_property
     def parameter_derivative(self) -> Floats:
         """(N+r,) dr/dλ = Bᵀ ∂∇E/∂λ, and Bᵀ Df[v] where λ moves the boundary; -dV̄/dλ in units of force."""
         rest, line = self.rest, self.mesh.line

@@ -22,12 +22,12 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..certificate.balance import coarseness, overload
+from ..certificate.measures import vertices_up
 from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .outcome import Design, DesignStatus, NoStart
-from .quantities import vertices_up
 from .sensitivity import slopes
 from .steps import StepPlan, Trial
 from .targets import Parameter, Target, as_parameters, as_targets, measure

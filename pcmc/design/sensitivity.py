@@ -8,10 +8,7 @@ At rest the residual r(X, λ) = Bᵀ∇E vanishes and stays zero along the solut
 moves (``linearise``); that part is small, so J s = b is solved by a few GMRES steps with the factor of
 Bᵀ(∂²E)B as preconditioner. A quantity q(X, λ) then changes by ⟨∂q/∂X, dX/dλ⟩ + ∂q/∂λ.
 
-Where rooms prescribe volumes, their pressures δ change with λ, too, and J is bordered:
-
-    [ J   -G ] [ s     ]     [ -Bᵀ ∂(∇E)/∂λ ]
-    [ Gᵀ   0 ] [ dδ/dλ ]  =  [  dV̄/dλ       ]        G = Bᵀ ∂V/∂X
+Where rooms prescribe volumes, their pressures change with λ, too: ``Equilibrium.times`` stands for J.
 """
 
 from __future__ import annotations
@@ -20,19 +17,19 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
+from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
 from ..forces.pinching import place_wall_rows
+from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..surface import Surface
 from ..surface.values import rates_of
-from .quantities import Measurement
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 ACCURACY = 1e-9  # relative residual to which J s = b is solved
@@ -150,7 +147,6 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         raise SurfaceError(AT_FOLD, what="surface") from None
     surface, space, walls = at.surface, at.space, at.part.walls
     count, units = space.size, at.volume_units
-    gradients = units[:, None, None] * at.volume_gradients
     walls_follow = bool((walls.top_free & ~at.part.resting).any())
 
     def motion(s: Floats) -> Floats:  # walls that hang from their junction follow it, as in the solver
@@ -161,28 +157,13 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         return ahead - here
 
     def times(z: Floats) -> Floats:
-        d = motion(z[:count])
-        change = at.jacobian.times(d)
-        if not len(units):
-            return change
-        pressed = space.to_coordinates(np.tensordot(z[count:], gradients, axes=1))
-        return np.append(change - pressed, np.einsum("rnd,nd->r", gradients, d))
+        return at.times(motion(z[:count]), z[count:])
 
     def response(of: dict[str, Floats]) -> tuple[Floats, Floats]:
         right = np.append(-space.to_coordinates(gradient_by(surface, of)), units * of.get("volumes", 0.0))
         if not np.any(right):
             return np.zeros_like(at.X), np.zeros(len(units))
-        residuals: list[float] = []
-        z, _ = gmres(
-            LinearOperator((len(right), len(right)), times, dtype=float),
-            right,
-            M=LinearOperator((len(right), len(right)), inverse.solve, dtype=float),
-            rtol=ACCURACY,
-            restart=40,
-            maxiter=1,
-            callback=residuals.append,
-            callback_type="pr_norm",
-        )
+        z, residuals = solve_preconditioned(times, inverse.solve, right, ACCURACY, restart=40)
         if not residuals or residuals[-1] > NO_SOLUTION:
             raise SurfaceError(AT_FOLD, what="surface")
         return motion(z[:count]), units * z[count:]

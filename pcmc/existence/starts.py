@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
-from ..certificate.balance import load
+from ..certificate.forces import load
 from ..forces.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
 from ..surface import Surface

@@ -48,7 +48,7 @@ from ..surface.topology import (
     topology,
     vertex_kind,
 )
-from .cables import squared_cable_forces, tensions_on
+from .cables import laws_on, squared_cable_forces
 from .triangles import Mesh, effective_tensions, energy_mesh
 
 PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
@@ -120,8 +120,8 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
     """
     in_room = surface.room_signs.any(axis=0)  # the pressure of a room may take any value
-    pulls = (surface.tensions != 0.0) | (surface.net_pressures != 0.0) | in_room
-    active = pulls[surface.patch_of_face]
+    acts = (surface.tensions != 0.0) | (surface.net_pressures != 0.0) | in_room
+    active = acts[surface.patch_of_face]
     faces, patch = surface.faces, surface.patch_of_face
     if not active.all():
         faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
@@ -147,9 +147,9 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     on_curve = topo.curve_edge | topo.one_way_edge
     if surface.on_planes:
         on_curve = on_curve & ~mirror_edges(surface.on_planes, topo)
-    pull = tensions_on(topo, surface.cable_edges) if surface.cables else None
-    if pull is not None:
-        on_curve = on_curve | (pull > 0.0)
+    pulls = laws_on(topo, surface) if surface.cables else None
+    if pulls is not None:
+        on_curve = on_curve | (pulls[:, 0] > 0.0)
     edges = topo.edges[on_curve]
     links = np.concatenate([edges, edges[:, ::-1]])
     if crest is not None and len(crest):
@@ -157,11 +157,12 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     curve, beside = curve_neighbours(links, surface.n)
     kind = vertex_kind(links[:, 0], surface.n)
     shared = topo.fans > 1
-    if pull is not None:
-        least, most = np.full(surface.n, np.inf), np.zeros(surface.n)
-        np.minimum.at(least, edges, pull[on_curve, None])
-        np.maximum.at(most, edges, pull[on_curve, None])
-        shared |= least < most  # where curve edges of different line tension meet
+    if pulls is not None:
+        for law in pulls[on_curve].T:
+            least, most = np.full(surface.n, np.inf), np.full(surface.n, -np.inf)
+            np.minimum.at(least, edges, law[:, None])
+            np.maximum.at(most, edges, law[:, None])
+            shared |= least < most  # where curve edges of different line tension or weight meet
     if crest is not None:
         shared[crest[:, 0]] = False
     kind[shared] = POINT
@@ -258,7 +259,7 @@ def tension_forces(surface: Surface) -> float:
 
 def _tension_forces(surface: Surface, X: Floats, F: Ints, patch: Ints) -> float:
     sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
-    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) if surface.cables else sheets
+    return sqrt(sheets**2 + squared_cable_forces(surface, X).sum()) if surface.cables else sheets
 
 
 @inlined

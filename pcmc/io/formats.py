@@ -49,6 +49,7 @@ class Format:
             "snow": surface.snows.any(),
             "lines": surface.given_supports.on_line,
             "cables": surface.cables,
+            "cable weights": surface.cable_edges.weight.any(),
             "rooms": surface.rooms,
             "planes": surface.on_planes,
             "unit": units,
@@ -74,6 +75,7 @@ LOST = {
     "snow": "snow",
     "lines": "lines or circles that vertices slide along (they are fixed in it)",
     "cables": "cables",
+    "cable weights": "weights of cables",
     "rooms": "volumes of rooms (it has the pressures reached)",
     "planes": "planes other than Π that vertices slide on, and mirror planes (fixed in it)",
     "unit": "its unit {unit}",
@@ -83,8 +85,8 @@ LOST = {
 OURS = ("support", "patch")
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
-    ".fe": Format("evolver", shared=True, loses=("lines", "unit")),
-    ".dmp": Format("evolver", shared=True, loses=("lines", "unit")),
+    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
+    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices")),
     ".stl": Format("stl", separate=True, bare=True, loses=tuple(LOST)),

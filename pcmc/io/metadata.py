@@ -60,7 +60,10 @@ def metadata_text(
     parts = {
         "units": astuple(units) if units else (),
         "bare": [patch.name for patch in surface.patches if patch.name in bare],
-        "cables": [[cable.name, cable.tension, where(cable.edges)] for cable in surface.cables],
+        "cables": [
+            [cable.name, cable.tension, where(cable.edges), *[cable.weight] * bool(cable.weight)]
+            for cable in surface.cables
+        ],
         "rooms": [astuple(room) for room in surface.rooms],
         "lines": [[astuple(guide), where(own)] for guide, own in guides if own.any()],
         "planes": [[astuple(plane), where(own)] for plane, own in planes if own.any()],
@@ -192,8 +195,8 @@ def _with_parts(data: MeshData) -> MeshData:
         ]
 
     cables = [
-        Cable(name, pull, keep[ends])
-        for name, pull, where in parts.get("cables", ())
+        Cable(name, pull, keep[ends], *weight)
+        for name, pull, where, *weight in parts.get("cables", ())
         if (ends := groups(where, f"cable {name!r} was left out")) is not None
     ]
     lines = sliding("lines", "what slides along a line is fixed")

@@ -27,7 +27,7 @@ from .libraries import translated_errors
 from .mesh_data import MeshData, numeric, support_of, within
 from .metadata import DAMAGED, parse_metadata
 
-VERSION = 7  # since 4 weights, 5 snow, 6 cables, rooms, lines, planes, 7 curves; the oldest that will do
+VERSION = 8  # since 4 weights, 5 snow, 6 cables, rooms, lines, planes, 7 curves, 8 weights of cables
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -39,9 +39,13 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     version = 5 if surface.snows.any() else 4 if surface.weights.any() else 1
     if surface.rooms or surface.on_planes or surface.cables or surface.given_supports.on_line:
         version = 6
+    if surface.held_curves:
+        version = 7
+    if surface.cable_edges.weight.any():
+        version = 8
     meta = {
         "format": FORMAT,
-        "version": VERSION if surface.held_curves else version,
+        "version": version,  # the oldest that will do
         "description": content.metadata,
         "curves": [one.plain() for one in surface.held_curves],
         "certificate": {k: v for k, v in content.certificate.items() if k not in tables},

@@ -74,7 +74,8 @@ def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
     curves = [(f"PCMC-{kind}", curve, "") for kind, curve in curves_by_kind(surface)]
     free = np.zeros(surface.n, dtype=bool)
     for cable in surface.cables:
-        named, own = f"cable {cable.name}", json.dumps([cable.name, cable.tension])
+        named, weight = f"cable {cable.name}", [cable.weight] * bool(cable.weight)
+        own = json.dumps([cable.name, cable.tension, *weight])
         curves += [(named, chain, own) for chain in surface.topology.chains(cable.edges, free)]
     for name, curve, cable_text in curves:
         if name not in layers:
@@ -142,7 +143,11 @@ def read(path: Path) -> MeshData:
         own = metadata.units.length or UNIT
         factor, model = length_factor(model, own), own
         X = [factor * points for points in X]
-        rows = [[*json.loads(text), (factor * np.array(pairs)).tolist()] for text, pairs in cables.items()]
+        rows = [
+            [name, pull, (factor * np.array(pairs)).tolist(), *weight]
+            for text, pairs in cables.items()
+            for name, pull, *weight in [json.loads(text)]
+        ]
         metadata = replace(metadata, parts={**metadata.parts, "cables": rows})
         held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)

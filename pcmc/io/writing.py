@@ -6,7 +6,6 @@ import os
 import re
 import warnings
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,8 +22,6 @@ from .formats import FORMATS, Content, format_of
 from .mesh_data import scaled_surface
 from .metadata import metadata_text
 from .patch_meshes import encode_walls
-
-MADE = ("supports", "balance", "reactions")  # of a certificate, when they are asked for; files have them, too
 
 
 class Solved(Protocol):
@@ -122,14 +119,13 @@ def _values(certificate: Any) -> Mapping[str, Any]:
     """The certificate's public values by name."""
     if certificate is None or isinstance(certificate, Mapping):
         return certificate or {}
-    if not is_dataclass(certificate):
+    names = getattr(certificate, "FILED", None)
+    if names is None:
         found = type(certificate).__name__
         raise FileError(
             f"certificate: expected a Certificate, found {found}", what="certificate", found=found
         )
-    shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
-    shown += [name for name in MADE if hasattr(certificate, name)]
-    return {name: getattr(certificate, name) for name in shown}
+    return {name: getattr(certificate, name) for name in names}
 
 
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:

@@ -18,7 +18,7 @@ import numpy as np
 from ..base.errors import OptionError
 from ..certificate import certify
 from ..certificate.certificate import TOLERANCE
-from ..design.quantities import Measurement
+from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
 from ..surface import Surface
 from .edge import Margin, margin

@@ -16,7 +16,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..base.units import NO_UNITS, Units
-from ..certificate.reactions import support_forces
+from ..certificate.forces import Forces
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import add_legend, color_scale
@@ -253,14 +253,14 @@ def reactions(
 ) -> Image:
     """Arrows of the reactions: along lines force per length, in blue the forces at single points.
 
-    Forces of cables that end on a line are forces at points; see ``pcmc.certificate.reactions``.
+    Forces of cables that end on a line are forces at points; see ``pcmc.certificate.forces``.
     ``options`` are those of ``vectors``: view, length, most, title, supports, edges, width, renderer.
 
     Raises
     ------
     OptionError : when nothing holds the surface, so that there are no reactions.
     """
-    acting = support_forces(surface)
+    acting = Forces.of(surface)
     lines, held = acting.per_length, acting.points.any(axis=1)
     if np.isnan(lines).all() and not held.any():
         raise OptionError("nothing holds the surface: no reactions to draw", what="surface")

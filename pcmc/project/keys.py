@@ -263,9 +263,8 @@ def solve_section(method: str) -> Section:
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
     from ..design import Parameter, Target  # needed by projects with targets only
-    from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
-    from ..design.targets import SHORT
+    from ..design.targets import MEASURES, SHORT
 
     wanted = _of_class(Target, quantity=(*MEASURES, *SHORT))
     changing = _of_class(Parameter, kind=KINDS_OF_PARAMETER)

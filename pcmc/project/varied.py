@@ -261,7 +261,7 @@ def digest(path: PathLike) -> str:
         sha.update(getattr(surface, name).tobytes())
     sha.update(repr([curve.plain() for curve in surface.curves]).encode() if surface.curves else b"")
     for cable in surface.cables:
-        sha.update(repr((cable.name, cable.tension)).encode() + cable.edges.tobytes())
+        sha.update(repr((cable.name, cable.tension, cable.weight)).encode() + cable.edges.tobytes())
     for held, on in (*surface.on_planes, *surface.given_supports.on_line):
         sha.update(repr(vars(held)).encode() + on.tobytes())
     return sha.hexdigest()

@@ -10,8 +10,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..forces import triangles
-from ..forces.flat_pieces import add_plane_forces, add_plane_volumes, flat_pieces
-from ..forces.functional import add_cables_and_weights, total
+from ..forces.functional import add_forces, elements, total
 from ..forces.motion_space import tension_forces
 from ..surface import Surface
 from ..surface.checks import reachable
@@ -76,8 +75,7 @@ class Evaluator:
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
-        self._pieces = bool(flat_pieces(surface))
-        self._pulled = bool(surface.cables) or bool(surface.weights.any())
+        self._more = surface.heavy or any(True for _ in elements(surface, surface.vertices))
         self._single = len(blocks(surface.m, threads())) == 1
 
     def ending(self, point: Point) -> Status | None:
@@ -97,10 +95,7 @@ class Evaluator:
             triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), area, volume, G)
         else:
             area, volume, G = triangles.measure(self._mesh, X)
-        if self._pieces:
-            add_plane_volumes(self._surface, X, volume)
-            add_plane_forces(self._surface, pressure, X, G)
-        further = add_cables_and_weights(self._surface, X, G) if self._pulled else 0.0
+        further = add_forces(self._surface, X, G) if self._more else 0.0
         for plane, mask in self._others:
             G[mask] = plane.along(G[mask])
         squared = _apply_supports(G, *self._supports)

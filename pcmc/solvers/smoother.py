@@ -144,8 +144,7 @@ class HarmonicExtension:
     ) -> None:
         used = ~classes.idle
         space = _one_unknown_each(used)
-        none = {cable.name: 0.0 for cable in surface.cables}
-        equal = surface.retensioned({p.name: 1.0 for p in surface.patches}, cables=none)
+        equal = surface._with(cables=()).retensioned({p.name: 1.0 for p in surface.patches})
         pattern = hessian_pattern(classes, space)
         L = pattern.symmetric(_laplacian(equal, classes, space, pattern, X))
         curves = (classes.kind != SHEET) | surface.fixed

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
 from ..meshing.quality import edge_lengths
+from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
@@ -217,46 +217,33 @@ class Stepper:
         With a shift, J is the shifted matrix, and the factor its inverse. Stiffness added to the factor is
         added to J, too: otherwise motions that cost no energy would use up the accuracy.
 
-        Where rooms prescribe volumes, the pressures μ (r,) are unknowns, too, and J is bordered:
+        Where rooms prescribe volumes, their pressures are unknowns, too (``Equilibrium.times``).
 
-            [ J   -G ] [ s ]     [ -r      ]
-            [ Gᵀ   0 ] [ μ ]  =  [ V̄ - V   ]        G = Bᵀ ∂V/∂X
-
-        Returns the motion (n,3), μ, and the steps that GMRES took.
+        Returns the motion (n,3), the changes (r,) of the pressures, and the steps that GMRES took.
         """
         at, added = self.state.at, second.added_matrix
-        size, columns = at.space.size, at.volume_columns * at.volume_units
+        size = at.space.size
         right = np.append(-at.forces, -at.volume_units * self._volumes_ahead())
 
         def times(z: Floats) -> Floats:
-            s = z[:size]
-            change = at.jacobian.times(at.space.to_vectors(s))
+            change = at.times(at.space.to_vectors(z[:size]), z[size:])
             if added is not None:
-                change = change + self._in_basis_of(second, added.__matmul__, s)
-            return np.append(change - columns @ z[size:], columns.T @ s)
+                change[:size] += self._in_basis_of(second, added.__matmul__, z[:size])
+            return change
 
         def inverse(z: Floats) -> Floats:
             return self._in_basis_of(second, second.bordered.solve, z)
 
-        norms: list[float] = []
         if second.stiffness != 0.0:
-            z = inverse(right)
+            z, steps = inverse(right), 0
         else:
-            z, _ = gmres(
-                LinearOperator((len(right), len(right)), times, dtype=float),
-                right,
-                M=LinearOperator((len(right), len(right)), inverse, dtype=float),
-                rtol=1e-3,
-                restart=12,
-                maxiter=1,
-                callback=norms.append,
-                callback_type="pr_norm",
-            )
-            self.state.evaluations += len(norms)
+            z, residuals = solve_preconditioned(times, inverse, right, 1e-3, restart=12)
+            steps = len(residuals)
+            self.state.evaluations += steps
         s = z[:size]
         if second.stiffness == 0.0 and len(at.rigid_motions):
             s = self._limit_drift(s)
-        return at.space.to_vectors(s), z[size:] * at.volume_units, len(norms)
+        return at.space.to_vectors(s), z[size:] * at.volume_units, steps
 
     def _limit_drift(self, s: Floats) -> Floats:
         """s with its rigid part shortened, which only slides the mesh; the residual may rise for a while."""

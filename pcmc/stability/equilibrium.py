@@ -28,7 +28,8 @@ from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from ..surface.supports import apply_supports
-from .factorisation import BorderedFactor, Factor, Factoriser, SingularMatrix, factoriser
+from .bordered import BorderedFactor
+from .factorisation import Factor, Factoriser, Inverse, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 TINY = float(np.finfo(float).tiny)
@@ -181,6 +182,23 @@ class Equilibrium:
         return np.stack(columns, axis=1) if columns else np.zeros((self.space.size, 0))
 
     @cached_property
+    def defects(self) -> Floats:
+        """(N+r,) r, and the defects V - V̄ in units of force."""
+        return np.append(self.forces, self.volume_units * self.volume_defects)
+
+    def times(self, d: Floats, pressures: Floats) -> Floats:
+        """(N+r,) how ``defects`` change with a motion d = Bs (n,3) and with rooms' pressures over units:
+
+        [ J   -C ] [ s ]
+        [ Cᵀ   0 ] [ μ ]        C = Bᵀ ∂V/∂X in units of force
+        """
+        change = self.jacobian.times(d)
+        if not self.surface.rooms:
+            return change
+        growth = self.volume_units * np.einsum("rnd,nd->r", self.volume_gradients, d)
+        return np.append(change - self.volume_columns @ (self.volume_units * pressures), growth)
+
+    @cached_property
     def norm(self) -> float:
         """‖r‖, with the volumes' defects in units of force; of loose parts the worst counts as if all."""
         if self.surface.topology.components.any():
@@ -319,11 +337,12 @@ class SecondVariation:
         return self.pattern.symmetric(self.of.matrix(0.0, self.added))
 
     @cached_property
-    def bordered(self) -> Factor | BorderedFactor:
-        """The inverse, where rooms prescribe volumes with the borders -G and Gᵀ in units of force."""
+    def bordered(self) -> Inverse:
+        """The inverse of ``Equilibrium.times``, with A in the place of J."""
         if not self.of.surface.rooms:
             return self.factor
-        return BorderedFactor(self.factor, self.of.volume_columns * self.of.volume_units)
+        columns = self.of.volume_columns * self.of.volume_units
+        return BorderedFactor(self.factor, -columns, columns.T)
 
     @cached_property
     def _behind(self) -> Floats:

@@ -32,7 +32,7 @@ from ..base.errors import MissingExtra, PcmcError
 from ..forces.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
-__all__ = ("BACKENDS", "BorderedFactor", "Factor", "Factoriser", "SingularMatrix", "available", "factoriser")
+__all__ = ("BACKENDS", "Factor", "Factoriser", "Inverse", "SingularMatrix", "available", "factoriser")
 Ordering = Literal["MMD_AT_PLUS_A", "NATURAL"]
 BACKENDS = ("pardiso", "superlu")
 OUTDATED = (
@@ -54,15 +54,19 @@ IPARM = {  # MKL's parameters by their numbers from 1
 }
 
 
-class Factor(Protocol):
+class Inverse(Protocol):
+    """Solves with a matrix A."""
+
+    def solve(self, right: Floats) -> Floats:
+        """A⁻¹ right, for one right-hand side (N,) or several (N,k)."""
+
+
+class Factor(Inverse, Protocol):
     """A factorised matrix."""
 
     @property
     def negative(self) -> int:
         """Number of negative eigenvalues (Sylvester: negative pivots of D in L D Lᵀ)."""
-
-    def solve(self, right: Floats) -> Floats:
-        """A⁻¹ right, for one right-hand side (N,) or several (N,k)."""
 
 
 class Factoriser(Protocol):
@@ -128,31 +132,6 @@ class _Scaled:
 
     def factor(self, data: Floats) -> Factor:
         return _ScaledFactor(self._plain.factor(self._products * data), self._units)
-
-
-class BorderedFactor:
-    """The inverse of [[A, -C], [Cᵀ, 0]], A factorised, C (N,r): by the Schur complement Cᵀ A⁻¹ C.
-
-    It exists where A is singular along C alone, as at a fold in the pressure. Near there the factor of A
-    loses digits, and the inverse is a preconditioner.
-
-    >>> pattern = Pattern(np.array([0, 1, 2]), np.array([0, 1]), np.empty((0, 3)))
-    >>> factor = factoriser(pattern, "superlu").factor(np.array([2.0, -1.0]))
-    >>> BorderedFactor(factor, np.array([[1.0], [0.0]])).solve(np.array([0.0, 1.0, 3.0])).tolist()
-    [3.0, -1.0, 6.0]
-    """
-
-    def __init__(self, factor: Factor, columns: Floats) -> None:
-        self._factor, self._columns = factor, columns
-        self._behind = factor.solve(columns)
-        self._schur = np.linalg.pinv(columns.T @ self._behind)
-
-    def solve(self, right: Floats) -> Floats:
-        """(s, μ) (N+r,) with A s - C μ and Cᵀ s as given in ``right`` (N+r,)."""
-        size = len(self._columns)
-        s = self._factor.solve(right[:size])
-        multipliers = self._schur @ (right[size:] - self._columns.T @ s)
-        return np.append(s + self._behind @ multipliers, multipliers)
 
 
 def _finite(data: Floats) -> None:

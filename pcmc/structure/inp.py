@@ -16,6 +16,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
+from ..forces.cables import pull_along
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from .loads import Step
@@ -131,7 +132,8 @@ def _prestress(model: StructuralModel) -> Iterator[str]:
     stress *= model.prestress[:, None, None]
     yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, stress, POINTS)
     for cable, area, numbers, along in model.cable_edges():
-        stress = cable.tension / area * along[:, :, None] * along[:, None, :]
+        pull = pull_along(surface, cable, cable.edges)[:, None, None]
+        stress = pull / area * along[:, :, None] * along[:, None, :]
         yield _stresses(numbers, stress, CABLE_POINTS)
 
 

@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.checks import LARGEST, SMALLEST
-from ..surface.geometry import area_vectors, face_areas, vertex_sums
+from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 
 GRAVITY = 9.81  # m/s²
 
@@ -131,6 +131,9 @@ def load_steps(
     per_face = surface.weights[surface.patch_of_face] * face_areas(surface.vertices[surface.faces])
     downwards = -np.array(surface.plane.normal) / 3.0
     weight = vertex_sums(per_face[:, None] * downwards, surface.faces, surface.n)
+    ends, _, per_length = surface.cable_edges
+    per_edge = 1.5 * per_length * segment_lengths(surface.vertices, ends)
+    np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
     permanent = Step(name, surface.net_pressures, weight)
     steps = [permanent]

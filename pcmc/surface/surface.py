@@ -209,6 +209,11 @@ class Surface(supports.Supported):
     weights = _of_patches("weight")  # (k,) w, force/area
 
     @cached_property
+    def heavy(self) -> bool:
+        """Whether a patch or a cable has a weight."""
+        return bool(self.weights.any() or self.cable_edges.weight.any())
+
+    @cached_property
     def cable_edges(self) -> CableEdges:
         """The edges that carry a line tension, and how much."""
         return cable_edges(self.cables)

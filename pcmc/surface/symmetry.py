@@ -90,7 +90,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
 
 
 def _cut_cables(surface: Surface, side: Ints, number: Ints) -> tuple[Cable, ...]:
-    """The cables of the part that stays; of one in the plane, half the tension."""
+    """The cables of the part that stays; of one in the plane, half the tension and weight."""
     cables = []
     for cable in surface.cables:
         ends = side[cable.edges]
@@ -100,7 +100,8 @@ def _cut_cables(surface: Surface, side: Ints, number: Ints) -> tuple[Cable, ...]
             raise SurfaceError(text, what="cables", where=cable.name)
         if stays.any():
             share = 0.5 if inside.any() else 1.0
-            cables.append(Cable(cable.name, share * cable.tension, number[cable.edges[stays]]))
+            edges = number[cable.edges[stays]]
+            cables.append(Cable(cable.name, share * cable.tension, edges, share * cable.weight))
     return tuple(cables)
 
 
@@ -344,7 +345,8 @@ def _cables(surface: Surface, place: Ints) -> tuple[Cable, ...]:
         if times.min() != times.max():
             text = f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
             raise SurfaceError(text, what="cables", where=cable.name)
-        cables.append(Cable(cable.name, int(times[0]) * cable.tension, edges))
+        factor = int(times[0])
+        cables.append(Cable(cable.name, factor * cable.tension, edges, factor * cable.weight))
     return tuple(cables)
 
 

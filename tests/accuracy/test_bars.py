@@ -75,6 +75,26 @@ def test_orders_that_the_surface_does_not_have_are_not_believed(errors, shape_or
     assert found.limit_error[0] < 1.5 * abs(errors[-1])
 
 
+@pytest.mark.parametrize(
+    ("values", "limit", "bar"),
+    [
+        ((4.0, 6.25, 6.8125), 7.0, 0.05 * 0.5625),  # order 2: a twentieth of the last difference
+        ((4.0, 5.5, 6.25), 7.0, 2.0 * (7.0 - (6.25 + 0.75 / 3.0))),  # order 1: from what order 2 would give
+        (
+            (4.0, 6.4, 6.7),
+            6.7 + 0.3 / 7.0,
+            2.4 / 12.0,
+        ),  # order 3 is a coincidence: what order 2 leaves of d_1
+        ((4.0, 6.25), 7.0, 2.25),  # two meshes: all of the last difference
+    ],
+)
+def test_the_limit_and_its_bar_are_those_of_the_table(values, limit, bar):
+    found = extrapolate(np.array(values)[:, None], np.array([1e-15]))
+    assert found.limit[0] == pytest.approx(limit, rel=1e-12)
+    assert found.limit_error[0] == pytest.approx(bar, rel=1e-12)
+    assert found.error[0] == pytest.approx(abs(limit - values[0]) + bar, rel=1e-12)
+
+
 def test_heights_in_mirror_planes_are_read_with_the_images():
     """The crown of a barrel of nine squares lies between vertices, the highest of them in mirror planes."""
     case = next(c for c in coverage_weights.barrels() if c.name == "α 2, p 1, w 0.3, 9 squares")

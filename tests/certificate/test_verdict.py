@@ -244,6 +244,17 @@ def test_the_first_rule_that_applies_decides(changes, verdict):
     assert judge(findings(**changes))[0] is verdict
 
 
+@pytest.mark.parametrize(("weak", "named"), [(1e-7, True), (1e-5, False), (0.0, False)])
+def test_a_hidden_index_is_put_down_to_tensions_that_differ_widely(weak, named):
+    one = pyramid()
+    patches = [Patch("strong", 1.0, 0.0), Patch("weak", weak, 0.0)]
+    both = Surface(one.vertices, one.faces, [0, 0, 1, 1], patches, fixed=one.fixed)
+    detail = judge(findings(spectrum=Spectrum(), surface=both))[1]
+    assert "cannot be counted" in detail
+    assert ("the tensions differ by a factor of 1e+07" in detail) == named
+    assert ("the tensions differ" in detail) == named
+
+
 def test_every_verdict_names_itself_and_says_what_it_means():
     for verdict in Verdict:
         name, meaning = verdict.value.split(": ")

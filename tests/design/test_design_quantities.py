@@ -13,8 +13,7 @@ from generators import double_bubble, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Target, sensitivities
 from pcmc.base.errors import SurfaceError
 from pcmc.certificate.certificate import TOLERANCE
-from pcmc.design.quantities import MEASURES
-from pcmc.design.targets import measure
+from pcmc.design.targets import MEASURES, measure
 
 
 @pytest.fixture

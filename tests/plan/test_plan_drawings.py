@@ -73,6 +73,13 @@ def test_a_project_that_refers_to_its_drawing_follows_it(tmp_path):
         assert project.build(path).size > 1.9 * surface.size
 
 
+@pytest.mark.parametrize(("unit", "code", "metres"), [("in", 1, 0.0254), ("ft", 2, 0.3048)])
+def test_feet_and_inches_of_a_drawing_are_converted(tmp_path, unit, code, metres):
+    read = read_drawing(drawn.nave(tmp_path / "nave.dxf", unit=code), "m")
+    assert (read.unit, read.units) == (unit, "m")
+    assert read.outline.length == pytest.approx(metres * (8.0 + 2 * 18.0 + 4.0 * np.pi), rel=1e-4)
+
+
 def test_millimetres_and_metres_give_the_same_plan(tmp_path):
     metres = read_drawing(drawn.nave(tmp_path / "m.dxf"))
     small = drawn.nave(tmp_path / "mm.dxf", scale=1000.0, unit=4)

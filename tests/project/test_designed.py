@@ -16,8 +16,7 @@ import pcmc
 from pcmc import cli, explore
 from pcmc.base.units import Units
 from pcmc.certificate.quantities import QUANTITIES, dimension_of
-from pcmc.design.quantities import MEASURES
-from pcmc.design.targets import KINDS, SHORT
+from pcmc.design.targets import KINDS, MEASURES, SHORT
 from pcmc.explore.page_data import unit_texts
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
 
@@ -95,6 +94,7 @@ def test_solving_a_project_fills_the_cache(folder):
         ("tension = 2.0", "tension = 2.1"),
         ('method = "newton"', "tolerance = 1e-11"),
         ("value = 0.6", "value = 0.61"),
+        ("[targets]", "[targets]\ntolerance = 1e-5"),
         ("edge_length = 0.8", "edge_length = 0.7"),
     ],
 )

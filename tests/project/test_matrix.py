@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import re
-import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from asking import Client
+from printed import words_of
 
 import pcmc
 from pcmc import cli, explore, io, project
@@ -232,9 +232,7 @@ def certified(roof: Roof, capsys: Any) -> Facts:
 def reported(roof: Roof) -> Facts:
     """pcmc report, as the PDF shows it."""
     run("report", roof.path, "-o", "report.pdf", "--no-mesh-check")
-    text = subprocess.run(
-        ["pdftotext", "-layout", "report.pdf", "-"], capture_output=True, check=True
-    ).stdout.decode()
+    text = "\f".join(words_of("report.pdf"))
     labels = {
         "apex": "highest point above the plane",
         "roof area": "area of the roof",

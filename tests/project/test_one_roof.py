@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from printed import words_of
 from refusals import refused
 from small_project import WITH_UNITS
 
@@ -16,7 +17,6 @@ from pcmc import cli, project
 from pcmc.base.errors import FileError, OptionError, PcmcError
 from pcmc.base.units import Units
 from pcmc.project import opened
-from tests.report.test_report import words_of
 
 DOCUMENTS = """
 [structure]

@@ -9,6 +9,8 @@ import pytest
 from nightly import night_but
 from running import FOLDER, NAMES, executed, load, outputs, text, words_and_numbers
 
+ROUNDING = 1e-8  # numbers below are residuals at rest
+
 
 def test_there_are_five():
     assert len(NAMES) == 5
@@ -17,7 +19,10 @@ def test_there_are_five():
 @pytest.mark.parametrize("name", night_but(NAMES, "1-quick-start.ipynb"))
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_a_notebook_runs_and_says_what_is_stored(name):
-    """Words are the same, numbers agree to a hundredth, pictures are where pictures were."""
+    """Words are the same, numbers agree to a hundredth, pictures are where pictures were.
+
+    What is zero but for rounding stays so: a residual of 1e-13 may become 1e-12, not 1e-6.
+    """
     stored, now = load(name), executed(name)
     assert [o.output_type for o in outputs(now)] == [o.output_type for o in outputs(stored)]
     for old, new in zip(outputs(stored), outputs(now), strict=True):
@@ -25,7 +30,10 @@ def test_a_notebook_runs_and_says_what_is_stored(name):
         assert old.get("data", {}).keys() == new.get("data", {}).keys()
         before, after = words_and_numbers(text(old)), words_and_numbers(text(new))
         assert before[0] == after[0]
-        np.testing.assert_allclose(after[1], before[1], rtol=1e-2, atol=1e-3)
+        first, again = np.array(before[1]), np.array(after[1])
+        rounding = np.abs(first) < ROUNDING
+        np.testing.assert_allclose(again[~rounding], first[~rounding], rtol=1e-2)
+        assert (np.abs(again[rounding]) <= 100.0 * np.abs(first[rounding]) + 1e-12).all()
 
 
 @pytest.mark.parametrize("name", NAMES)

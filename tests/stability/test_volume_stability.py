@@ -106,6 +106,34 @@ def test_a_cylinder_of_prescribed_volume_is_stable_up_to_a_length(between, limit
     assert abs(errors[-1]) < 0.0025 * limit
 
 
+def test_a_cylinder_longer_than_its_limit_is_a_saddle_though_rigid_motions_are_free():
+    """At 1.2 πR between plates its waist costs less than nothing; sideways it is free in both directions."""
+    certificate = pcmc.solve(cylinder(0.3, 1.2 * np.pi, "plates"), target="stationary").certificate
+    assert (certificate.verdict.name, certificate.index) == ("SADDLE", 1)
+    shorter = pcmc.solve(cylinder(0.3, 0.8 * np.pi, "plates"), target="stationary").certificate
+    assert (shorter.verdict.name, shorter.index) == ("NEUTRAL", 0)
+    assert "rigid motions" in shorter.detail
+
+
+@pytest.mark.parametrize(
+    ("softness", "verdict", "named"),
+    [(0.9, "NEUTRAL", True), (1.1, "STABLE", True), (90.0, "STABLE", True), (110.0, "STABLE", False)],
+)
+def test_a_fold_is_named_within_1_and_neutral_within_a_hundredth(softness, verdict, named):
+    """A cylinder of its own volume between rings, so long that λ size²/α is ``softness``/100."""
+
+    def certificate(length: float) -> pcmc.Certificate:
+        return pcmc.solve(cylinder(0.4, length, "rings"), target="stationary").certificate
+
+    def excess(length: float) -> float:
+        surface = cylinder(0.4, length, "rings")
+        return float(certificate(length).eigenvalues[0]) * surface.size**2 - softness / 100.0
+
+    found = certificate(brentq(excess, 1.6 * np.pi, 2.02 * np.pi, xtol=1e-9))
+    assert (found.verdict.name, found.index) == (verdict, 0)
+    assert ("fold" in found.detail) == named
+
+
 def test_volumes_between_planes_are_those_enclosed_and_their_gradients():
     surface = cylinder(0.5, 3.0, "plates")
     assert room_volumes(surface)[0] == pytest.approx(3.0 * np.pi, rel=0.03)

@@ -255,6 +255,28 @@ def test_cables_weights_and_rooms_are_carried():
     assert again.rooms[0].volume == 0.4
 
 
+def test_a_cable_in_one_of_two_mirror_planes_has_its_tension_twice_and_its_length_twice():
+    """A quarter of a tent: the plane y = 0 cuts its ridge in half, and the ridge lies in x = 0."""
+    planes = [Plane(normal=axis, mirror=True) for axis in ((1, 0, 0), (0, 1, 0))]
+    X = [[0, 0, 1], [1, 0, 0.5], [1, 1, 0], [0, 1, 0.5]]
+    piece = Surface(
+        X,
+        [[0, 1, 2], [0, 2, 3]],
+        [0, 0],
+        [Patch("tent", 1.0)],
+        fixed=[2],
+        on_planes={planes[0]: [0, 3], planes[1]: [0, 1]},
+        cables=[Cable("ridge", 1.5, [[0, 3]])],
+    )
+    whole = mirrored(piece)
+    (ridge,) = whole.cables
+    ends = whole.vertices[ridge.edges]
+    assert (ridge.tension, len(ridge.edges)) == (3.0, 2)
+    np.testing.assert_allclose(np.sort(ends[:, :, 1].ravel()), [-1.0, 0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(ends[:, :, 0], 0.0)
+    assert pcmc.energy(whole) == pytest.approx(4.0 * pcmc.energy(piece), rel=1e-14)
+
+
 def test_rooms_that_do_not_meet_stay_apart():
     X, F = [[1, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 1], [0, 5, 0], [0, 6, 0], [1, 5, 0]], None
     F = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [4, 6, 5]]

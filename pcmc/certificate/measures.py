@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +15,15 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..certificate.cables import chord
-from ..certificate.reactions import SupportForces, support_forces
-from ..certificate.tables import lean_sines, sides_at
 from ..forces.functional import weighted
 from ..forces.parameters import gradient_by
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, segment_lengths
 from ..surface.values import part_index
+from .cables import chord
+from .forces import Forces, sides_at
+from .tables import lean_sines
 
 TIE = 1e-6  # of a maximum's size: a change of parameters as small, relative, may bring another one to the top
 
@@ -151,14 +150,14 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
 
     As in the certificate's table of supports; an edge that slides pulls across its plane. Force/length.
     """
-    acting = support_forces(surface)
+    acting = Forces.of(surface)
     edges = acting.along_patch(None if of is None else surface.patch_index(of))
     if not edges.any():
         raise OptionError(f"reaction of {of}: nothing holds the edges of that patch", what="of", found=of)
     return largest_pull(acting, edges)
 
 
-def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
+def largest_pull(acting: Forces, edges: Bools) -> Measurement:
     """The largest pull along some of the edges (e,) of a surface, force/length.
 
     A side from a to b of length L, with the unit tangent t, has in a triangle of normal ν the co-normal n;
@@ -173,7 +172,7 @@ def largest_pull(acting: SupportForces, edges: Bools) -> Measurement:
 
     def branches(near: Ints) -> Branches:
         ends = acting.surface.topology.edges[numbers[near]]
-        at, face, corners = sides_at(surface, surface.topology.edge_numbers(ends))
+        at, face, corners = sides_at(surface, ends)
         c, a, b = surface.vertices[corners].transpose(1, 0, 2)
         k, pull = surface.patch_of_face[face], (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][at]
         length = np.linalg.norm(b - a, axis=1)[:, None]
@@ -265,16 +264,13 @@ def _length(surface: Surface, of: str) -> Measurement:
 
 def _force(surface: Surface, of: str) -> Measurement:
     """τ, the force in a cable: the same all along it."""
+    if surface.cables[surface.cable_index(of)].weight:
+        message = f"force of {of}: with a weight it differs along the cable; it has no single value"
+        raise OptionError(message, what="of", found=of)
     one = np.zeros(len(surface.cables))
     one[surface.cable_index(of)] = 1.0
     tension = surface.cables[surface.cable_index(of)].tension
     return Measurement(tension, np.zeros_like(surface.vertices), {"cables": one})
-
-
-def _margin(surface: Surface, of: str | None) -> Measurement:
-    """The factor of ``pcmc.margin``, which stands on this package: so it is found when it is asked for."""
-    found: Measurement = import_module("pcmc.margins.targets").measured_margin(surface, of)
-    return found
 
 
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:
@@ -303,5 +299,4 @@ MEASURES = {
     "length": Measure(_length, lambda surface: surface.size),
     "force": Measure(_force, lambda surface: max(cable.tension for cable in surface.cables) or 1.0),
     "reaction per length": Measure(_reaction, lambda surface: float(surface.tensions.max())),
-    "margin": Measure(_margin, lambda surface: 1.0),
 }

@@ -1,0 +1,71 @@
+"""Bordered systems: rooms of prescribed volume, or the parameter of a branch, beside an equilibrium.
+
+J, the derivative of the forces, is applied and not assembled; a factorisation of A = Bᵀ(∂²E)B in its place
+preconditions GMRES. Where J is singular, as at a fold, the bordered matrix is not (Govaerts 2000, ch. 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from ..base.arrays import Floats
+from .factorisation import Inverse
+
+
+class BorderedFactor:
+    """The inverse of [[A, P], [Q, D]], P (N,k), Q (k,N), by that of A and the Schur complement D - Q A⁻¹ P.
+
+    It exists where A is singular along P alone. Near there the factor of A loses digits, and the inverse is a
+    preconditioner.
+
+    >>> class Diagonal:
+    ...     def solve(self, right):
+    ...         return (right.T / [2.0, -1.0]).T
+    >>> P = np.array([[1.0], [0.0]])
+    >>> BorderedFactor(Diagonal(), -P, P.T).solve(np.array([0.0, 1.0, 3.0])).tolist()
+    [3.0, -1.0, 6.0]
+    """
+
+    def __init__(self, inner: Inverse, columns: Floats, rows: Floats, corner: float = 0.0) -> None:
+        self._inner, self._rows, self._behind = inner, rows, inner.solve(columns)
+        self.schur = corner - rows @ self._behind  # (k,k)
+
+    @cached_property
+    def _multipliers(self) -> Floats:
+        return np.asarray(np.linalg.pinv(self.schur))
+
+    def solve(self, right: Floats) -> Floats:
+        """(s, μ) (N+k,) with A s + P μ and Q s + D μ as given in ``right``, or several of them (N+k,j)."""
+        size = len(self._behind)
+        s = self._inner.solve(right[:size])
+        multipliers = self._multipliers @ (right[size:] - self._rows @ s)
+        return np.concatenate([s - self._behind @ multipliers, multipliers])
+
+
+def solve_preconditioned(
+    times: Callable[[Floats], Floats],
+    inverse: Callable[[Floats], Floats],
+    right: Floats,
+    accuracy: float,
+    *,
+    restart: int,
+    cycles: int = 1,
+) -> tuple[Floats, list[float]]:
+    """z with ``times(z)`` = right (N,) to a relative accuracy, by GMRES, and the residual after each step."""
+    residuals: list[float] = []
+    shape = len(right), len(right)
+    z, _ = gmres(
+        LinearOperator(shape, times, dtype=float),
+        right,
+        M=LinearOperator(shape, inverse, dtype=float),
+        rtol=accuracy,
+        restart=restart,
+        maxiter=cycles,
+        callback=residuals.append,
+        callback_type="pr_norm",
+    )
+    return z, residuals
