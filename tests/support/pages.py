@@ -1,7 +1,7 @@
-"""Run what the README and the pages of the documentation print: ``python pages.py PAGE ...``, in an empty folder.
+"""Run what README and documentation print: ``python pages.py PAGE ...``, in an empty folder.
 
-The blocks of a page run in order, in one namespace and one folder. Comments in a page, which readers do not see, say
-what a block needs: ``<!-- before ... -->`` has Python to run first, ``<!-- file: NAME -->`` names the file that the next
+The blocks of a page run in order, in one namespace and one folder. Comments that readers do not see say what a
+block needs: ``<!-- before ... -->`` has Python to run first, ``<!-- file: NAME -->`` names the file that the next
 block is written to (a project is solved, too), and ``<!-- not run: REASON -->`` leaves the next block out.
 """
 
@@ -22,7 +22,7 @@ BLOCK = re.compile(
     r"|^```(?P<language>\w+)\n(?P<text>.*?)^```",
     re.S | re.M,
 )
-OUTSIDE = ("pip ", "python -m pip ", "python -m studies", "python -m pcmc.compas", "sphinx-build ", "ccx ", "apt ")
+OUTSIDE = ("pip ", "python -m pip ", "python -m studies", "python -m pcmc.compas", "sphinx-build ", "ccx ")
 
 
 def parts(page: Path) -> Iterator[tuple[int, str, str]]:
@@ -93,7 +93,8 @@ def run_project(text: str, file: str, where: str) -> None:
     data = tomllib.loads(text)
     if file:
         path = Path(file)
-        before = path.read_text(encoding="utf-8") if path.exists() and not {"plan", "mesh"} & set(data) else ""
+        added = path.exists() and not {"plan", "mesh"} & set(data)
+        before = path.read_text(encoding="utf-8") if added else ""
         path.write_text(f"{before}\n{text}", encoding="utf-8")
         outcome = run(path)
         assert outcome.good, f"{where}: {outcome.certificate.verdict}"
@@ -101,7 +102,7 @@ def run_project(text: str, file: str, where: str) -> None:
     known = {key.name for section in sections() for key in section.keys}
     for section, table in data.items():
         keys = set(table) if isinstance(table, dict) and section != "patches" else set()
-        assert keys <= known and section in known, f"{where}: unknown keys {sorted(keys - known)} of [{section}]"
+        assert {section, *keys} <= known, f"{where}: unknown keys {sorted({section, *keys} - known)}"
 
 
 def main(pages: list[str]) -> None:
