@@ -1,8 +1,8 @@
 """Run what README and documentation print: ``python pages.py PAGE ...``, in an empty folder.
 
 The blocks of a page run in order, in one namespace and one folder. Comments that readers do not see say what
-a block needs: ``<!-- before ... -->`` has Python to run first, ``<!-- file: NAME -->`` names the file to which
-the next block is written (a project is solved, too); ``<!-- not run: REASON -->`` leaves the next block out.
+a block needs: ``<!-- before ... -->`` has Python to run first, ``<!-- file: NAME -->`` names the file for
+the next block (a project is solved, too); ``<!-- not run: REASON -->`` leaves the next block out.
 """
 
 from __future__ import annotations
