@@ -54,6 +54,15 @@ def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
     return cached_property(computed)
 
 
+def format_rows(template: str, *columns: npt.NDArray[Any]) -> str:
+    """The template filled with each row of the columns; ``%r`` writes a float exactly.
+
+    >>> format_rows("v %r %d\\n", np.array([0.1, 2.0]), np.array([3, 4]))
+    'v 0.1 3\\nv 2.0 4\\n'
+    """
+    return "".join(template % row for row in zip(*(column.tolist() for column in columns), strict=True))
+
+
 def plain(value: Any) -> Any:
     """The value in terms of JSON: tables as lists of rows, members of an Enum as words, None for numbers that
     are not finite.

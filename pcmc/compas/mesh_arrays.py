@@ -81,9 +81,7 @@ class WholeMesh(NamedTuple):
     planes: tuple[Plane, ...] = ()  # besides Π, that vertices slide on
     rooms: tuple[Room, ...] = ()
     cables: tuple[str, ...] = ()  # their names in order
-    curves: tuple[
-        HeldCurve, ...
-    ] = ()  # that held vertices were drawn on; their vertices are keys of the meshes
+    curves: tuple[HeldCurve, ...] = ()  # that held vertices were drawn on, by their keys
 
 
 def read_whole(named: Mapping[str, Any]) -> WholeMesh:
@@ -112,13 +110,10 @@ def read_whole(named: Mapping[str, Any]) -> WholeMesh:
             tuple(map(HeldCurve.from_plain, values.get("curves", ()))),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({reason}); without it Π is z = 0")
+        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({_reason(error)}); without it Π is z = 0")
 
 
 class Vertex(NamedTuple):
-    """A vertex of a mesh that a face uses."""
-
     mesh: str
     key: int
     point: list[float]
@@ -168,9 +163,8 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
 
 
 def shared_vertices(vertices: Sequence[Vertex], weld: bool) -> tuple[Ints, Ints]:
-    """Which vertices to keep, and the index among them of every vertex.
-
-    Vertices of one key are one, and must lie at one place; with ``weld``, vertices at one place are one.
+    """Which vertices to keep, and the index among them of every vertex: those of one key are one, and must
+    lie at one place; with ``weld``, those at one place are one.
     """
     X = np.array([vertex.point for vertex in vertices])
     if weld:
@@ -209,9 +203,8 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
 
 
 def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) -> tuple[Cable, ...]:
-    """A cable for each value of the edges' attribute ``cable``; their attribute ``tension`` is its force.
-
-    ``names`` lists cables that come first.
+    """A cable for each value of the edges' attribute ``cable``, those in ``names`` first; their attribute
+    ``tension`` is its force.
     """
     edges: dict[str, set[tuple[int, int]]] = {name: set() for name in names}
     tensions: dict[str, float] = {}
@@ -233,16 +226,18 @@ def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) 
 
 
 def refuse(what: str, name: str, problem: str) -> NoReturn:
-    """Raise the error about a mesh."""
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
 
 
 def damaged_mesh(error: Exception) -> SurfaceError:
     """The error for a mesh that is wrong in a way that none checks."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-    return SurfaceError(f"meshes: one is damaged ({reason}); check it with mesh.is_valid()", what="meshes")
+    text = f"meshes: one is damaged ({_reason(error)}); check it with mesh.is_valid()"
+    return SurfaceError(text, what="meshes")
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:120]
 
 
 def _is_index(value: Any) -> bool:
-    """Whether it is a whole number ≥ 0."""
     return isinstance(value, int | np.integer) and int(value) >= 0

@@ -1,8 +1,7 @@
 """The mesh of a file and its data, as every reader returns them, before they become a Surface.
 
-They can be converted to another unit of length. With the factor f, lengths become f times as large, tensions
-(force/length) 1/f, pressures, weights and snow (force/length²) 1/f², volumes f³. Forces stay, so the shape at
-rest stays the same.
+In a unit f times smaller, lengths become f times as large, tensions 1/f, pressures, weights and snow 1/f²,
+volumes f³. Forces stay, so the shape at rest stays the same.
 """
 
 from __future__ import annotations
@@ -59,10 +58,7 @@ class MeshData:
 
 
 def checked(data: MeshData) -> MeshData:
-    """The same with arrays of the right type, shape and range; FileError for others.
-
-    Readers and libraries do not all check the numbers of a file, and indices out of range would reach numpy.
-    """
+    """The same with arrays of the right type, shape and range; FileError where a library let others pass."""
     X = checks.positions(numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64))
     n, m, support, scalars = len(X), len(data.faces), data.support, dict(data.scalars)
     F = within(numeric(data.faces, "faces", "iu", (None, 3)), "faces", n)
@@ -257,8 +253,7 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
 def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     """A file's data in another unit of length, if any is given, with a note if that changes them.
 
-    ``assumed`` is the unit of a file that names none. Tensions and pressures change only where the file has
-    them; scalars stay.
+    ``assumed`` is the unit of a file that names none. Scalars stay, and tensions that the file does not have.
     """
     units = data.units or Units(assumed, data.units.force)
     factor = length_factor(units.length, length)
