@@ -1,7 +1,6 @@
 """Accuracy: how far an answer depends on its mesh.
 
-Gives ``check_mesh``, ``solve_to_accuracy`` and their values. May import ``continuation``,
-``design``, ``solvers`` and the rooms below them.
+Gives ``check_mesh``, ``solve_to_accuracy`` and their values. May import ``existence`` and the rooms below.
 """
 
 from .adaptive import AccuracyStatus, AccurateResult, solve_to_accuracy

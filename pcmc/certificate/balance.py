@@ -1,39 +1,28 @@
-"""Balance: loads, what supports could carry of them, and proofs that no smooth surface is at rest."""
+"""What supports could carry of the loads, and proofs that no smooth surface is at rest."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 
 from ..base.arrays import Bools
+from ..base.tolerances import EXCESS, HARDLY, ON, PARALLEL
+from ..forces.cables import cable_pulls
+from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.supports import common_point, uncancelled_pressures
 from ..surface.values import balanced_wall
+from .forces import load
 from .proof import Overload, UnbalancedJunction, Unheld
-
-ROUNDED = 1e-9  # a load, or a tension, that exceeds what balances it by less may do so by rounding alone
-COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
-HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
-FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
 
 
 def load_name(surface: Surface) -> str:
     """What sentences call the load: "pressure", "net pressure" less snow, "weight", or "load" for several."""
-    if surface.weights.any():
+    if surface.heavy:
         return "load" if surface.net_pressures.any() else "weight"
     return "net pressure" if surface.snows.any() else "pressure"
-
-
-def load(surface: Surface) -> float:
-    """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
-    vector = area_vectors(surface.vertices[surface.faces])
-    pressed = surface.net_pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
-    if not surface.weights.any():
-        return float(pressed)
-    return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
 
 
 def load_ratio(surface: Surface) -> float:
@@ -72,7 +61,7 @@ def overload(surface: Surface) -> Overload | None:
         return None
     fixed = np.asarray(surface.pinned[surface.topology.edges].all(axis=1))
     ratio = abs(load(surface)) / (_capacity(surface, fixed) or np.inf)
-    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 + ROUNDED else None
+    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 + EXCESS else None
 
 
 def load_is_given(surface: Surface) -> bool:
@@ -92,8 +81,8 @@ def load_is_given(surface: Surface) -> bool:
     topo, pinned = surface.topology, surface.pinned
     pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
     normals = [np.dot(plane.normal, surface.plane.normal) for plane, _ in surface.on_planes]
-    varies = surface.rooms or surface.weights.any() or surface.given_supports.on_line
-    if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > 1e-9 for up in normals):
+    varies = surface.rooms or surface.heavy or surface.given_supports.on_line
+    if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > PARALLEL for up in normals):
         return False
     alone = pinned.copy()
     alone[topo.edges[pinned[topo.edges].all(axis=1)]] = False
@@ -123,8 +112,8 @@ def _capacity(surface: Surface, carrying: Bools) -> float:
     if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
         capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
-    ends, tension = surface.cable_edges
-    return capacity + float(tension[supports[ends].sum(axis=1) == 1].sum())
+    pulls = np.abs(cable_pulls(surface, X))
+    return capacity + float(pulls[supports[surface.cable_edges.ends].sum(axis=1) == 1].sum())
 
 
 def coarseness(surface: Surface) -> float:
@@ -147,55 +136,7 @@ def coarseness(surface: Surface) -> float:
     return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
-def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
-    """Force and moment of the loads, of the supports, and what remains of both: a row each.
-
-    The loads are Σ p A_T ν_T - Σ w A_T n, the supports the rows of their table. What remains are the forces
-    at vertices that nothing holds: a mesh at rest balances along its normals; along the sheets forces are
-    left, smaller ones on finer meshes.
-
-    Columns: ``of``; ``force_x``, …, and ``moment_x``, …, about the middle of the surface's bounding box at
-    ``x``, ``y``, ``z``; ``force_share``, ``moment_share``, the largest component over the sum of the loads'
-    sizes, triangle by triangle; without loads, over that of the supports.
-    """
-    X, n = surface.vertices, np.array(surface.plane.normal)
-    corners, patch = X[surface.faces], surface.patch_of_face
-    vector = area_vectors(corners)
-    force = surface.net_pressures[patch, None] * vector
-    if surface.weights.any():
-        force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
-    about = 0.5 * (X.min(axis=0) + X.max(axis=0))
-    arm = corners.mean(axis=1) - about
-    products = arm.T @ force
-    moment = [products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)]  # Σ arm × force
-    loads = np.array([force.sum(axis=0), moment])
-    columns = [*FORCE, *MOMENT, *"xyz"]
-    rows, moments, places = np.split(supports[columns].to_numpy(float), 3, axis=1)
-    arms = places - about
-    carried = np.array([rows.sum(axis=0), (moments + np.cross(arms, rows)).sum(axis=0)])
-    sizes, away = (np.linalg.norm(part, axis=1) for part in ((force, arm) if force.any() else (rows, arms)))
-    scale = np.array([sizes.sum(), sizes @ away])
-    parts = np.array([loads, carried, loads + carried])
-    shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
-    values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
-    columns = ["of", *columns, "force_share", "moment_share"]
-    return pd.DataFrame(dict(zip(columns, [["loads", "supports", "remainder"], *values], strict=True)))
-
-
-def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
-    """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
-    left = table.iloc[-1]
-    force, moment = left["force_share"], left["moment_share"]
-    share = f"to {force:.1g} of them in x, y and z, and to {moment:.1g} in moments"
-    if not table.iloc[0][[*FORCE]].any():
-        return f"the forces of the supports cancel {share}"
-    place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")
-    whose = " of the piece between the mirror planes" if mirrors else ""
-    hint = "; the rest is what the mesh leaves along its sheets: refine it" if force > COARSE else ""
-    return f"the supports carry the loads{whose} {share} about ({place}){hint}"
-
-
-def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + ROUNDED) -> UnbalancedJunction | None:
+def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + EXCESS) -> UnbalancedJunction | None:
     """A junction whose tensions cannot balance at any angles; None if there is none.
 
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others, or here ``share`` of it. A
@@ -219,17 +160,17 @@ def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + ROUNDED)
     return None
 
 
-def strained_junction(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
+def strained_junction(surface: Surface) -> UnbalancedJunction | None:
     """A junction as in ``unbalanced`` whose tensions balance only with sheets nearly on each other.
 
     At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow.
     """
-    return unbalanced(surface, pinchable, HARDLY)
+    return unbalanced(surface, standing_part(surface).walls.pinchable, HARDLY)
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     """Names a ``strained_junction``; or empty."""
-    strained = strained_junction(surface, pinchable)
+    strained = unbalanced(surface, pinchable, HARDLY)
     if strained is None:
         return ""
     others = " + ".join(f"{tension:g}" for tension in strained.others)
@@ -272,8 +213,10 @@ def unheld(surface: Surface) -> Unheld | None:
     parts, patch = surface.topology.components, surface.patch_of_face
     resting = surface.held.copy()
     resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
-    falling = np.setdiff1d(parts[surface.faces[surface.weights[patch] > 0.0, 0]], parts[resting])
-    if len(falling) and not (surface.weights < 0.0).any():
+    ends, _, weight = surface.cable_edges
+    heavy = np.append(surface.faces[surface.weights[patch] > 0.0, 0], ends[weight > 0.0, 0])
+    falling = np.setdiff1d(parts[heavy], parts[resting])
+    if len(falling) and not ((surface.weights < 0.0).any() or (weight < 0.0).any()):
         return Unheld(int(np.flatnonzero(parts == falling[0])[0]), falls=True)
     for part, pressed in _scaled(surface):
         if not pressed and surface.tensions[patch[parts[surface.faces[:, 0]] == part]].any():
@@ -312,12 +255,13 @@ def _scaled(surface: Surface) -> list[tuple[int, bool]]:
         held |= along
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
+    held[surface.cable_edges.ends[surface.cable_edges.weight != 0.0]] = True
     loose = []
     for part in np.setdiff1d(parts[used], parts[held]):
         planes = [(surface.plane, given.on_plane), *surface.on_planes]
         there = [plane for plane, mask in planes if (mask & (parts == part)).any()]
         point = common_point(np.array(there[0].point), there) if len(there) > 1 else None
-        if point is None or all(abs(plane.height(point)) <= 1e-9 * surface.size for plane in there):
+        if point is None or all(abs(plane.height(point)) <= ON * surface.size for plane in there):
             loose.append((part, bool(part in pressed)))
     return loose
 

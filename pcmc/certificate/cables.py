@@ -1,4 +1,4 @@
-"""Cables: their balance with the sheets along them, the forces at their ends, and where they are too weak."""
+"""Where cables are too weak for the sheets along them, and how far they sag."""
 
 from __future__ import annotations
 
@@ -6,79 +6,16 @@ import math
 from itertools import pairwise
 
 import numpy as np
-import pandas as pd
 from scipy.optimize import brentq
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..forces.cables import directions
+from ..base.tolerances import ON
 from ..surface import Surface
-from ..surface.geometry import cross_2d, segment_lengths
-from ..surface.parts import Cable
+from ..surface.geometry import cross_2d
 from ..surface.symmetry import mirrored
-from ..surface.topology import EdgeCurve
+from .forces import cable_parts
 from .proof import WeakCable
-from .tables import conormal_sum, middle
-
-FLAT = 1e-9  # of the size: fixed points this near to one plane lie in it; the least excess that counts
-
-
-def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
-    """A row per cable, or per part of it between supports, branches and ends.
-
-    At rest a cable of tension τ and curvature vector κ balances the sheets along it: Σ α n + τ κ = 0 with
-    their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in
-    the mean over a cable's edges up to what the mesh leaves.
-
-    Columns: ``cable``, ``tension`` (its force) and ``length``; the middle of the part; ``sheet_pull``, the
-    mean of |Σ α n| and ``cable_pull``, that of τ |κ|, force/length; ``force_left`` per length in the motion
-    space, of ``left`` (n,3).
-    """
-    rows = []
-    for cable, curve in _parts(surface):
-        lengths, t = segment_lengths(surface.vertices, curve.pairs), _tangents(surface, curve.pairs)
-        total = float(lengths.sum())
-        turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if curve.closed else np.diff(t, axis=0), axis=1)
-        weight = 0.5 * (lengths + np.roll(lengths, 1)) if curve.closed else 0.5 * (lengths[1:] + lengths[:-1])
-        sheets = np.linalg.norm(conormal_sum(surface, surface.topology.edge_numbers(curve.pairs)), axis=1)
-        inner = curve.vertices if curve.closed else curve.vertices[1:-1]
-        most = float(np.linalg.norm(left[inner], axis=1).max(initial=0.0))
-        rows.append(
-            {
-                "cable": cable.name,
-                "tension": cable.tension,
-                "length": total,
-                **middle(surface, curve),
-                "sheet_pull": float(sheets @ lengths) / (total or 1.0),
-                "cable_pull": cable.tension * float(turns.sum()) / (float(weight.sum()) or 1.0),
-                "force_left": most / (float(lengths.mean()) or 1.0),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def cable_end_table(surface: Surface) -> pd.DataFrame:
-    """A row per end of each part of a cable: where it is, whether a support holds it, and the force.
-
-    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -τ t, with t the
-    direction from the end along the cable. Where several cables end, their support carries the sum.
-    """
-    rows = [
-        [cable.name, vertex, *surface.vertices[vertex].tolist(), bool(surface.held[vertex]), *force.tolist()]
-        for cable, vertex, force in cable_ends(surface)
-    ]
-    columns = ["cable", "vertex", *"xyz", "held", "force_x", "force_y", "force_z"]
-    return pd.DataFrame(rows, columns=columns if rows else None)
-
-
-def cable_ends(surface: Surface) -> list[tuple[Cable, int, Floats]]:
-    """Each end of a part of a cable: the cable, the vertex, and -τ t (3,), the force that holds it there."""
-    return [
-        (cable, int(pair[0]), -cable.tension * _tangents(surface, pair[None])[0])
-        for cable, curve in _parts(surface)
-        if not curve.closed
-        for pair in (curve.vertices[:2], curve.vertices[:-3:-1])
-    ]
 
 
 def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
@@ -105,8 +42,8 @@ def too_long(surface: Surface) -> str:
 
     In a plane no arc is as wide, so a flat sheet is not at rest there; another one hardly.
     """
-    for cable, curve in _parts(surface):
-        if curve.closed or len(curve.sheets) != 1:
+    for cable, curve in cable_parts(surface):
+        if curve.closed or len(curve.sheets) != 1 or cable.weight:
             continue
         chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
         tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
@@ -155,7 +92,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     if plane is None:
         return None
     topo, fixed = surface.topology, surface.fixed
-    found: tuple[float, WeakCable | None] = 1.0 + FLAT, None
+    found: tuple[float, WeakCable | None] = 1.0 + ON, None
     alpha = float(surface.tensions[surface.patch_of_face[0]])
     inner = fixed[topo.edges].all(axis=1) & ~topo.boundary_edge
     disc = surface.n - len(topo.edges) + surface.m == 1 and not np.ptp(topo.components)
@@ -180,14 +117,14 @@ def weak_cable(surface: Surface) -> WeakCable | None:
 def _plane_of_sail(surface: Surface) -> Floats | None:
     """(3,2) directions of the plane in which a sail of one tension lies at rest; None if there is none."""
     topo, X = surface.topology, surface.vertices[surface.fixed]
-    loads = surface.net_pressures.any() or surface.weights.any() or bool(surface.rooms)
+    loads = surface.net_pressures.any() or surface.heavy or bool(surface.rooms)
     slides = surface.on_plane.any() or bool(surface.on_planes or surface.given_supports.on_line)
     tensions = surface.tensions[surface.patch_of_face]
     outer = topo.boundary_edge[topo.edge_numbers(surface.cable_edges.ends)]
     if loads or slides or not len(outer) or not outer.all() or topo.valence.max() > 2 or len(X) < 2:
         return None
     _, sizes, axes = np.linalg.svd(X - X.mean(axis=0))
-    flat = len(X) < 3 or sizes[2] <= FLAT * sizes[0]
+    flat = len(X) < 3 or sizes[2] <= ON * sizes[0]
     return axes[:2].T if flat and not np.ptp(tensions) and tensions[0] > 0.0 else None
 
 
@@ -215,7 +152,7 @@ def _angles(chords: Floats) -> Floats:
     """(k,) the angle β at the start of each side (k,2) of a polygon; infinite where it does not turn once."""
     before = np.roll(chords, 1, axis=0)
     turns = np.arctan2(cross_2d(before, chords), np.einsum("ij,ij->i", before, chords))
-    once = abs(abs(turns.sum()) - 2.0 * math.pi) < FLAT
+    once = abs(abs(turns.sum()) - 2.0 * math.pi) < ON
     return np.asarray(math.pi - np.sign(turns.sum()) * turns if once else np.full(len(turns), math.inf))
 
 
@@ -226,25 +163,6 @@ def _least_factor(small: float, large: float, angle: float) -> float:
     def excess(factor: float) -> float:
         return math.asin(0.5 * small / factor) + math.asin(min(1.0, 0.5 * large / factor)) - angle
 
-    if least == 0.0 or excess(least) <= 0.0 or angle < FLAT:
+    if least == 0.0 or excess(least) <= 0.0 or angle < ON:
         return least
     return float(brentq(excess, least, 2.0 * (small + large) / min(1.0, angle)))
-
-
-def _tangents(surface: Surface, pairs: Ints) -> Floats:
-    return directions(surface.vertices, pairs)[0]
-
-
-def _parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
-    """The parts of each cable of tension > 0 between its ends, branches and the supports in between.
-
-    A support in between is a mast that it runs over: a fixed vertex beside one that moves.
-    """
-    parts = []
-    for cable in surface.cables:
-        if cable.tension > 0.0:
-            mast = np.zeros(surface.n, dtype=bool)
-            leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
-            mast[leading] = surface.fixed[leading]
-            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, mast)]
-    return parts

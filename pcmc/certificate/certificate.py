@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -17,25 +17,31 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
+from ..base.tolerances import AT_REST, COLLAPSED, NEAR_NEUTRAL, NEUTRAL
 from ..base.units import NO_UNITS, Units
-from ..forces.functional import energy, patch_areas
+from ..forces.functional import energy
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
 from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import NEAR, NEUTRAL, Spectrum, count_soft, lowest
+from ..stability.modes import Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
-from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
-from .cables import cable_end_table, cable_table
+from .balance import load_ratio, pressures_left_over
+from .forces import Forces, along_normal
 from .proof import Attempt, Proof
-from .reactions import SupportForces, support_forces
-from .supports import boundary_view, pull_table, support_table
-from .tables import junction_table, lean_table, lean_texts, patch_table, room_table
-from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge, only_coarse
-
-TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
+from .supports import FORCE, MOMENT, balance_sentence, balance_table, boundary_view, pull_table, support_table
+from .tables import (
+    cable_end_table,
+    cable_table,
+    junction_table,
+    lean_table,
+    lean_texts,
+    patch_table,
+    room_table,
+)
+from .verdict import Evidence, Findings, Verdict, judge
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,29 +55,17 @@ class Certificate:
         vertices beyond what their wall can take, and the relative differences of prescribed volumes (as
         squares). Of several loose parts, that of the worst.
     scale : norm of the single triangles' tension forces, force.
-    energy, volume : E (force·length) and the volume between the roof and Π (``volumes_below``, length³).
+    energy : E, force·length.
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
         that change a prescribed volume.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) their displacement fields, unit mass.
-    curvature_error : largest |H - H̄|/H̄ by the variational definition.
     quality : smallest triangle quality outside walls that can pinch; ``walls_quality`` in these.
-    patches : a row per patch: tension, pressure (where there is snow, snow and net pressure), target
-        curvature, area, errors by both definitions, quality.
-    junctions : a row per curve: length, middle, forces left and Σ α n, force/length.
-    load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
-        what the mesh leaves along the sheets.
     acting : the forces of the supports by how they act; ``reactions`` are these (n,3) for each vertex.
+    left : (n,3) the forces left in the motion space.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
-    load_ratio : pressure and weight along Π's normal over the most that the supports could carry.
     proofs : why there is no equilibrium, if that is the verdict.
     tried : what a search for an equilibrium has tried, if that led to none.
-    cables, cable_ends : see ``pcmc.certificate.cables.cable_table`` and ``cable_end_table``.
-    rooms : a row per room of prescribed volume: the volume it has, the one prescribed, the difference
-        over the latter, and the room's pressure.
-    symmetric_in : the mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
-        symmetric in these; ``certify(surface, whole=True)`` is about all.
-    leaning : a row per wall: its largest angle from the vertical of Π, degrees, and the place.
     """
 
     verdict: Verdict
@@ -79,27 +73,97 @@ class Certificate:
     residual: float
     scale: float
     energy: float
-    volume: float
     index: int | None
     eigenvalues: Floats
     modes: Floats
-    curvature_error: float
     quality: float
     walls_quality: float
-    patches: pd.DataFrame
-    junctions: pd.DataFrame
-    load: float
-    support: float
-    acting: SupportForces = field(repr=False)  # no file has it: it holds the surface
+    acting: Forces = field(repr=False)
+    left: Floats = field(repr=False)
     pinched: Ints
-    load_ratio: float
     proofs: tuple[Proof, ...] = ()
     tried: tuple[Attempt, ...] = ()
-    cables: pd.DataFrame = field(default_factory=pd.DataFrame)
-    cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
-    rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
-    symmetric_in: tuple[str, ...] = ()
-    leaning: pd.DataFrame = field(default_factory=pd.DataFrame)
+    FILED: ClassVar = (
+        *("verdict", "detail", "residual", "scale", "energy", "volume", "index", "eigenvalues", "modes"),
+        *(
+            "curvature_error",
+            "quality",
+            "walls_quality",
+            "patches",
+            "junctions",
+            "load",
+            "support",
+            "pinched",
+        ),
+        *("load_ratio", "proofs", "tried", "cables", "cable_ends", "rooms", "symmetric_in", "leaning"),
+        *("supports", "balance", "reactions"),
+    )
+
+    @property
+    def volume(self) -> float:
+        """The volume between the roof and Π (``volumes_below``), length³."""
+        return volume_below(self.acting.surface)
+
+    @cached_property
+    def patches(self) -> pd.DataFrame:
+        """A row per patch: tension, pressure (where there is snow, snow and net pressure), target curvature,
+        area, errors by both definitions, quality."""
+        return patch_table(self.acting.surface, self.acting.standing)
+
+    @property
+    def curvature_error(self) -> float:
+        """The largest |H - H̄|/H̄ by the variational definition."""
+        return _largest(self.patches["variational_max"])
+
+    @cached_property
+    def junctions(self) -> pd.DataFrame:
+        """A row per curve: length, middle, forces left and Σ α n, force/length."""
+        return junction_table(self.acting.standing, self.left)
+
+    @property
+    def load(self) -> float:
+        """The force of pressure and weight along Π's normal.
+
+        Its sum with ``support`` is what the mesh leaves along the sheets.
+        """
+        return along_normal(self.acting.surface, self.acting.loads)
+
+    @property
+    def support(self) -> float:
+        """The force of all supports along Π's normal."""
+        return along_normal(self.acting.surface, self.acting.reactions)
+
+    @cached_property
+    def load_ratio(self) -> float:
+        """Pressure and weight along Π's normal over the most that the supports could carry."""
+        return load_ratio(self.acting.standing)
+
+    @cached_property
+    def cables(self) -> pd.DataFrame:
+        """A row per part of a cable; see ``pcmc.certificate.tables.cable_table``."""
+        return cable_table(self.acting.standing, self.left)
+
+    @cached_property
+    def cable_ends(self) -> pd.DataFrame:
+        """A row per end of a cable; see ``pcmc.certificate.tables.cable_end_table``."""
+        return cable_end_table(self.acting.standing, self.acting.cable_ends)
+
+    @cached_property
+    def rooms(self) -> pd.DataFrame:
+        """A row per room of prescribed volume: the volume it has, the one prescribed, the difference over the
+        latter, and the room's pressure."""
+        return room_table(self.acting.surface)
+
+    @property
+    def symmetric_in(self) -> tuple[str, ...]:
+        """The mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
+        symmetric in these; ``certify(surface, whole=True)`` is about all."""
+        return tuple(str(plane) for plane, _ in self.acting.surface.on_planes if plane.mirror)
+
+    @cached_property
+    def leaning(self) -> pd.DataFrame:
+        """A row per wall: its largest angle from the vertical of Π, degrees, and the place."""
+        return lean_table(self.acting.standing)
 
     @cached_property
     def supports(self) -> pd.DataFrame:
@@ -121,7 +185,7 @@ class Certificate:
     @cached_property
     def balance(self) -> pd.DataFrame:
         """Force and moment of the loads, of the supports, and what remains of both: a row each."""
-        return balance_table(self.acting.standing, self.supports)
+        return balance_table(self.acting, self.supports)
 
     @property
     def remainder(self) -> tuple[Floats, Floats]:
@@ -132,7 +196,7 @@ class Certificate:
     @property
     def reactions(self) -> Floats:
         """(n,3) force of each support on the surface."""
-        return self.acting.forces
+        return self.acting.reactions
 
     @property
     def largest_reaction(self) -> float:
@@ -199,7 +263,7 @@ def certify(
     surface: Surface,
     *,
     modes: int = 1,
-    tolerance: float = TOLERANCE,
+    tolerance: float = AT_REST,
     evidence: Evidence | None = None,
     tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
@@ -234,16 +298,13 @@ def certify(
         validate.refuse("evidence", evidence, "an Evidence or None")
     if whole is not False:
         surface = mirrored(surface, None if whole is True else whole)
-    equilibrium = Equilibrium.of(surface)
-    part, left, residual = equilibrium.part, equilibrium.unbalanced, equilibrium.residual_with_pull
-    standing, X, pinchable = part.surface, part.surface.vertices, part.walls.pinchable
-    qualities = triangle_quality(X, standing.faces)
-    in_wall = pinchable[standing.patch_of_face]
+    at = Equilibrium.of(surface)
+    standing, pinchable, residual = at.shape, at.part.walls.pinchable, at.residual_with_pull
+    qualities, in_wall = triangle_quality(at.X, standing.faces), pinchable[standing.patch_of_face]
     quality = float(qualities[~in_wall].min(initial=1.0))
-    at_rest = residual <= tolerance and quality > COLLAPSED
     spectrum, eigenvalues, fields = Spectrum(), np.empty(0), np.empty((0, 0, 3))
-    if at_rest:
-        spectrum, eigenvalues, fields = _stability(equilibrium, modes, clear)
+    if residual <= tolerance and quality > COLLAPSED:
+        spectrum, eigenvalues, fields = _stability(at, modes, clear)
     findings = Findings(
         surface=surface,
         pinchable=pinchable,
@@ -251,52 +312,32 @@ def certify(
         tolerance=tolerance,
         quality=quality,
         spectrum=spectrum,
-        own_residuals=_own_residuals(equilibrium),
-        rounding=rounding_left(standing, part.classes, X),
+        own_residuals=_own_residuals(at),
+        rounding=rounding_left(standing, at.classes, at.X),
         evidence=evidence,
         tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
-        rigid=equilibrium.rigid.shape[1] if surface.rooms else 0,
+        rigid=at.rigid.shape[1] if surface.rooms else 0,
+        pulled=tuple(np.flatnonzero(at.excess_pull).tolist()),
+        left_over=pressures_left_over(standing),
     )
-    verdict, reason = judge(findings)
-    pulled = np.flatnonzero(equilibrium.excess_pull)
-    notes = (
-        only_coarse(surface, pinchable) if at_rest and surface.tensions.any() else "",
-        f"at {len(pulled)} pinched vertices, the first {pulled[0]}, the sheets pull harder than the"
-        " wall can hold: the wall will stand there once solved"
-        if len(pulled)
-        else "",
-        pressures_left_over(standing),
-    )
-    patches = patch_table(surface, standing, patch_areas(surface), qualities)
-    errors, acting = patches["variational_max"], support_forces(surface, standing=standing)
+    verdict, detail = judge(findings)
     return Certificate(
         verdict=verdict,
-        detail="; ".join(filter(None, (reason, *notes))),
+        detail=detail,
         residual=residual,
-        scale=equilibrium.scale,
-        energy=equilibrium.energy,
-        volume=volume_below(surface),
+        scale=at.scale,
+        energy=at.energy,
         index=spectrum.index,
         eigenvalues=eigenvalues,
         modes=fields,
-        curvature_error=_largest(errors),
         quality=quality,
         walls_quality=float(qualities[in_wall].min(initial=1.0)),
-        patches=patches,
-        junctions=junction_table(standing, left),
-        load=load(standing),
-        support=float((acting.forces @ np.array(surface.plane.normal)).sum()),
-        acting=acting,
-        pinched=np.flatnonzero(part.resting),
-        load_ratio=load_ratio(standing),
+        acting=Forces.of(surface, standing=standing),
+        left=at.unbalanced,
+        pinched=np.flatnonzero(at.part.resting),
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
         tried=tried,
-        cables=cable_table(standing, left),
-        cable_ends=cable_end_table(standing),
-        rooms=room_table(surface),
-        leaning=lean_table(standing),
-        symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
 
 
@@ -337,7 +378,7 @@ def _stability(
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
     square = equilibrium.shape.size**2
     clear = clear if clear is not None and clear.of.same_as(equilibrium) else None
-    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square, clear)
+    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR_NEUTRAL / square, clear)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)

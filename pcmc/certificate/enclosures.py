@@ -56,7 +56,7 @@ class Elements(NamedTuple):
 def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elements:
     """The elements of a standing part at its own vertices."""
     F, offset, patch = classes.faces, pattern.offset, classes.patch_of_face
-    X, ends, pull = surface.vertices, *surface.cable_edges
+    X, (ends, pull, _) = surface.vertices, surface.cable_edges
     tension, weight = surface.tensions[patch], surface.weights[patch]
     corner: Ints = np.empty(0, dtype=np.int64)
     push = np.empty((0, 3))

@@ -1,4 +1,4 @@
-"""The tables of patches, junctions and rooms, and of how far walls lean."""
+"""The tables of patches, junctions, cables and rooms, and of how far walls lean."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
+from ..forces.cables import directions, pull_along
 from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
+from ..forces.functional import patch_areas
 from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
+from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import EdgeCurve
+from .forces import CableEnd, cable_parts, sheet_pulls
 
 ROUNDING = 1e-8  # of the size, about what a solve leaves: a coordinate below is 0
 THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth telling
@@ -22,40 +26,6 @@ THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth
 def names_of(surface: Surface, patches: Iterable[int]) -> str:
     """The names of patches that meet, as in "north | south | wall"."""
     return " | ".join(surface.patches[i].name for i in patches)
-
-
-def conormal_sum(surface: Surface, edges: Ints) -> Floats:
-    """(k,3) at each of the edges (k,), Σ α n over its triangles, n the outward co-normal, force/length.
-
-    With weights, α + w z stands for α. Zero along a junction of smooth surfaces at rest (7) without a
-    cable; of triangles it is zero only in the limit.
-    """
-    at, face, corners = sides_at(surface, edges)
-    c, a, b = surface.vertices[corners].transpose(1, 0, 2)
-    along = b - a
-    length = np.linalg.norm(along, axis=1)
-    along /= np.where(length > 0.0, length, 1.0)[:, None]
-    out = a - c
-    out -= np.einsum("ij,ij->i", out, along)[:, None] * along
-    length = np.linalg.norm(out, axis=1)
-    k, height = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
-    pull = (surface.tensions[k] + surface.weights[k] * height) / np.where(length > 0.0, length, 1.0)
-    total = np.zeros((len(edges), 3))
-    np.add.at(total, at, pull[:, None] * out)
-    return total
-
-
-def sides_at(surface: Surface, edges: Ints) -> tuple[Ints, Ints, Ints]:
-    """The sides of triangles at edges (k,): which of these, the triangle, and its corners, (s,) and (s,3).
-
-    The corner opposite the side comes first.
-    """
-    row = np.full(len(surface.topology.edges), -1)
-    row[edges] = np.arange(len(edges))
-    at = row[surface.topology.edge_of_face]
-    face, corner = np.nonzero(at >= 0)
-    corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
-    return at[face, corner], face, corners
 
 
 def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
@@ -71,10 +41,11 @@ def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
 
 
-def patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Floats) -> pd.DataFrame:
-    """A row per patch; see ``Certificate.patches``. ``quality`` (m,) is that of the standing triangles."""
+def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
+    """A row per patch; see ``Certificate.patches``."""
     errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
     curvature, target = mean_curvature(standing, "variational"), target_curvature(standing)
+    areas, quality = patch_areas(surface), triangle_quality(standing.vertices, standing.faces)
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
@@ -100,23 +71,70 @@ def patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Flo
 
 
 def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
-    """One row per junction curve: where it is, the forces left per length, Σ α n of its triangles."""
+    """A row per junction curve: where it is, the forces left (n,3) per length, Σ α n of its triangles."""
     rows = []
     for curve in surface.topology.junctions:
-        lengths = segment_lengths(surface.vertices, curve.pairs)
-        sums = np.linalg.norm(conormal_sum(surface, surface.topology.edge_numbers(curve.pairs)), axis=1)
-        total, mean = float(lengths.sum()), float(lengths.mean()) or 1.0
+        lengths, sums, along = _along_curve(surface, curve, left[curve.vertices])
+        mean = float(sums @ lengths) / (along["length"] or 1.0)
+        names = names_of(surface, curve.sheets)
         rows.append(
-            {
-                "junction": names_of(surface, curve.sheets),
-                "length": total,
-                **middle(surface, curve),
-                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / mean,
-                "sum_alpha_n_mean": float(sums @ lengths) / total if total else 0.0,
-                "sum_alpha_n_max": float(sums.max()),
-            }
+            {"junction": names, **along, "sum_alpha_n_mean": mean, "sum_alpha_n_max": float(sums.max())}
         )
     return pd.DataFrame(rows)
+
+
+def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
+    """A row per cable, or per part of it between supports, branches and ends.
+
+    At rest a cable of tension τ and curvature vector κ balances the sheets along it: Σ α n + τ κ = 0 with
+    their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in
+    the mean over a cable's edges up to what the mesh leaves.
+
+    Columns: ``cable``, ``tension`` (its force, the largest where a weight g lets it vary) and ``length``; the
+    middle of the part; ``sheet_pull``, the mean of |Σ α n|, with the weight across the cable, and
+    ``cable_pull``, that of (τ + g z) |κ|, force/length; ``force_left`` per length in the motion space, of
+    ``left`` (n,3).
+    """
+    rows = []
+    for cable, curve in cable_parts(surface):
+        t, closed = directions(surface.vertices, curve.pairs)[0], curve.closed
+        inner = curve.vertices if closed else curve.vertices[1:-1]
+        load = -cable.weight * np.array(surface.plane.normal)
+        lengths, sums, along = _along_curve(surface, curve, left[inner], load - (t @ load)[:, None] * t)
+        turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if closed else np.diff(t, axis=0), axis=1)
+        weight = 0.5 * (lengths + np.roll(lengths, 1)) if closed else 0.5 * (lengths[1:] + lengths[:-1])
+        pulls = {
+            "sheet_pull": float(sums @ lengths) / (along["length"] or 1.0),
+            "cable_pull": float(pull_along(surface, cable, inner) @ turns) / (float(weight.sum()) or 1.0),
+            "force_left": along.pop("force_left"),
+        }
+        tension = float(pull_along(surface, cable, curve.vertices).max())
+        rows.append({"cable": cable.name, "tension": tension, **along, **pulls})
+    return pd.DataFrame(rows)
+
+
+def _along_curve(
+    surface: Surface, curve: EdgeCurve, left: Floats, load: Floats | float = 0.0
+) -> tuple[Floats, Floats, dict[str, float]]:
+    """Lengths, |Σ α n + load| (k,) of a curve's edges; its length, middle, largest force left per length."""
+    lengths = segment_lengths(surface.vertices, curve.pairs)
+    sums = np.linalg.norm(sheet_pulls(surface, curve.pairs) + load, axis=1)
+    most = float(np.linalg.norm(left, axis=1).max(initial=0.0)) / (float(lengths.mean()) or 1.0)
+    return lengths, sums, {"length": float(lengths.sum()), **middle(surface, curve), "force_left": most}
+
+
+def cable_end_table(surface: Surface, ends: Iterable[CableEnd]) -> pd.DataFrame:
+    """A row per end of each part of a cable: where it is, whether a support holds it, and the force.
+
+    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -(τ + g z) t, t the
+    direction from the end along the cable. Where several cables end, their support carries the sum.
+    """
+    rows = [
+        [cable.name, vertex, *surface.vertices[vertex].tolist(), bool(surface.held[vertex]), *force.tolist()]
+        for cable, vertex, force in ends
+    ]
+    columns = ["cable", "vertex", *"xyz", "held", "force_x", "force_y", "force_z"]
+    return pd.DataFrame(rows, columns=columns if rows else None)
 
 
 def room_table(surface: Surface) -> pd.DataFrame:

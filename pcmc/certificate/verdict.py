@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -10,26 +10,24 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.tolerances import COLLAPSED, NEAR_NEUTRAL, NEUTRAL, NOISE, WEAK
+from ..forces.cables import compressed_cables
 from ..forces.triangles import compressed, effective_tensions
-from ..stability.modes import NEAR, NEUTRAL, Spectrum
+from ..stability.modes import Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
-from .diagnosis import describe_saddle, held_wall_down, where_collapsed
-from .neck import Neck, pinched_neck
+from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
-NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 NO_TENSION = "no patch has a tension: every shape is at rest"
-COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
 
 
 class Verdict(Enum):
     """What kind of equilibrium a surface is, or why it is none. The value is a sentence."""
 
-    STABLE = "stable: at rest, and every small change of shape raises the energy"
+    STABLE = "stable: at rest, and every small change of shape of this mesh raises the energy"
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
@@ -67,6 +65,8 @@ class Findings:
     tried: tuple[Attempt, ...] = ()  # by a search
     mode: Floats = field(default_factory=lambda: np.empty((0, 3)))  # (n,3) the lowest; empty if unknown
     rigid: int = 0  # number of rigid motions that nothing resists, where rooms prescribe volumes
+    pulled: tuple[int, ...] = ()  # pinched vertices at which the sheets pull harder than the wall can hold
+    left_over: str = ""  # where pressures do not cancel at free edges, as a sentence
 
     @property
     def moving(self) -> bool:
@@ -132,10 +132,23 @@ def only_coarse(surface: Surface, pinchable: Bools) -> str:
 
 
 def judge(findings: Findings) -> tuple[Verdict, str]:
-    """The verdict on the findings and its reason, by the first of ``RULES`` that applies."""
+    """The verdict on the findings and its reason, by the first of ``RULES`` that applies; with notes."""
     verdict, reason = next((verdict, reason) for verdict, applies, reason in RULES if applies(findings))
     parts = reason(findings)
-    return verdict, parts if isinstance(parts, str) else "; ".join(str(part) for part in parts if part)
+    parts = [parts] if isinstance(parts, str) else parts
+    return verdict, "; ".join(str(part) for part in (*parts, *_notes(findings)) if part)
+
+
+def _notes(f: Findings) -> Iterator[str]:
+    """What is to be known whatever the verdict is."""
+    if not f.moving and f.quality > COLLAPSED and f.surface.tensions.any():
+        yield only_coarse(f.surface, f.pinchable)
+    if len(f.pulled):
+        yield (
+            f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than the"
+            " wall can hold: the wall will stand there once solved"
+        )
+    yield f.left_over
 
 
 def _disproved(f: Findings) -> list[object]:
@@ -199,11 +212,17 @@ def _hidden_stability(f: Findings) -> list[object]:
 
 
 def _compressed(f: Findings) -> str:
-    """Names a patch whose weight leaves no tension somewhere; or empty, as where it grew without bound."""
+    """Names a patch or cable whose weight leaves no tension; or empty, as where it grew without bound."""
     surface = f.surface
-    faces = np.flatnonzero(compressed(surface))
-    if not len(faces) or f.evidence is Evidence.INFLATED:
+    faces, edges = np.flatnonzero(compressed(surface)), np.flatnonzero(compressed_cables(surface))
+    if not len(faces) + len(edges) or f.evidence is Evidence.INFLATED:
         return ""
+    if not len(faces):
+        place = surface.vertices[surface.cable_edges.ends[edges[0]]].mean(axis=0).round(4).tolist()
+        return (
+            f"a cable is under compression in {len(edges)} edges, the first at {place}: its weight leaves"
+            " τ + g z ≤ 0; raise its tension, or put Π lower"
+        )
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
     worst = faces[pull.argmin()]
     name = surface.patches[surface.patch_of_face[worst]].name
@@ -221,7 +240,7 @@ def _saddle(f: Findings) -> list[object]:
 
 def _near_fold(f: Findings) -> str:
     """Names what nearly lets go, so that the certificate of a fold says where it is; else empty."""
-    count, band = (f.spectrum.soft, NEUTRAL) if f.spectrum.soft else (f.spectrum.near, NEAR)
+    count, band = (f.spectrum.soft, NEUTRAL) if f.spectrum.soft else (f.spectrum.near, NEAR_NEUTRAL)
     if not count:
         return ""
     index = f.spectrum.index
@@ -246,8 +265,9 @@ RULES: tuple[Rule, ...] = (
     (Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
     (Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
     (Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
-    (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > SMALL * f.tolerance, _weak_patch),
+    (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > WEAK * f.tolerance, _weak_patch),
     (Verdict.SADDLE, lambda f: compressed(f.surface).any(), _compressed),
+    (Verdict.SADDLE, lambda f: compressed_cables(f.surface).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
     (Verdict.NEUTRAL, lambda f: f.rigid > 0, _free_motions),

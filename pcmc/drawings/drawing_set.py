@@ -50,11 +50,9 @@ class DrawingSet:
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
         jobs: list[tuple[Path, Callable[[Path], None]]] = []
-        document: Any = None
-        for path in map(Path, paths):
-            suffix = check_suffix(path)
-            if document is None:
-                document = dxf.document(self)
+        wanted = [(path, check_suffix(path)) for path in map(Path, paths)]
+        document: Any = dxf.document(self) if wanted else None
+        for path, suffix in wanted:
             if suffix == ".dxf":
                 jobs.append((path, document.saveas))
             elif suffix == ".pdf":
@@ -69,11 +67,7 @@ class DrawingSet:
     def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
         """Write .dxf, .pdf (a page per sheet) and .svg (a file NAME-1.svg and so on per sheet).
 
-        All files appear together, or none.
-
-        Raises
-        ------
-        FileError : for another suffix, or a file that cannot be written.
+        All files appear together, or none. FileError for another suffix, or a file that cannot be written.
         """
         jobs = self.files(*paths)
         with atomic_writes([path for path, _ in jobs]) as temporaries:
@@ -111,16 +105,14 @@ def drawing_set(
     sheet : format of the sheets, "A4" to "A0".
     scale : of plan, elevations and sections, 1 to this; by default the largest usual one that fits.
     heights : z of horizontal sections; by default at a quarter, half and three quarters of the height.
-    lines : pairs of points (x, y) in the plan, for vertical sections; by default through the middle of
-        the plan, along x and along y.
+    lines : pairs of points (x, y), for vertical sections; by default through the middle, along x and y.
     tolerance : of the panels' families; None for no schedule.
-    panel_sheets : whether to draw every panel at true size, on sheets and flat in the .dxf's model space;
-        needs a tolerance. What is larger than a sheet is in model space alone.
+    panel_sheets : draw every panel at true size, on sheets and flat in the .dxf's model space, where those
+        larger than a sheet are alone; needs a tolerance.
     mirror_images : as in ``pcmc.panels``.
     name : of the roof, in the title strips.
     anyway : draw a surface that is not certified; every sheet is marked.
-    certificate, schedule : of the surface, where they are known; by default they are computed, the schedule
-        with ``tolerance``.
+    certificate, schedule : of the surface, where they are known; otherwise computed.
 
     Raises
     ------
@@ -128,8 +120,6 @@ def drawing_set(
     OptionError : for units that are missing; a section that misses the roof; a view that does not fit the
         sheet, with the smallest format that holds it.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
@@ -148,14 +138,13 @@ def drawing_set(
     if scale is not None:
         validate.integer("scale", scale, least=1)
     validate.flag("panel_sheets", panel_sheets)
-    if schedule is not None and (
-        schedule.surface is not surface or tolerance not in (None, schedule.tolerance)
-    ):
+    if schedule is None:
+        if panel_sheets and tolerance is None:
+            text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
+            raise OptionError(text, what="tolerance", expected="a length")
+    elif schedule.surface is not surface or tolerance not in (None, schedule.tolerance):
         text = "schedule: belongs to another surface or tolerance; pass panels(surface, tolerance)"
         raise OptionError(text, what="schedule", found=schedule.tolerance, expected=tolerance)
-    if panel_sheets and tolerance is None and schedule is None:
-        text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
-        raise OptionError(text, what="tolerance", expected="a length")
     certificate = certified(surface, anyway, certificate)
     if tolerance is not None and schedule is None:
         options: dict[str, Any] = {"anyway": anyway, "certificate": certificate}
@@ -165,12 +154,11 @@ def drawing_set(
     at_points = certificate.supports[certificate.supports["kind"] == "point"]
     marks = list(zip(at_points["support"], at_points[[*"xyz"]].to_numpy(), strict=True))
     named = [(at, name, "PCMC-SUPPORT") for name, at in marks]
-    named += [
-        (np.array(at), name, "PCMC-POINT") for name, *at in points[["point", *"xyz"]].to_numpy().tolist()
-    ]
+    setting_out = zip(points["point"], points[[*"xyz"]].to_numpy(), strict=True)
+    named += [(at, name, "PCMC-POINT") for name, at in setting_out]
     levels, profiles = _levels(surface, heights), _profiles(surface, lines)
-    drawn: dict[str, list[views.View]] = {
-        "Plan": [views.plan(surface, curves, named)],
+    drawn: dict[str, list[views.DrawnView]] = {
+        "Plan": [views.plan_view(surface, curves, named)],
         "Elevations": views.elevations(surface, curves),
         "Sections at heights": [views.contours(surface, curves, levels)] if levels else [],
         "Sections along lines": [view for view, _ in profiles],
@@ -206,16 +194,14 @@ def check_suffix(path: Path) -> str:
 
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
-    order: dict[int, tuple[Floats, str]] = {}
+    rows: dict[int, list[Any]] = {}
     open_ended = [c for c in curves if not (c.closed or c.layer == "PCMC-CABLE")]
     ends = [(c, k) for c in open_ended for k in (0, -1)]
     along = [(c, k) for c in curves for k in range(len(c.vertices))]
-    for curve, k in [*ends, *along]:
-        order.setdefault(curve.vertices[k], (curve.points[k], curve.layer.removeprefix("PCMC-").lower()))
-    at = np.array([point for point, _ in order.values()]).reshape(-1, 3)
-    names = [f"P{k + 1}" for k in range(len(order))]
-    where = [on for _, on in order.values()]
-    return pd.DataFrame({"point": names, "x": at[:, 0], "y": at[:, 1], "z": at[:, 2], "on": where})
+    for c, k in [*ends, *along]:
+        on = c.layer.removeprefix("PCMC-").lower()
+        rows.setdefault(c.vertices[k], [f"P{len(rows) + 1}", *c.points[k].tolist(), on])
+    return pd.DataFrame(rows.values(), columns=["point", *"xyz", "on"])
 
 
 def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[SheetLine]]]:
@@ -223,7 +209,7 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
     low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
     given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
     chosen = [validate.number("heights", height) for height in given]
-    cuts = [(h, views.cut(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
+    cuts = [(h, views.cut_lines(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
     for h, found in cuts:
         if not found and heights is not None:
             text = f"heights: z = {h:g} misses the roof, which lies between {low:g} and {high:g}"
@@ -231,7 +217,9 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
     return [cut for cut in cuts if cut[1]]
 
 
-def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[SheetLine]]]:
+def _profiles(
+    surface: Surface, lines: Sequence[Ends] | None
+) -> list[tuple[views.DrawnView, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
     if lines is None:
         low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
@@ -245,7 +233,7 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
         if not (np.isfinite(ends).all() and length > 0.0):
             validate.refuse("lines", line, "two different points (x, y)")
         along /= length
-        found = views.cut(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
+        found = views.cut_lines(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
         if not found:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.libraries import load_library
 from ..base.units import TABLE, length_factor
-from ..io.libraries import load_library
 from .sheet import LAYERS, SMALL, Sheet
 
 VERSION = "R2018"
@@ -22,9 +22,9 @@ DIMENSION |= {"dimexe": 1.0, "dimtix": 1, "dimtoh": 0, "dimtih": 0, "dimdsep": o
 def document(drawings: Any) -> Any:
     """The model of a ``DrawingSet``, in its unit, and a layout per sheet, in mm, with its title as name.
 
-    The model has ridges, rims, wall lines, cables and sections as polylines, each a whole curve with the
-    name of its patches or its cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports
-    of one point, each on the layer of its kind; beside the roof the panels flat at true size.
+    The model has ridges, rims, wall lines, cables and sections as polylines with the names of their patches
+    or cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports of one point; beside the
+    roof the panels flat at true size.
     """
     doc = load_library("ezdxf", "cad").new(VERSION)
     units = drawings.units
@@ -72,7 +72,7 @@ def _add_model(space: Any, model: Any) -> None:
         entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs=look)
         entity.set_xdata("PCMC", [(1000, line.name[:250])])
     height = MODEL_TEXT * surface.size
-    rows = model.points[["point", "x", "y", "z"]].to_numpy().tolist()
+    rows = model.points[["point", *"xyz"]].to_numpy().tolist()
     labels = [(name, at, "PCMC-POINT") for name, *at in rows]
     labels += [(name, at.tolist(), "PCMC-SUPPORT") for name, at in model.marks]
     for name, at, layer in labels:
@@ -100,16 +100,10 @@ def _add_sheet(space: Any, sheet: Sheet, scale: float = 1.0, shift: Floats | flo
         plain = text.text.replace("%%", 2 * "%%%").replace("^", "^ ")  # else %%c is ⌀, and ^J a line break
         entity = space.add_text(plain, height=scale * text.height, dxfattribs=look)
         entity.set_placement((scale * np.array(text.at) + shift).tolist(), align=TextEntityAlignment[align])
-    for dimension in sheet.dimensions:  # they measure in the unit of the roof
-        space.add_linear_dim(
-            base=[dimension.at, dimension.at],
-            p1=dimension.start.tolist(),
-            p2=dimension.end.tolist(),
-            angle=90.0 * dimension.axis,
-            dimstyle="PCMC",
-            override={"dimlfac": dimension.unit, "dimdec": dimension.decimals},
-            dxfattribs={"layer": "PCMC-DIM"},
-        ).render()
+    for start, end, axis, at, unit, decimals in sheet.dimensions:  # they measure in the unit of the roof
+        style = {"dimstyle": "PCMC", "override": {"dimlfac": unit, "dimdec": decimals}}
+        look = {"angle": 90.0 * axis, "dxfattribs": {"layer": "PCMC-DIM"}}
+        space.add_linear_dim([at, at], start.tolist(), end.tolist(), **style, **look).render()
 
 
 def write_svg(doc: Any, number: int, path: Path) -> None:
@@ -120,8 +114,7 @@ def write_svg(doc: Any, number: int, path: Path) -> None:
     backend, sheet = svg.SVGBackend(), doc.layouts.get(doc.layouts.names_in_taborder()[number + 1])
     look = Configuration(background_policy=BackgroundPolicy.WHITE, color_policy=ColorPolicy.COLOR)
     Frontend(RenderContext(doc), backend, config=look).draw_layout(sheet)
-    page = layout.Page(
-        sheet.dxf.paper_width, sheet.dxf.paper_height, layout.Units.mm, layout.Margins.all(0.0)
-    )
+    size, none = (sheet.dxf.paper_width, sheet.dxf.paper_height), layout.Margins.all(0.0)
+    page = layout.Page(*size, layout.Units.mm, none)
     text = backend.get_string(page, settings=layout.Settings(scale=1.0, fit_page=False))
     path.write_text(text, encoding="utf-8")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..io.libraries import require
+from ..base.libraries import require
 from .sheet import LAYERS, Sheet, SheetLine, Text
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
@@ -15,11 +15,9 @@ COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 
 
 
 def register_fonts() -> None:
-    """Make matplotlib's letters known to reportlab: they have Greek, Cyrillic and the signs of units.
+    """Make matplotlib's letters, which have Greek, Cyrillic and the signs of units, known to reportlab.
 
-    Raises
-    ------
-    MissingExtra : reportlab or matplotlib is not installed.
+    MissingExtra if one of the two is not installed.
     """
     require("reportlab", extra="report")
     require("matplotlib", extra="plot")
@@ -41,12 +39,12 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
     canvas = Canvas(str(path), invariant=1)
     for sheet in sheets:
         canvas.setPageSize([side * mm for side in sheet.size])
-        paint(canvas, *sheet.drawn())
+        paint_sheet(canvas, *sheet.drawn())
         canvas.showPage()
     canvas.save()
 
 
-def paint(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
+def paint_sheet(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
     """Draw on a canvas of reportlab, from its origin; ``boxed`` texts hide what is behind them."""
     from reportlab.lib.colors import HexColor
     from reportlab.lib.units import mm

@@ -101,9 +101,8 @@ class Dimension(NamedTuple):
         away = np.sign(feet - ends)
         lines = [feet, *np.stack([ends + away, feet + away], axis=1), *(feet[:, None] + TICK)]
         beside[other] = SMALL if self.axis == 0 else -SMALL
-        text = Text(
-            feet.mean(axis=0) + 0.8 * beside, self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis
-        )
+        place, turn = feet.mean(axis=0) + 0.8 * beside, 90.0 * self.axis
+        text = Text(place, self.text, layer="PCMC-DIM", align="C", turn=turn)
         return [SheetLine(line, "PCMC-DIM") for line in lines], text
 
 
@@ -137,8 +136,7 @@ def place_labels(
 ) -> list[Text]:
     """Labels at or beside their places, so that none covers another text.
 
-    One without room within ``rings`` steps of its height stays at its place if it is needed, else it is left
-    out.
+    One without room within ``rings`` steps of its height stays if it is ``needed``, else it is left out.
     """
     steps = np.indices((2 * rings + 1, 2 * rings + 1)).reshape(2, -1).T - rings
     steps = steps[np.hypot(*steps.T).argsort(kind="stable")]
@@ -167,9 +165,7 @@ def box(text: Text) -> Floats:
     wide = width(text.text, text.height)
     left = {"L": 0.0, "C": 0.5, "R": 1.0}[text.align] * wide
     corners = np.array([[-left - 0.3, -0.7 * text.height], [wide - left + 0.3, 0.7 * text.height]])
-    if text.turn == 90.0:
-        corners = np.array([[corners[0, 1], corners[0, 0]], [corners[1, 1], corners[1, 0]]])
-    return np.asarray(text.at) + corners
+    return np.asarray(text.at) + (corners[:, ::-1] if text.turn == 90.0 else corners)
 
 
 def drawing_area(name: str) -> tuple[float, float]:

@@ -42,7 +42,7 @@ ELEVATIONS = {  # to the right, and towards the viewer
 
 
 @dataclass
-class View:
+class DrawnView:
     """What is drawn on two axes, in the surface's unit."""
 
     title: str
@@ -75,7 +75,7 @@ def model_curves(surface: Surface) -> list[SheetLine]:
     ]
 
 
-def outline(curves: Sequence[SheetLine], axis: Sequence[float]) -> Floats:
+def outline_places(curves: Sequence[SheetLine], axis: Sequence[float]) -> Floats:
     """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
     places = []
     for curve in curves:
@@ -91,27 +91,25 @@ def outline(curves: Sequence[SheetLine], axis: Sequence[float]) -> Floats:
     return np.concatenate(places) if places else np.empty(0)
 
 
-def cut(surface: Surface, point: Floats, normal: Floats) -> list[SheetLine]:
+def cut_lines(surface: Surface, point: Floats, normal: Floats) -> list[SheetLine]:
     """The lines in which a plane cuts the roof and its walls."""
+    layers = ["PCMC-SECTION" if roof else "PCMC-SECTION-WALL" for roof in surface.roof]
     return [
-        SheetLine(
-            one.points,
-            "PCMC-SECTION" if surface.roof[one.patch] else "PCMC-SECTION-WALL",
-            one.closed,
-            surface.patches[one.patch].name,
-        )
+        SheetLine(one.points, layers[one.patch], one.closed, surface.patches[one.patch].name)
         for one in section(surface, point, normal)
     ]
 
 
-def _seen(title: str, surface: Surface, curves: Sequence[SheetLine], axes: Floats, faces: Bools) -> View:
+def _seen(title: str, surface: Surface, curves: Sequence[SheetLine], axes: Floats, faces: Bools) -> DrawnView:
     """The edges of faces and the curves on two axes (2,3)."""
     edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[faces])]
     lines = [SheetLine(pair, "PCMC-PANEL") for pair in surface.vertices[edges] @ axes.T]
-    return View(title, lines + [curve._replace(points=curve.points @ axes.T) for curve in curves])
+    return DrawnView(title, lines + [curve._replace(points=curve.points @ axes.T) for curve in curves])
 
 
-def plan(surface: Surface, curves: Sequence[SheetLine], points: Sequence[tuple[Floats, str, str]]) -> View:
+def plan_view(
+    surface: Surface, curves: Sequence[SheetLine], points: Sequence[tuple[Floats, str, str]]
+) -> DrawnView:
     """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
@@ -121,18 +119,18 @@ def plan(surface: Surface, curves: Sequence[SheetLine], points: Sequence[tuple[F
             at = curve.points[len(curve.points) // 2, :2]
             away = at - middle
             view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
-    view.stations = outline(curves, (1.0, 0.0, 0.0)), outline(curves, (0.0, 1.0, 0.0))
+    view.stations = outline_places(curves, (1.0, 0.0, 0.0)), outline_places(curves, (0.0, 1.0, 0.0))
     return view
 
 
-def elevations(surface: Surface, curves: Sequence[SheetLine]) -> list[View]:
+def elevations(surface: Surface, curves: Sequence[SheetLine]) -> list[DrawnView]:
     """From four sides: curves, the edges of the panels that face the viewer, and levels."""
     height, normal = surface.vertices[:, 2], area_vectors(surface.vertices[surface.faces])
     views = []
     for title, (right, towards) in ELEVATIONS.items():
         axes = np.array([[*right, 0.0], [0.0, 0.0, 1.0]])
         facing = surface.roof[surface.patch_of_face] & (normal[:, :2] @ np.array(towards) > 0.0)
-        along, heights = (np.sort(outline(curves, axis)) for axis in axes)
+        along, heights = (np.sort(outline_places(curves, axis)) for axis in axes)
         views.append(_seen(title, surface, curves, axes, facing))
         views[-1].stations = along[[0, -1]] if len(along) else along, np.empty(0)
         views[-1].levels = np.append(heights, [height.min(), height.max()])
@@ -141,9 +139,9 @@ def elevations(surface: Surface, curves: Sequence[SheetLine]) -> list[View]:
 
 def contours(
     surface: Surface, curves: Sequence[SheetLine], cuts: Sequence[tuple[float, list[SheetLine]]]
-) -> View:
+) -> DrawnView:
     """Sections at heights, seen from above, each with its height."""
-    view = plan(surface, curves, ())
+    view = plan_view(surface, curves, ())
     view.title = "sections at heights"
     view.lines = [line for line in view.lines if line.layer != "PCMC-PANEL"]
     for height, lines in cuts:
@@ -153,12 +151,12 @@ def contours(
     return view
 
 
-def profile(name: str, start: Floats, along: Floats, lines: Sequence[SheetLine]) -> View:
+def profile(name: str, start: Floats, along: Floats, lines: Sequence[SheetLine]) -> DrawnView:
     """A section along a line in the plan: distance from the line's first point, and height.
 
     Its stations and levels are the ends of its lines, where the roof ends or meets a wall, and its top.
     """
-    view, ends = View(name), [np.empty((0, 2))]
+    view, ends = DrawnView(name), [np.empty((0, 2))]
     for one in lines:
         flat = np.stack([(one.points[:, :2] - start) @ along, one.points[:, 2]], axis=1)
         view.lines.append(one._replace(points=flat))
@@ -169,13 +167,16 @@ def profile(name: str, start: Floats, along: Floats, lines: Sequence[SheetLine])
 
 
 def placed(
-    views: Sequence[View], title: str, name: str, millimetres: float, scale: int | None, decimals: int = 3
+    views: Sequence[DrawnView],
+    title: str,
+    name: str,
+    millimetres: float,
+    scale: int | None,
+    decimals: int = 3,
 ) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 
-    Raises
-    ------
-    OptionError : they do not fit at the scale given; the message names the smallest format that holds them.
+    OptionError if they do not fit at the scale given, with the smallest format that holds them.
     """
     boxes = [view.box for view in views]
     extent = np.max([high - low for low, high in boxes], axis=0)
@@ -212,7 +213,7 @@ def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -
     raise OptionError(text, what="scale", found=scale, expected=better)
 
 
-def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
+def _add(sheet: Sheet, view: DrawnView, factor: float, shift: Floats) -> None:
     """Lines, marked points, and the names that find room: those of supports and cables first."""
     sheet.lines += [
         SheetLine(factor * line.points + shift, line.layer, line.closed)
@@ -227,12 +228,10 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     for at, name, layer in view.points:
         place = factor * at + shift
         half, height = (0.8, TINY) if layer == "PCMC-POINT" else (1.5, SMALL)
-        sheet.lines += [
-            SheetLine(place + half * np.array([[-1.0, s], [1.0, -s]]), layer) for s in (-1.0, 1.0)
-        ]
+        square = place + half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        sheet.lines += [SheetLine(square[::2], layer), SheetLine(square[[3, 1]], layer)]
         if layer != "PCMC-POINT":
-            square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-            sheet.lines.append(SheetLine(place + half * square, layer, True))
+            sheet.lines.append(SheetLine(square, layer, True))
             marks.append(Text(place, "##", align="C"))  # kept free of names
         beside = place + np.array([half + 0.3, half + 0.6 * height])
         (small if layer == "PCMC-POINT" else large).append(Text(beside, name, height, layer))
@@ -240,7 +239,7 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     sheet.texts += place_labels(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
 
 
-def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, decimals: int) -> None:
+def _add_dimensions(sheet: Sheet, view: DrawnView, factor: float, shift: Floats, decimals: int) -> None:
     """Distances between stations, and over all, below and left of a view; levels at its right."""
     low, high = (factor * end + shift for end in view.box)
     for axis, stations in enumerate(view.stations):

@@ -30,8 +30,7 @@ def serve(
 ) -> None:
     """Explore a surface in the browser; returns when Ctrl-C is pressed.
 
-    Every page, in any number of browsers, has its own session. The surface is solved first, unless it is
-    at rest already.
+    Every page has its own session. The surface is solved first, unless it is at rest already.
 
     Parameters
     ----------
@@ -91,9 +90,8 @@ def start_roof(
 def show(surface: Surface, height: int = 680, title: str = "", units: Units | str = NO_UNITS) -> View:
     """The page as the output of a cell in JupyterLab.
 
-    The View returned has ``.surface``, the surface with the tensions and pressures now chosen, for the
-    next cell. The browser must run on the machine of the notebook's kernel. ``height`` is in pixels; the rest
-    as for ``serve``.
+    The View returned has ``.surface``, with the tensions and pressures now chosen, for the next cell. The
+    browser must run on the kernel's machine. ``height`` is in pixels; the rest as for ``serve``.
     """
     from .roof import ShownRoof
     from .server import View

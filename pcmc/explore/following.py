@@ -37,7 +37,7 @@ def until(stop: Stop, end: float) -> Stop:
     return lambda: stop() or time.monotonic() > end
 
 
-def attempt(surface: Surface, stop: Stop, **options: Any) -> Result:
+def solve_until(surface: Surface, stop: Stop, **options: Any) -> Result:
     """Solve, and end early when ``stop`` becomes true."""
 
     def check(_: Progress) -> None:
@@ -63,7 +63,7 @@ def reach(start: Surface, asked: Surface, stop: Stop, attempts: int = 100, **opt
     for _ in range(attempts):
         ahead = min(1.0, done + step)
         aim = between(start, asked, ahead).moved(_with_points(here, start, asked, ahead))
-        result = attempt(aim, stop, target="stationary", **options)
+        result = solve_until(aim, stop, target="stationary", **options)
         ended = result.certify(modes=0)
         if ended.verdict in AT_REST:
             here, certificate, done, step = result.surface, ended, ahead, 2.0 * step
@@ -136,9 +136,8 @@ class ProjectFallback:
     ) -> tuple[Reached, str, ProjectFallback]:
         """Follow to ``asked``; else with the project's walls, in small steps, and from its start shape.
 
-        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, empty where
-        following led to the values, else what did, or why the project does not; and the fallback for the next
-        time.
+        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, unless
+        following led there: what did, or why the project does not; and the fallback for the next time.
         """
         late = until(stop, end)
         way = reach(here, asked, late, attempts=FIRST_ATTEMPTS if self.data else 100, **options)

@@ -21,7 +21,7 @@ from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
 from ..base.errors import MissingExtra, OptionError, PcmcError
-from .protocol import RequestError
+from .protocol import REQUESTS, RequestError
 
 REQUEST_SECONDS = 30.0  # to send a request, from its first byte or the last answer; and to take an answer
 WAITING = 128  # connections that the system keeps until they are accepted
@@ -133,7 +133,7 @@ class PageHandler(BaseHTTPRequestHandler):
         return content
 
     def _check_sender(self) -> None:
-        """Refuse requests from pages of other sites, under other names of this machine, and without token."""
+        """Refuse requests from other sites' pages, under other names of this machine, and without token."""
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
         explorer = self.server.explorer
         try:
@@ -175,10 +175,8 @@ class PageHandler(BaseHTTPRequestHandler):
         if not isinstance(asked, dict):
             raise RequestError("expected a JSON object")
         match urlsplit(self.path).path.strip("/").split("/"):
-            case ["api", "open"]:
-                body = self.server.explorer.answer("", "open", asked, self._gone)
-            case ["api", session, act] if act in self.server.explorer.acts:
-                body = self.server.explorer.answer(session, act, asked, self._gone)
+            case ["api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
+                body = self.server.explorer.answer("".join(session), act, asked, self._gone)
             case _:
                 raise RequestError(f"there is nothing at {self.path:.60}", HTTPStatus.NOT_FOUND)
         self._send(body, BYTES)

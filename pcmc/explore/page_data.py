@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 from zlib import crc32
 
@@ -14,17 +13,16 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
+from ..certificate.forces import Forces
 from ..certificate.quantities import dimension_of
-from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
-from ..design.quantities import MEASURES
-from ..design.targets import NAMED
+from ..design.targets import MEASURES, NAMED
 from ..forces.curvature import curvature_error, mean_curvature
 from ..margins.varied import named
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import values_of
-from ..surface import Patch, Surface
+from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
 from .session import SessionState, figures_data
@@ -35,9 +33,8 @@ Arrays = dict[str, npt.NDArray[Any]]
 def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
     """Everything that stays the same while the surface moves.
 
-    A vertex where sheets meet is drawn once for each sheet, so that colours and shading break there:
-    ``sheet_faces`` (m,3) index these corners; ``sheet_vertex`` and ``sheet_patch`` are their vertex
-    and patch. A surface that ends at mirror planes is drawn whole.
+    A vertex is drawn once for each sheet that meets there, so that colours break: ``sheet_faces`` (m,3) index
+    these corners, ``sheet_vertex`` and ``sheet_patch`` are their vertex and patch.
     """
     piece, surface = surface, drawn(surface)
     walls, colours = surface.walls.tolist(), patch_colors(surface).tolist()
@@ -123,8 +120,6 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
     names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
     return {
         "mesh": crc32(surface.faces.tobytes() + origin.tobytes() + names.encode()),  # that ``outline`` has
-        "asked": _patches(state.wanted.patches),
-        "shown": _patches(surface.patches),
         "values": {"asked": values_of(state.wanted), "shown": values_of(surface)},
         "verdict": _verdict(state.failure or certificate),
         "at_rest": state.failure is None,
@@ -136,27 +131,16 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
         "met": state.met,
         "number": state.number,
         "way": state.note,
-        "variants": [
-            {"name": one.name, "word": _verdict(one.certificate)["word"], "figures": one.figures}
-            for one in state.variants
-        ],
+        "variants": [{**v.data, "word": _verdict(v.certificate)["word"]} for v in state.variants],
         "compared": state.compared,
     }
 
 
-def _patches(patches: Iterable[Patch]) -> list[dict[str, Any]]:
-    """The tensions and pressures of patches, for the card."""
-    return [
-        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
-        for p in patches
-    ]
-
-
-def _verdict(certificate: Certificate) -> dict[str, str]:
+def _verdict(finding: Certificate | MeshCheck, advice: str = "") -> dict[str, str]:
     """The verdict as a code, ``name``, and in words."""
-    word, _, rest = certificate.verdict.value.partition(": ")
-    name = certificate.verdict.name.lower()
-    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}
+    word, _, rest = finding.verdict.value.partition(": ")
+    detail = "; ".join(filter(None, (finding.detail, advice)))
+    return {"name": finding.verdict.name.lower(), "word": word, "sentence": rest, "detail": detail}
 
 
 def _findings(certificate: Certificate, moving: bool) -> dict[str, Any]:
@@ -175,7 +159,7 @@ def fields(state: SessionState, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     shown = surface if whole is None else whole.surface
-    acting = certificate.acting if whole is None else support_forces(shown)
+    acting = certificate.acting if whole is None else Forces.of(shown)
     arrays: Arrays = {
         "vertices": shown.vertices - origin,
         "curvature": mean_curvature(shown, "variational"),
@@ -198,12 +182,10 @@ def families_drawn(state: SessionState) -> Floats:
 
 def target_choices(surface: Surface) -> list[dict[str, Any]]:
     """The quantities that targets may have on a surface: the names of what each may be of, and "" for all."""
-    names: dict[str, list[str]] = {
-        "patch": [p.name for p, kept in zip(surface.patches, surface.roof, strict=True) if kept],
-        "wall": [p.name for p, kept in zip(surface.patches, surface.roof, strict=True) if not kept],
-        "cable": [cable.name for cable in surface.cables],
-        "room": [room.name for room in surface.rooms],
-    }
+    names: dict[str, list[str]] = {"patch": [], "wall": []}
+    for patch, kept in zip(surface.patches, surface.roof.tolist(), strict=True):
+        names["patch" if kept else "wall"].append(patch.name)
+    names |= {"cable": [c.name for c in surface.cables], "room": [room.name for room in surface.rooms]}
     varied: dict[Any, str] = {}  # of margins, each once
     for what, parts in named(surface).items():
         varied.setdefault(parts, what)
@@ -227,16 +209,11 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
 
 def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:
     """The verdict of the mesh check, and its table in words."""
-    word, _, sentence = check.verdict.value.partition(": ")
     rows = []
     for row in check.table.to_dict(orient="records"):
         unit = units.behind(dimension_of(row["quantity"]))
-        values = {
-            "value": with_bar(row["value"], row["error"], unit),
-            "limit": with_bar(row["limit"], row["limit_error"], unit),
-        }
+        bars = {"value": "error", "limit": "limit_error"}
+        texts = {key: with_bar(row[key], row[bar], unit) for key, bar in bars.items()}
         name = " of ".join(filter(None, (row["quantity"], row["of"])))
-        rows.append({"name": name, **values, "order": float(row["order"])})
-    detail = "; ".join(filter(None, (check.detail, check.advice)))
-    words = {"name": check.verdict.name.lower(), "word": word, "sentence": sentence, "detail": detail}
-    return {**words, "rows": rows}
+        rows.append({"name": name, **texts, "order": float(row["order"])})
+    return {**_verdict(check, check.advice), "rows": rows}

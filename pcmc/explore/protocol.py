@@ -36,10 +36,10 @@ class RequestError(Exception):
         self.status = status
 
 
-def checked(keys: Mapping[str, Check], asked: Mapping[str, Any], where: str = "") -> dict[str, Any]:
+def check_request(keys: Mapping[str, Check], asked: Mapping[str, Any], where: str = "") -> dict[str, Any]:
     """The values in a request; a key that is not in the table is refused, one ending in ? may be missing.
 
-    >>> checked({"number": whole, "name?": name}, {"number": 3})
+    >>> check_request({"number": whole, "name?": name}, {"number": 3})
     {'number': 3}
     """
     known = {key.removesuffix("?"): check for key, check in keys.items()}
@@ -54,52 +54,49 @@ def or_null(check: Check) -> Check:
     return lambda what, value: None if value is None else check(what, value)
 
 
+def of_type(words: str, *types: type) -> Check:
+    """The check of a value of one of these types; true and false are no numbers."""
+
+    def check(what: str, value: Any) -> Any:
+        if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+            raise RequestError(f"{what}: expected {words}, found {value!r:.60}")
+        return value
+
+    return check
+
+
+whole, truth = of_type("a whole number", int), of_type("true or false", bool)
+real, text = of_type("a number", int, float), of_type("a name", str)
+
+
 def name(what: str, value: Any) -> str:
-    """A text."""
-    if not isinstance(value, str):
-        raise RequestError(f"{what}: expected a name, found {value!r:.60}")
-    if len(value) > LONGEST_NAME:
+    """A text that is not too long."""
+    if len(text(what, value)) > LONGEST_NAME:
         raise RequestError(f"{what}: a name of {len(value)} characters: {value[:40]!r}...")
-    return value
+    return str(value)
 
 
-def number(what: str, value: Any) -> float:
+def as_float(what: str, value: Any) -> float:
     """A float."""
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise RequestError(f"{what}: expected a number, found {value!r:.60}")
     try:
-        return float(value)
+        return float(real(what, value))
     except OverflowError:
         raise RequestError(f"{what}: expected a number up to 1.8e308") from None
 
 
-def whole(what: str, value: Any) -> int:
-    """An integer."""
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise RequestError(f"{what}: expected a whole number, found {value!r:.60}")
-    return value
-
-
-def place(what: str, value: Any) -> list[float]:
-    """A point in space."""
-    if not isinstance(value, list) or len(value) != 3:
-        raise RequestError(f"{what}: expected a point [x, y, z], found {value!r:.60}")
-    return [number(what, x) for x in value]
-
-
-def truth(what: str, value: Any) -> bool:
-    """A bool."""
-    if not isinstance(value, bool):
-        raise RequestError(f"{what}: expected true or false, found {value!r:.60}")
-    return value
+def place(what: str, value: Any, words: str = "a point [x, y, z]", size: int = 3) -> list[float]:
+    """A point."""
+    if not isinstance(value, list) or len(value) != size:
+        raise RequestError(f"{what}: expected {words}, found {value!r:.60}")
+    return [as_float(what, x) for x in value]
 
 
 def variant_name(what: str, value: Any) -> str:
     """The name of a new variant."""
-    text = " ".join(name(what, value).split())
-    if not 0 < len(text) <= 60:
-        raise RequestError(f"{what}: expected 1 to 60 characters, found {len(text)}")
-    return checked_name(what, text)
+    words = " ".join(name(what, value).split())
+    if not 0 < len(words) <= 60:
+        raise RequestError(f"{what}: expected 1 to 60 characters, found {len(words)}")
+    return checked_name(what, words)
 
 
 def file_name(what: str, value: Any) -> str:
@@ -111,11 +108,7 @@ def file_name(what: str, value: Any) -> str:
 
 def owner(what: str, value: Any) -> str | tuple[float, ...]:
     """What a target is of: a name, or the point of a height."""
-    if isinstance(value, str):
-        return name(what, value)
-    if not isinstance(value, list) or len(value) != 2:
-        raise RequestError(f"{what}: expected a name or a point, found {value!r:.60}")
-    return tuple(number(what, x) for x in value)
+    return name(what, value) if isinstance(value, str) else tuple(place(what, value, "a name or a point", 2))
 
 
 def patches(what: str, value: Any) -> str | tuple[str, ...]:
@@ -123,7 +116,7 @@ def patches(what: str, value: Any) -> str | tuple[str, ...]:
     return tuple(name(what, one) for one in value) if isinstance(value, list) else name(what, value)
 
 
-def by_name(check: Check) -> Check:
+def values_by_name(check: Check) -> Check:
     """Values by name."""
 
     def values(kind: str, listed: Any) -> dict[str, Any]:
@@ -145,21 +138,15 @@ def entries(keys: Mapping[str, Check], made: Callable[..., Any]) -> Check:
             raise RequestError(f"{what}: {len(listed)} are too many; at most {MOST_AIMS}")
         if not all(first in entry for entry in listed):
             raise RequestError(f"{what}: each needs a {first}")
-        return tuple(made(**checked(keys, entry, f"{what}: ")) for entry in listed)
+        return tuple(made(**check_request(keys, entry, f"{what}: ")) for entry in listed)
 
     return objects
 
 
-LIMIT = or_null(number)
-VALUES = {f"{kind}?": by_name(number) for kind in KINDS} | {"points?": by_name(place)}
-TARGET = {
-    "quantity": name,
-    "of?": or_null(owner),
-    "value?": LIMIT,
-    "at_most?": LIMIT,
-    "at_least?": LIMIT,
-    "name?": name,
-}
+LIMIT = or_null(as_float)
+VALUES = {f"{kind}?": values_by_name(as_float) for kind in KINDS} | {"points?": values_by_name(place)}
+LIMITS = dict.fromkeys(("value?", "at_most?", "at_least?"), LIMIT)
+TARGET = {"quantity": name, "of?": or_null(owner), **LIMITS, "name?": name}
 PARAMETER = {"patch": patches, "kind?": name, "low?": LIMIT, "high?": LIMIT}
 NUMBER: dict[str, Check] = {"number": whole}
 ACTS: dict[str, dict[str, Check]] = {
@@ -173,13 +160,13 @@ ACTS: dict[str, dict[str, Check]] = {
     **{act: {} for act in ("stabilise", "remesh", "undo", "redo", "reset", "stop", "state")},
 }
 """The acts of a session, with the arguments that each takes; they answer with its state."""
-OTHERS: dict[str, dict[str, Check]] = {
+REQUESTS: dict[str, dict[str, Check]] = ACTS | {
     "open": {"session?": or_null(name)},
     "margin": {"what": name},
     "save": {"name": file_name, "replace?": truth},
     **{act: {} for act in ("check", "verify", "families", "news")},
 }
-"""The requests that answer with something else."""
+"""All requests; those that are no acts answer with something else."""
 
 
 def pack(header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]] | None = None) -> bytes:
@@ -194,9 +181,9 @@ def pack(header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]] | Non
         kind = "f" if array.dtype.kind == "f" else "u"
         listed.append([name, kind, int(array.size)])
         blocks.append(np.ascontiguousarray(array, dtype=TYPES[kind]).tobytes())
-    text = json.dumps(plain({**header, "arrays": listed}), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    return b"".join([len(text).to_bytes(4, "little"), text, *blocks])
+    packed = json.dumps(plain({**header, "arrays": listed}), allow_nan=False).encode()
+    packed += b" " * (-len(packed) % 4)
+    return b"".join([len(packed).to_bytes(4, "little"), packed, *blocks])
 
 
 def unpack(message: bytes) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:

@@ -32,14 +32,8 @@ def save(
 
     ``name`` is that of the file, without folder; with ``replace`` it may be that of a project that is there.
     ``aims`` are targets met by the page, with what they vary. Returns the file, and what happened to its
-    targets.
-
-    Raises
-    ------
-    FileError : a name that leads elsewhere, a file that is there already, was changed since it was read, or
-        is no project of pcmc.
-    OptionError : a surface whose values the project cannot hold.
-    MissingExtra : without tomlkit.
+    targets. FileError for a name that leads elsewhere, or a file that may not be replaced; OptionError for
+    values that the project cannot hold; MissingExtra without tomlkit.
     """
     project, path = _place(roof, name)
     text, note, left = project_with(roof, surface, aims, path.stem)

@@ -22,22 +22,18 @@ from ..surface import Surface
 from . import page_data, saving
 from .following import ProjectFallback, Stop
 from .listening import LOOPBACK, PageHandler, listen
-from .protocol import ACTS, OTHERS, RequestError, checked, pack
+from .protocol import ACTS, REQUESTS, RequestError, check_request, pack
 from .roof import ShownRoof, Watch, signature
 from .session import Session, SessionState, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 POLL = 0.1  # seconds after which the server sees that it shall end
+Answer = tuple[dict[str, Any], page_data.Arrays]  # header and arrays; see protocol.py
 
 
 class Explorer:
-    """A running server. ``url`` is the page; ``close`` ends it.
-
-    Each page has its own session in ``sessions``, the most recently used last.
-    """
-
-    acts = (*ACTS, *OTHERS)
+    """A running server: the page's ``url``, and ``sessions``, one for each page, the last used at the end."""
 
     def __init__(
         self, roof: ShownRoof, host: str, port: int, watch: Callable[[], ShownRoof] | None = None
@@ -81,7 +77,7 @@ class Explorer:
         return ProjectFallback() if project is None else ProjectFallback(project.path, project.data)
 
     def open(self) -> tuple[str, Session]:
-        """A new session and its name in addresses."""
+        """The name of a new session, and the session."""
         name, units = secrets.token_urlsafe(12), self.roof.outcome.units
         session = Session(self.start, self._turn, units, self._fallback(), self._checks)
         with self._lock:
@@ -101,43 +97,48 @@ class Explorer:
     def answer(self, name: str, act: str, asked: dict[str, Any], gone: Stop) -> bytes:
         """Answer a request of the session ``name``; ``gone`` is true once the browser has hung up."""
         if act == "open":
-            known = checked(OTHERS[act], asked).get("session")
-            name, session = (known, self.session(known)) if known else self.open()
-            return self._opening(name, session, session.state())
-        session, units = self.session(name), self.roof.outcome.units
-        given = checked(ACTS[act] if act in ACTS else OTHERS[act], asked)
-        if act == "check":
-            check = session.check_mesh(gone)
-            if check is None:
-                return pack({"superseded": True})
-            return pack({"check": page_data.mesh_findings(check, units)})
-        if act == "margin":
-            margin = session.margin(**given, gone=gone)
-            if margin is None:
-                return pack({"superseded": True})
-            there = page_data.drawn(margin.surface).vertices - self.origin
-            return pack({"margin": margin.text(units)}, {"vertices": there})
-        if act == "verify":
-            theorem = session.verify()
-            return pack({"badge": theorem.brief(units), "text": theorem.text(units)})
-        if act == "families":
-            return pack({}, {"family": page_data.families_drawn(session.state())})
-        if act == "news":
-            watch = self.watch
-            news = {"working": bool(watch and watch.working), "problem": watch.problem if watch else ""}
-            return pack({"version": self.version, "progress": session.progress, **news})
-        if act == "save":
-            return pack(self.save(session, **given))
-        if act in ("follow", "settle"):
-            state = getattr(session, act)(given)
-        else:
-            state = getattr(session, act)(**given, **({"gone": gone} if act == "meet" else {}))
-        if state.superseded:
-            return pack({"superseded": True})
-        about = page_data.state_data(state, self.origin, moving=act == "follow")
-        return pack({"superseded": False, **about}, page_data.fields(state, self.origin))
+            name = check_request(REQUESTS[act], asked).get("session") or self.open()[0]
+            return pack(*self._opening(name, self.session(name).state()))
+        session = self.session(name)
+        given = check_request(REQUESTS[act], asked)
+        answer = self._act if act in ACTS else self._question
+        return pack(*(answer(session, act, given, gone) or ({"superseded": True},)))
 
-    def _opening(self, name: str, session: Session, state: SessionState) -> bytes:
+    def _act(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
+        """The state that an act leads to; None if newer values have arrived meanwhile."""
+        values = (given,) if act in ("follow", "settle") else ()
+        options = {} if values else given | ({"gone": gone} if act == "meet" else {})
+        state = getattr(session, act)(*values, **options)
+        if state.superseded:
+            return None
+        about = page_data.state_data(state, self.origin, moving=act == "follow")
+        return {"superseded": False, **about}, page_data.fields(state, self.origin)
+
+    def _question(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
+        """What is asked about the surface shown; None if the page shows another one before it is found."""
+        units = self.roof.outcome.units
+        match act:
+            case "check":
+                check = session.check_mesh(gone)
+                return None if check is None else ({"check": page_data.mesh_findings(check, units)}, {})
+            case "margin":
+                margin = session.margin(**given, gone=gone)
+                if margin is None:
+                    return None
+                there = page_data.drawn(margin.surface).vertices - self.origin
+                return {"margin": margin.text(units)}, {"vertices": there}
+            case "verify":
+                theorem = session.verify()
+                return {"badge": theorem.brief(units), "text": theorem.text(units)}, {}
+            case "families":
+                return {}, {"family": page_data.families_drawn(session.state())}
+            case "news":
+                watch = self.watch
+                news = {"working": bool(watch and watch.working), "problem": watch.problem if watch else ""}
+                return {"version": self.version, "progress": session.progress, **news}, {}
+        return self.save(session, **given), {}
+
+    def _opening(self, name: str, state: SessionState) -> Answer:
         """A state with what the page learns once: the mesh, the file and what may be asked."""
         roof, origin = self.roof, self.origin
         about, arrays = page_data.outline(state.surface, origin)
@@ -157,9 +158,7 @@ class Explorer:
             "version": self.version,
             "superseded": False,
         }
-        return pack(
-            about | once | page_data.state_data(state, origin), arrays | page_data.fields(state, origin)
-        )
+        return about | once | page_data.state_data(state, origin), arrays | page_data.fields(state, origin)
 
     def save(self, session: Session, name: str, replace: bool = False) -> dict[str, Any]:
         """Save the surface of a session as a project beside the file that was opened."""
@@ -208,26 +207,18 @@ class Explorer:
 
 
 class View:
-    """The page in a notebook; ``surface`` is the one it shows now."""
+    """The page in a notebook: its ``url``, to open it in a window; ``close()`` ends the server behind it."""
 
     def __init__(self, roof: ShownRoof, height: int) -> None:
         self.explorer = Explorer(roof, "127.0.0.1", 0)
-        self._name, self._session = self.explorer.open()
-        self.height = int(height)
+        name, self._session = self.explorer.open()
+        self.height, self.url = int(height), f"{self.explorer.url}&session={name}"
+        self.close = self.explorer.close
 
     @property
     def surface(self) -> Surface:
         """The surface that the page shows now."""
         return self._session.surface
-
-    @property
-    def url(self) -> str:
-        """The page's address, to open it in a window."""
-        return f"{self.explorer.url}&session={self._name}"
-
-    def close(self) -> None:
-        """End the server behind the page."""
-        self.explorer.close()
 
     def _repr_html_(self) -> str:
         return (

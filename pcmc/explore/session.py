@@ -30,7 +30,7 @@ from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from .following import AT_REST, ProjectFallback, Reached, Stop, Values, attempt, reach, until, wanted
+from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
@@ -53,9 +53,9 @@ class Variant:
     certificate: Certificate
 
     @cached_property
-    def figures(self) -> list[dict[str, Any]]:
-        """Its key figures."""
-        return figures_data(self.surface, self.certificate)
+    def data(self) -> dict[str, Any]:
+        """Its name and key figures."""
+        return {"name": self.name, "figures": figures_data(self.surface, self.certificate)}
 
 
 def figures_data(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]:
@@ -99,7 +99,7 @@ class SessionState:
         return len(self.steps) - 1 - self.place
 
     def asking(self, values: Values) -> SessionState:
-        """The same surface, with other values asked for."""
+        """Other values asked for."""
         return replace(self, wanted=wanted(self.surface, values))
 
     def showing(self, surface: Surface, certificate: Certificate | None = None) -> SessionState:
@@ -136,9 +136,9 @@ class SessionState:
 def act(
     moves: bool = False, ends: bool = False
 ) -> Callable[[Callable[..., SessionState]], Callable[..., SessionState]]:
-    """A method of a session that makes a state of the present one, done after the acts before it.
+    """A method that makes a state of the present one, done after the acts before it.
 
-    One that ``moves`` or ``ends`` moves ends moves before it: their ``stop`` becomes true.
+    One that ``moves``, or ``ends`` moves, ends those before it: their ``stop`` becomes true.
     """
 
     def made(method: Callable[..., SessionState]) -> Callable[..., SessionState]:
@@ -191,9 +191,8 @@ def solved_start(surface: Surface) -> SessionState:
 class Session:
     """A surface that follows its values; every method is safe to call from any thread.
 
-    Calls are answered in the order in which they come, and none is dropped: but a move (to other values, to
-    targets, to new triangles) ends early when a newer move, or an act that shows another surface, has come
-    after it.
+    Calls are answered in the order in which they come, and none is dropped; but a move ends early when a
+    newer one, or an act that shows another surface, has come after it.
     """
 
     start: SessionState
@@ -235,10 +234,7 @@ class Session:
 
     @act(moves=True)
     def settle(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
-        """Move to these values, or as close as possible, in as many steps as needed.
-
-        The surface reached is a step that ``undo`` returns to.
-        """
+        """Move to these values, or as close as possible; the surface reached is a step of ``undo``."""
         state, end = state.asking(values), time.monotonic() + SETTLE_SECONDS
         progress = partial(setattr, self, "progress")
         settled = self.fallback.settle(state.surface, state.wanted, stop, end, progress, **SETTLE)
@@ -252,7 +248,7 @@ class Session:
     def stabilise(self, state: SessionState, stop: Stop) -> SessionState:
         """Move from a saddle to a stable shape, if there is one nearby."""
         end = time.monotonic() + SETTLE_SECONDS
-        result = attempt(state.surface, until(stop, end), target="minimum")
+        result = solve_until(state.surface, until(stop, end), target="minimum")
         certificate = result.certify()
         if stop():
             return state
@@ -265,7 +261,7 @@ class Session:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
         asked, end = values_of(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
         mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
-        result = attempt(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
+        result = solve_until(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
         if stop():
             return state
         if result.certificate.verdict not in AT_REST:
@@ -285,10 +281,7 @@ class Session:
         vary: tuple[Parameter, ...],
         gone: Stop = lambda: False,
     ) -> SessionState:
-        """Move to values that meet the targets; if there are none, ``message`` says why.
-
-        The search ends when ``gone``: its page was closed.
-        """
+        """Move to values that meet the targets; ``message`` says why not. ``gone``: the page is closed."""
         solves = count(1)
 
         def check(_: object) -> None:
@@ -380,7 +373,7 @@ class Session:
         return self._look(lambda shown, check: check_mesh(shown, callback=check), gone)
 
     def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
-        """How far the surface shown is from the edge; None as of ``check_mesh``."""
+        """How far the surface shown is from the edge; None as for ``check_mesh``."""
         return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
 
     def verify(self) -> Theorem:
@@ -389,7 +382,6 @@ class Session:
             return verify(self.surface)
 
     def _look(self, at: Callable[[Surface, Callback], Found], gone: Stop) -> Found | None:
-        """What is found about the surface shown; None if the page shows another one, or is closed, before."""
         shown = self.surface
 
         def check(_: Progress) -> None:

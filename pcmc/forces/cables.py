@@ -4,54 +4,63 @@ An edge from a to b has the length ℓ = |b - a| and the direction t = (b - a) /
 
     ∂ℓ/∂b = t = -∂ℓ/∂a,     ∂²ℓ/∂b² = (1 - t tᵀ) / ℓ = ∂²ℓ/∂a² = -∂²ℓ/∂a∂b
 
-An edge without length has no direction and contributes none of these.
+and L has τ/ℓ. An edge without length has no direction and contributes none of these.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
 from ..surface import Surface
-from ..surface.parts import CableEdges
+from ..surface.parts import Cable
 from ..surface.topology import Topology
+from .elements import Elements
+
+ENDS = np.array([-1.0, 1.0])  # the signs of ∂ℓ at a and b
+PAIRS = np.outer(ENDS, ENDS)
 
 
-class EdgeBlocks(NamedTuple):
-    """Blocks of edges i → j: s t tᵀ + k 1 of an end with itself, -s t tᵀ - k 1 + [q]× of both."""
-
-    ends: Ints  # (e,2) i and j
-    t: Floats  # (e,3)
-    s: Floats  # (e,)
-    k: Floats  # (e,)
-    q: Floats  # (e,3)
-
-
-def add_cables(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
-    """Σ τ ℓ at X (n,3), force·length; its gradient is added to ``gradient`` (n,3) if that is given.
+def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
+    """Σ τ ℓ at X (n,3).
 
     >>> from pcmc import Cable, Patch
     >>> right = Surface([[0, 0, 0], [4, 0, 0], [0, 3, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], [0],
     ...                 cables=[Cable("edge", 2.0, [[1, 2]])])
-    >>> forces = np.zeros((3, 3))
-    >>> add_cables(right, right.vertices, forces), forces.tolist()[1]
-    (10.0, [1.6, -1.2, 0.0])
+    >>> [cable] = elements(right, right.vertices)
+    >>> cable.value.tolist(), (cable.gradient() + 0.0).tolist()
+    ([10.0], [[[1.6, -1.2, 0.0], [-1.6, 1.2, 0.0]]])
     """
-    ends, tension = surface.cable_edges
-    return float((tension * add_pull(X, ends, tension, gradient)).sum()) if len(ends) else 0.0
+    if surface.cables:
+        yield lengths(X, surface.cable_edges.ends).times(surface.cable_edges.tension)
 
 
-def add_pull(X: Floats, ends: Ints, tension: Floats | float, gradient: Floats | None = None) -> Floats:
-    """(c,) lengths of edges (c,2); the gradient of Σ τ ℓ is added to ``gradient`` (n,3) if that is given."""
+def lengths(X: Floats, ends: Ints) -> Elements:
+    """Σ ℓ over edges (c,2) at X (n,3)."""
     t, length = directions(X, ends)
-    if gradient is not None:
-        pull = np.broadcast_to(tension, len(ends))[:, None] * t
-        np.add.at(gradient, ends[:, 1], pull)
-        np.add.at(gradient, ends[:, 0], -pull)
-    return length
+
+    def hessian() -> Floats:
+        return np.asarray(
+            PAIRS[..., None, None] * (inverse(length)[:, None, None] * across(t))[:, None, None]
+        )
+
+    def stiffness() -> Floats:
+        return np.asarray(inverse(length)[:, None, None] * PAIRS)
+
+    return Elements(ends, length, lambda: ENDS[:, None] * t[:, None], hessian, stiffness)
+
+
+def inverse(length: Floats) -> Floats:
+    """(c,) 1/ℓ; 0 without length."""
+    return np.asarray(1.0 / np.where(length > 0.0, length, np.inf))
+
+
+def across(t: Floats) -> Floats:
+    """(c,3,3) 1 - t tᵀ."""
+    return np.asarray(np.eye(3) - t[:, :, None] * t[:, None, :])
 
 
 def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
@@ -61,33 +70,47 @@ def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
     return side / np.where(length > 0.0, length, 1.0)[:, None], length
 
 
-def cable_blocks(surface: Surface, X: Floats, hessian: float = 1.0, stiffness: float = 0.0) -> EdgeBlocks:
-    """The blocks of all cables, of hessian · ∂²E + stiffness · L; L is τ/ℓ 1."""
-    ends, tension = surface.cable_edges
-    t, length = directions(X, ends)
-    pull = tension / np.where(length > 0.0, length, np.inf)
-    return EdgeBlocks(np.asarray(ends), t, -hessian * pull, (hessian + stiffness) * pull, 0.0 * t)
+def cable_pulls(surface: Surface, X: Floats) -> Floats:
+    """(c,) τ + g z̄, the pull of each edge of ``Surface.cable_edges`` at X (n,3), force."""
+    ends, tension, weight = surface.cable_edges
+    if not weight.any():
+        return np.asarray(tension)
+    return np.asarray(tension + weight * surface.plane.height(X)[ends].mean(axis=1))
 
 
-def squared_cable_forces(surface: Surface) -> Floats:
-    """(c,) τ² at both ends of each edge that pulls, added up, force²."""
-    return np.asarray(2.0 * surface.cable_edges.tension**2)
+def pull_along(surface: Surface, cable: Cable, vertices: Ints) -> Floats:
+    """(k,) τ + g z, the pull of a cable at the mean of some vertices (k,) or (k,2), force."""
+    z = surface.plane.height(surface.vertices)[vertices].reshape(len(vertices), -1).mean(axis=1)
+    return np.asarray(cable.tension + cable.weight * z)
 
 
-def tensions_on(topo: Topology, cables: CableEdges) -> Floats:
-    """(e,) the line tension on each edge of a topology, force.
+def compressed_cables(surface: Surface) -> Bools:
+    """(c,) edges of cables with a weight where τ + g z̄ ≤ 0."""
+    return (surface.cable_edges.weight != 0.0) & (cable_pulls(surface, surface.vertices) <= 0.0)
+
+
+def squared_cable_forces(surface: Surface, X: Floats) -> Floats:
+    """(c,) squared pulls at both ends of each edge, added up, force²."""
+    return np.asarray(2.0 * cable_pulls(surface, X) ** 2)
+
+
+def laws_on(topo: Topology, surface: Surface) -> Floats:
+    """(e,2) the line tension, force, and weight, force/length, on each edge of a topology.
 
     Raises
     ------
     SurfaceError : a cable runs along an edge that is not there, so that nothing else acts on it.
     """
-    place = topo.edge_numbers(cables.ends)
+    ends, tension, weight = surface.cable_edges
+    place = topo.edge_numbers(ends)
     alone = np.flatnonzero(place < 0)
     if len(alone):
-        i, j = (int(v) for v in cables.ends[alone[0]])
+        i, j = (int(v) for v in ends[alone[0]])
         message = (
             f"the cable from vertex {i} to {j} runs where no patch has a tension or a pressure;"
             " give the patches there a tension, or remove the cable"
         )
         raise SurfaceError(message, what="cables", where=(i, j))
-    return np.bincount(place, cables.tension, len(topo.edges)).astype(float)
+    laws = np.zeros((len(topo.edges), 2))
+    laws[place] = np.stack([tension, weight], axis=1)
+    return laws

@@ -16,18 +16,17 @@ last side, + at the tail of the first), so ∂V/∂v = n. It all costs nothing w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner
+from ..base.tolerances import PARALLEL, SAME_PLACE
 from ..surface import Plane, Surface
 from ..surface.checks import lying
 from ..surface.supports import common_point
-from .cables import EdgeBlocks
-
-MEETS = 1e-9  # sine of an angle up to which two planes count as parallel
+from .elements import Elements
 
 
 class FlatPieces(NamedTuple):
@@ -52,37 +51,40 @@ EMPTY, FLAT = np.empty(0, dtype=np.int64), np.empty((0, 3))
 NONE = FlatPieces(EMPTY, EMPTY, FLAT, EMPTY, EMPTY, FLAT)
 
 
-def add_plane_volumes(surface: Surface, X: Floats, volumes: Floats) -> Floats:
+def volumes(surface: Surface, X: Floats) -> list[tuple[Ints, Elements]]:
+    """The volumes of the flat pieces, by sides and by ends, and the patch of each; vertices at X (n,3)."""
+    if not (pieces := flat_pieces(surface)):
+        return []
+    ends, c = np.stack(pieces.sides(surface), axis=1), pieces.apex
+    seen = X - surface.origin
+    a, b = seen[ends[:, 0]], seen[ends[:, 1]]
+
+    def hessian() -> Floats:
+        skew = np.cross(c[:, None] / 6.0, np.eye(3)).swapaxes(1, 2)  # [c]×/6
+        nothing = 0.0 * skew
+        return np.stack([np.stack(row, axis=1) for row in ((nothing, skew), (-skew, nothing))], axis=1)
+
+    def gradient() -> Floats:
+        return np.stack([np.cross(c, b), -np.cross(c, a)], axis=1) / 6.0
+
+    sides = Elements(ends, -np.einsum("ij,ij->i", c, np.cross(a, b)) / 6.0, gradient, hessian)
+    at_ends = np.einsum("ij,ij->i", pieces.normal, seen[pieces.end])
+    zero = np.zeros((len(pieces.end), 1, 1, 3, 3))
+    points = Elements(pieces.end[:, None], at_ends, lambda: pieces.normal[:, None], lambda: zero)
+    return [(surface.patch_of_face[pieces.face], sides), (pieces.end_patch, points)]
+
+
+def elements(surface: Surface, X: Floats, pressures: Floats | None = None) -> Iterator[Elements]:
+    """-Σ p V of the flat pieces, with the surface's net pressures or others (k,)."""
+    p = surface.net_pressures if pressures is None else pressures
+    return (pieces.times(-p[patch]) for patch, pieces in volumes(surface, X))
+
+
+def add_plane_volumes(surface: Surface, X: Floats, sums: Floats) -> Floats:
     """The volumes (k,) with the flat pieces of each patch added, in place; vertices at X (n,3)."""
-    if pieces := flat_pieces(surface):
-        a, b = pieces.sides(surface)
-        X = X - surface.origin
-        each = -np.einsum("ij,ij->i", pieces.apex, np.cross(X[a], X[b])) / 6.0
-        volumes += np.bincount(surface.patch_of_face[pieces.face], each, len(volumes))
-        at_ends = np.einsum("ij,ij->i", pieces.normal, X[pieces.end])
-        volumes += np.bincount(pieces.end_patch, at_ends, len(volumes))
-    return volumes
-
-
-def add_plane_forces(surface: Surface, pressures: Floats, X: Floats, gradient: Floats) -> Floats:
-    """The gradient (n,3) with -Σ p ∂V of the flat pieces added, in place; pressures (k,)."""
-    if pieces := flat_pieces(surface):
-        a, b = pieces.sides(surface)
-        X = X - surface.origin
-        p = pressures[surface.patch_of_face[pieces.face], None] / 6.0
-        np.subtract.at(gradient, a, p * np.cross(pieces.apex, X[b]))
-        np.add.at(gradient, b, p * np.cross(pieces.apex, X[a]))
-        np.subtract.at(gradient, pieces.end, pressures[pieces.end_patch, None] * pieces.normal)
-    return gradient
-
-
-def plane_blocks(surface: Surface, pressures: Floats, hessian: float = 1.0) -> EdgeBlocks:
-    """The blocks of the sides a → b of flat pieces under pressure: q = -p c / 6."""
-    pieces = flat_pieces(surface)
-    p = pressures[surface.patch_of_face[pieces.face]]
-    ends, nothing = np.stack(pieces.sides(surface), axis=1)[p != 0.0], np.zeros(np.count_nonzero(p))
-    q = hessian * (-p[p != 0.0, None] / 6.0 * pieces.apex[p != 0.0])
-    return EdgeBlocks(ends, 0.0 * q, nothing, nothing, q)
+    for patch, pieces in volumes(surface, X):
+        sums += np.bincount(patch, pieces.value, len(sums))
+    return sums
 
 
 def ground(surface: Surface) -> Bools:
@@ -99,7 +101,7 @@ def flat_pieces(surface: Surface) -> FlatPieces:
     masks = [(surface.plane, ground(surface)), *surface.on_planes]
     topo, origin = surface.topology, surface.origin
     distance = np.array([-float(plane.height(origin)) for plane, _ in masks])
-    rounding = 1e-12 * (surface.size + float(np.abs(origin).max()))
+    rounding = SAME_PLACE * (surface.size + float(np.abs(origin).max()))
     taken = np.zeros(len(topo.edges), dtype=bool)
     for k in np.flatnonzero(np.abs(distance) <= rounding):
         taken = taken | masks[k][1][topo.edges].all(axis=1)
@@ -137,10 +139,10 @@ def _ends(
     normal, done = np.zeros((len(places), 3)), count == 0.0
     for plane, mask in others:
         here = ~done & mask[vertex]
-        if here.any() and abs(plane.height(origin + apex[0])) <= 1e-12 * surface.size:
+        if here.any() and abs(plane.height(origin + apex[0])) <= SAME_PLACE * surface.size:
             done |= here  # the piece's last side lies in that plane, too
         normals = np.array([own[0].normal, plane.normal])
-        if not here.any() or np.linalg.norm(np.cross(*normals)) <= MEETS:
+        if not here.any() or np.linalg.norm(np.cross(*normals)) <= PARALLEL:
             continue
         away = -np.array([own[0].height(origin), plane.height(origin)])
         corner_point = np.linalg.lstsq(normals, away, rcond=None)[0]

@@ -1,10 +1,11 @@
 """The energy of a Surface, and its gradient with the supports applied.
 
-    E = Σ α_i A_i - Σ p_i V_i + Σ τ L + Σ w ∫ z dA   (11), (20); the paper's pressures are 1 and 0
+    E = Σ α_i A_i - Σ p_i V_i + Σ τ L + Σ g ∫ z ds + Σ w ∫ z dA   (11), (20); the paper's p are 1 and 0
     A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
     V_i = (1/6) Σ_T ⟨p, q_j × q_{j+1}⟩             (10b), positions seen from the point of Π
 
-τ L are the cables, w ∫ z dA the patches' weights; the paper has neither.
+τ L and g ∫ z ds are the cables and their weights, w ∫ z dA the patches' weights; the paper has neither.
+``FORCES`` lists what acts on elements other than triangles.
 
 V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.origin``) to patch i. At a
 junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
@@ -19,18 +20,24 @@ Units: E force·length, ∇E force, with tension in force/length and pressure in
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
-from .cables import add_cables
-from .flat_pieces import add_plane_forces, add_plane_volumes
+from . import cable_weights, cables, flat_pieces
+from .elements import Elements, add_values
+from .flat_pieces import add_plane_volumes
 from .triangles import add_weights, areas_and_volumes, energy_mesh, measure
+
+LINE_FORCES = (cables.elements, cable_weights.elements)
+FORCES = (*LINE_FORCES, flat_pieces.elements)
 
 
 def energy(surface: Surface) -> float:
-    """E = Σ α A - Σ (p - s) V + Σ τ L + Σ w ∫ z dA, Eq. (20) with snow, cables, weights, force·length.
+    """E = Σ α A - Σ (p - s) V + Σ τ L + Σ g ∫ z ds + Σ w ∫ z dA, Eq. (20) with snow, cables, weights.
 
     >>> from pcmc import Patch, Surface
     >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]],
@@ -45,13 +52,17 @@ def energy(surface: Surface) -> float:
 def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
     areas, volumes = areas_and_volumes(energy_mesh(surface), X)
-    add_plane_volumes(surface, X, volumes)
-    return total(surface.tensions, areas, surface.net_pressures, volumes) + add_cables_and_weights(surface, X)
+    return total(surface.tensions, areas, surface.net_pressures, volumes) + add_forces(surface, X)
 
 
-def add_cables_and_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
-    """Σ τ L + Σ w ∫ z dA at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
-    return add_cables(surface, X, gradient) + add_weights(surface, X, gradient)
+def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
+    """The elements of all ``FORCES`` at X (n,3)."""
+    return (each for force in FORCES for each in force(surface, X))
+
+
+def add_forces(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
+    """The energy at X (n,3) but for Σ α A - Σ p V of triangles; its gradient is added to ``gradient``."""
+    return add_values(elements(surface, X), gradient) + add_weights(surface, X, gradient)
 
 
 def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -> float:
@@ -68,9 +79,7 @@ def energy_and_gradient(
     """
     X = surface.vertices if X is None else X
     areas, volumes, gradient = measure(energy_mesh(surface), X, workers)
-    add_plane_volumes(surface, X, volumes)
-    add_plane_forces(surface, surface.net_pressures, X, gradient)
-    further = add_cables_and_weights(surface, X, gradient)
+    further = add_forces(surface, X, gradient)
     if supports:
         apply_supports(surface, gradient, X)
     return total(surface.tensions, areas, surface.net_pressures, volumes) + further, gradient
@@ -101,7 +110,8 @@ def weighted(
     alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
     X = surface.vertices if X is None else X
     areas, volumes, forces = measure(energy_mesh(surface, alpha, p), X)
-    return areas, add_plane_volumes(surface, X, volumes), add_plane_forces(surface, p, X, forces)
+    add_values(flat_pieces.elements(surface, X, p), forces)
+    return areas, add_plane_volumes(surface, X, volumes), forces
 
 
 def patch_areas(surface: Surface) -> Floats:

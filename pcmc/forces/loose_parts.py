@@ -22,7 +22,7 @@ def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: F
         return float(np.linalg.norm(left)) / force_scale(surface, classes, X)
     own, part_of = squared_forces(surface, classes, X), parts[classes.faces[:, 0]]
     if surface.cables:
-        own = np.append(own, squared_cable_forces(surface))
+        own = np.append(own, squared_cable_forces(surface, X))
         part_of = np.append(part_of, parts[surface.cable_edges.ends[:, 0]])
     return float(np.sqrt(ratios(left, parts, own, part_of).max(initial=0.0)))
 

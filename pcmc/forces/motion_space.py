@@ -23,6 +23,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
+from ..base.tolerances import NO_DIRECTION, ON
 from ..surface import Surface
 from ..surface.geometry import (
     accumulate,
@@ -48,10 +49,8 @@ from ..surface.topology import (
     topology,
     vertex_kind,
 )
-from .cables import squared_cable_forces, tensions_on
+from .cables import laws_on, squared_cable_forces
 from .triangles import Mesh, effective_tensions, energy_mesh
-
-PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +119,8 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
     """
     in_room = surface.room_signs.any(axis=0)  # the pressure of a room may take any value
-    pulls = (surface.tensions != 0.0) | (surface.net_pressures != 0.0) | in_room
-    active = pulls[surface.patch_of_face]
+    acts = (surface.tensions != 0.0) | (surface.net_pressures != 0.0) | in_room
+    active = acts[surface.patch_of_face]
     faces, patch = surface.faces, surface.patch_of_face
     if not active.all():
         faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
@@ -147,9 +146,9 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     on_curve = topo.curve_edge | topo.one_way_edge
     if surface.on_planes:
         on_curve = on_curve & ~mirror_edges(surface.on_planes, topo)
-    pull = tensions_on(topo, surface.cable_edges) if surface.cables else None
-    if pull is not None:
-        on_curve = on_curve | (pull > 0.0)
+    pulls = laws_on(topo, surface) if surface.cables else None
+    if pulls is not None:
+        on_curve = on_curve | (pulls[:, 0] > 0.0)
     edges = topo.edges[on_curve]
     links = np.concatenate([edges, edges[:, ::-1]])
     if crest is not None and len(crest):
@@ -157,11 +156,12 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     curve, beside = curve_neighbours(links, surface.n)
     kind = vertex_kind(links[:, 0], surface.n)
     shared = topo.fans > 1
-    if pull is not None:
-        least, most = np.full(surface.n, np.inf), np.zeros(surface.n)
-        np.minimum.at(least, edges, pull[on_curve, None])
-        np.maximum.at(most, edges, pull[on_curve, None])
-        shared |= least < most  # where curve edges of different line tension meet
+    if pulls is not None:
+        for law in pulls[on_curve].T:
+            least, most = np.full(surface.n, np.inf), np.full(surface.n, -np.inf)
+            np.minimum.at(least, edges, law[:, None])
+            np.maximum.at(most, edges, law[:, None])
+            shared |= least < most  # where curve edges of different line tension or weight meet
     if crest is not None:
         shared[crest[:, 0]] = False
     kind[shared] = POINT
@@ -180,7 +180,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     freedom = np.where(classes.idle, np.int8(0), freedom)
     for circle, along in surface.on_circle:
         # a curve along the circle on both sides: the polygon's chord is not quite along the tangent
-        near = surface.fixed & (circle.distance(surface.vertices) <= 1e-9 * surface.size)
+        near = surface.fixed & (circle.distance(surface.vertices) <= ON * surface.size)
         freedom[classes.curve[along[classes.curve] & near[classes.beside].all(axis=1)]] = 0
     chord = np.zeros_like(X)
     chord[classes.curve] = curve_chords(surface, classes, X)
@@ -219,15 +219,15 @@ def _fill(
         if freedom[v] == 2 and size > 0:  # within the plane across a
             rest = cross(a, along) if size == 2 else sub(first, scaled(dot(first, a), a))
             length = norm(rest)
-            if size == 3 or (size == 2 and length <= PARALLEL):
+            if size == 3 or (size == 2 and length <= NO_DIRECTION):
                 pair = perpendicular_pair(a)
                 first, second, third, size = pair[0], pair[1], none, 2
             else:
-                size = 1 if length > PARALLEL else 0
+                size = 1 if length > NO_DIRECTION else 0
                 first, second = divided(rest, length) if size else none, none
         elif freedom[v] == 1:  # along a
             across = (dot(first, a), dot(second, a), dot(third, a))
-            first, second, third, size = a, none, none, 1 if norm(across) > PARALLEL else 0
+            first, second, third, size = a, none, none, 1 if norm(across) > NO_DIRECTION else 0
         dimension[v] = size
         for d in range(3):
             if size > 0:
@@ -258,7 +258,7 @@ def tension_forces(surface: Surface) -> float:
 
 def _tension_forces(surface: Surface, X: Floats, F: Ints, patch: Ints) -> float:
     sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
-    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) if surface.cables else sheets
+    return sqrt(sheets**2 + squared_cable_forces(surface, X).sum()) if surface.cables else sheets
 
 
 @inlined

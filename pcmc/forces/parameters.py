@@ -14,8 +14,8 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface
-from ..surface.geometry import segment_lengths
-from .cables import add_pull
+from .cables import lengths
+from .elements import add_values
 from .functional import weighted
 from .triangles import moments
 
@@ -30,9 +30,7 @@ def energy_by(surface: Surface, rates: Rates, X: Floats) -> float:
     change -= float((rates.get("pressures", none) - rates.get("snows", none)) @ volumes)
     if "weights" in rates:
         change += float(rates["weights"] @ moments(surface, X, none))
-    for k in np.flatnonzero(rates.get("cables", ())):
-        change += float(rates["cables"][k] * segment_lengths(X, surface.cables[k].edges).sum())
-    return change
+    return change + _cables_by(surface, rates, X)
 
 
 def gradient_by(surface: Surface, rates: Rates, X: Floats | None = None) -> Floats:
@@ -44,6 +42,11 @@ def gradient_by(surface: Surface, rates: Rates, X: Floats | None = None) -> Floa
         out = weighted(surface, rates.get("tensions", none), net, X)[2]
     if "weights" in rates:
         moments(surface, X, rates["weights"], out)
-    for k in np.flatnonzero(rates.get("cables", ())):
-        add_pull(X, surface.cables[k].edges, float(rates["cables"][k]), out)
+    _cables_by(surface, rates, X, out)
     return out
+
+
+def _cables_by(surface: Surface, rates: Rates, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ τ̇ L at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
+    of = [(rate, cable.edges) for rate, cable in zip(rates.get("cables", ()), surface.cables, strict=False)]
+    return add_values((lengths(X, ends).times(np.full(len(ends), rate)) for rate, ends in of), gradient)

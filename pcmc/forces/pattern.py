@@ -19,9 +19,8 @@ class Pattern(NamedTuple):
     indptr: Ints  # CSR structure of the upper triangle, diagonal first in each row
     indices: Ints
     # (m,3) for corner pairs (0,1), (1,2), (2,0) of each active face, where the columns of the later vertex
-    # begin in the rows of the earlier one, counted after its diagonal block; (e,) the same for each edge
-    offset: Ints
-    edge_offset: Ints = np.empty(0, dtype=np.int32)
+    # begin in the rows of the earlier one, counted after its diagonal block
+    offset: Ints = np.empty((0, 3), dtype=np.int32)
 
     @property
     def size(self) -> int:
@@ -40,16 +39,27 @@ class Pattern(NamedTuple):
 
 def hessian_pattern(of: VertexClasses | Surface, space: MotionSpace) -> Pattern:
     """Sparsity of Bᵀ (∂²E) B: it depends on the faces and on the dimensions of the motion space."""
-    low, high = of.topology.edges.T.astype(np.int64)
+    pattern, offset = _pattern(of.topology.edges, space)
+    # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
+    return pattern._replace(offset=np.ascontiguousarray(offset[of.topology.edge_of_face[:, [2, 0, 1]]]))
+
+
+def pattern_of(elements: Ints, space: MotionSpace) -> Pattern:
+    """Sparsity for elements of k vertices each (e,k)."""
+    first, second = np.triu_indices(elements.shape[1], 1)
+    pairs = np.stack([elements[:, first].ravel(), elements[:, second].ravel()], axis=1)
+    return _pattern(np.unique(np.sort(pairs, axis=1), axis=0), space)[0]
+
+
+def _pattern(pairs: Ints, space: MotionSpace) -> tuple[Pattern, Ints]:
+    """The pattern of pairs (e,2) of vertices, in order, and the offset (e,) of each in it."""
+    low, high = pairs.T.astype(np.int64)
     first = np.searchsorted(low, np.arange(len(space.dimension) + 1))
     width = space.dimension[high]
     before = np.concatenate([[0], np.cumsum(width)])
-    edge_offset = (before[:-1] - before[first[low]]).astype(np.int32)
+    offset = (before[:-1] - before[first[low]]).astype(np.int32)
     beyond = before[first[1:]] - before[first[:-1]]
-    indptr, indices = _fill_pattern(space, first, high, beyond)
-    # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
-    offset = np.ascontiguousarray(edge_offset[of.topology.edge_of_face[:, [2, 0, 1]]])
-    return Pattern(indptr, indices, offset, edge_offset)
+    return Pattern(*_fill_pattern(space, first, high, beyond)), offset
 
 
 @inlined

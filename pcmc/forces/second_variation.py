@@ -4,7 +4,7 @@ For corners i and j of an element, ∂²E/∂x_i∂x_j is the 3×3 matrix
 
     s t tᵀ + k 1 + [q]× + u nᵀ + n vᵀ
 
-with the numbers given where each force is: ``triangles``, ``cables``, ``flat_pieces``; a vertex that slides
+for triangles (``triangles``), and given by each of the other forces (``elements``); a vertex that slides
 along a circle adds ⟨κ, ∇E⟩ along its tangent (``circle_curvatures``). The *stiffness* L has only k.
 ``assemble`` projects hessian · ∂²E + stiffness · L into the motion space; ``add_products`` multiplies ∂²E by
 a motion.
@@ -12,7 +12,7 @@ a motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,10 +21,8 @@ from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..surface import Surface, expect_surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scaled, vector
-from ..surface.topology import Topology
-from .cables import EdgeBlocks, cable_blocks
-from .flat_pieces import flat_pieces, plane_blocks
-from .functional import energy_and_gradient
+from .elements import Elements, add_hessian_products
+from .functional import elements, energy_and_gradient
 from .motion_space import MotionSpace, VertexClasses
 from .pattern import Pattern, hessian_pattern, pair_place, row_place
 from .triangles import (
@@ -54,7 +52,7 @@ def hessian(surface: Surface) -> csr_array:
     expect_surface(surface)
     every = MotionSpace.of(np.tile(np.eye(3), (surface.n, 1, 1)), np.full(surface.n, 3))
     pattern = hessian_pattern(surface, every)
-    data = _assembled(surface, surface.topology, energy_mesh(surface), every, pattern, surface.vertices)
+    data = _assembled(surface, energy_mesh(surface), every, pattern, surface.vertices)
     return pattern.symmetric(data)
 
 
@@ -68,8 +66,7 @@ def assemble(
     stiffness: float = 0.0,
 ) -> Floats:
     """Values of hessian · Bᵀ(∂²E)B + stiffness · BᵀLB in the pattern."""
-    mesh, topo = classes.mesh(surface), classes.topology
-    data = _assembled(surface, topo, mesh, space, pattern, X, hessian, stiffness)
+    data = _assembled(surface, classes.mesh(surface), space, pattern, X, hessian, stiffness)
     if hessian:
         rows, factor = circle_curvatures(surface, space, X)
         data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
@@ -96,28 +93,12 @@ def circle_curvatures(surface: Surface, space: MotionSpace, X: Floats) -> tuple[
 def add_products(surface: Surface, mesh: Mesh, X: Floats, d: Floats, change: Floats) -> Floats:
     """(∂²E) d added to ``change`` (n,3), in place, for a motion d (n,3); ``mesh`` has the triangles."""
     _add_triangle_products(mesh, X, d, change)
-    for edges in _edge_blocks(surface, mesh, X, 1.0, 0.0):
-        i, j = edges.ends.T
-        apart = d[j] - d[i]
-        along = edges.s * np.einsum("ij,ij->i", edges.t, apart)
-        pull = along[:, None] * edges.t + edges.k[:, None] * apart
-        np.add.at(change, j, pull - np.cross(edges.q, d[i]))
-        np.add.at(change, i, np.cross(edges.q, d[j]) - pull)
+    add_hessian_products(elements(surface, X), d, change)
     return change
-
-
-def _edge_blocks(
-    surface: Surface, mesh: Mesh, X: Floats, hessian: float, stiffness: float
-) -> Iterator[EdgeBlocks]:
-    if surface.cables:
-        yield cable_blocks(surface, X, hessian, stiffness)
-    if hessian and flat_pieces(surface):
-        yield plane_blocks(surface, mesh.pressure, hessian)
 
 
 def _assembled(
     surface: Surface,
-    topo: Topology,
     mesh: Mesh,
     space: MotionSpace,
     pattern: Pattern,
@@ -127,9 +108,7 @@ def _assembled(
 ) -> Floats:
     data = np.zeros(len(pattern.indices))
     _assemble_triangles(mesh, X, space, pattern, hessian, stiffness, data)
-    for edges in _edge_blocks(surface, mesh, X, hessian, stiffness):
-        offset = pattern.edge_offset[topo.edge_numbers(edges.ends)]
-        _assemble_edges(edges, offset, space, pattern, data)
+    add_blocks(elements(surface, X), space, pattern, hessian, stiffness, data)
     return data
 
 
@@ -201,16 +180,49 @@ def _assemble_triangles(
                 _add_pair(space, pattern, v, w, offset, pair, q, triangle_tilt(t, n, i, j), data)
 
 
-@compiled
-def _assemble_edges(
-    edges: EdgeBlocks, offset: Ints, space: MotionSpace, pattern: Pattern, data: Floats
+def add_blocks(
+    forces: Iterable[Elements],
+    space: MotionSpace,
+    pattern: Pattern,
+    hessian: float,
+    stiffness: float,
+    data: Floats,
 ) -> None:
-    for e in range(len(edges.ends)):
-        v, w, t = edges.ends[e, 0], edges.ends[e, 1], vector(edges.t[e])
-        alone, pair = Block(edges.s[e], t, edges.k[e]), Block(-edges.s[e], t, -edges.k[e])
-        _add_diagonal(space, pattern, v, alone, None, data)
-        _add_diagonal(space, pattern, w, alone, None, data)
-        _add_pair(space, pattern, v, w, offset[e], pair, vector(edges.q[e]), None, data)
+    """Add hessian · Bᵀ(∂²E)B + stiffness · BᵀLB to the values ``data`` of the pattern."""
+    for force in forces:
+        if not hessian and force.stiffness is None:
+            continue
+        blocks = hessian * force.hessian()
+        if stiffness and force.stiffness is not None:
+            blocks += stiffness * force.stiffness()[..., None, None] * np.eye(3)
+        _assemble_blocks(np.array(force.vertices, dtype=np.int64), blocks, space, pattern, data)
+
+
+@compiled
+def _assemble_blocks(
+    vertices: Ints, blocks: Floats, space: MotionSpace, pattern: Pattern, data: Floats
+) -> None:
+    dimension, start, indptr = space.dimension, space.start, pattern.indptr
+    for e in range(len(vertices)):
+        for i in range(vertices.shape[1]):
+            for j in range(vertices.shape[1]):
+                v, w, block = vertices[e, i], vertices[e, j], blocks[e, i, j]
+                if v > w or dimension[w] == 0:
+                    continue
+                for r in range(dimension[v]):
+                    at, b = row_place(space, pattern, v, r), vector(space.basis[v, r])
+                    row = (
+                        dot(b, vector(block[:, 0])),
+                        dot(b, vector(block[:, 1])),
+                        dot(b, vector(block[:, 2])),
+                    )
+                    if v != w:
+                        first, last = indptr[start[v] + r], indptr[start[v] + r + 1]
+                        at = first + np.searchsorted(pattern.indices[first:last], start[w])
+                        if at == last or pattern.indices[at] != start[w]:
+                            raise LookupError("two vertices of an element are no pair of the pattern")
+                    for s in range(r if v == w else 0, dimension[w]):
+                        data[at + s] += dot(row, vector(space.basis[w, s]))
 
 
 @compiled

@@ -11,8 +11,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..certificate.quantities import Parameter
 from ..continuation import Direction
-from ..design import Parameter
 from ..surface import Surface
 
 Part = tuple[str, str]  # the kind of a parameter, such as "tension", and the name of what it belongs to

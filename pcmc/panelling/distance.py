@@ -54,11 +54,10 @@ def difference(surface: Surface, other: Surface) -> Floats:
     roof, other_roof = (s.faces[s.roof[s.patch_of_face]] for s in (surface, other))
     if not (len(roof) and len(other_roof)):
         return _away(surface.vertices, other.vertices, other.faces)
-    on_roof = np.zeros(surface.n, dtype=bool)
-    on_roof[roof] = True
+    on_roof = np.isin(np.arange(surface.n), roof)
     away = np.empty(surface.n)
-    away[on_roof] = _away(surface.vertices[on_roof], other.vertices, other_roof)  # a wall may be nearer
-    away[~on_roof] = _away(surface.vertices[~on_roof], other.vertices, other.faces)
+    for chosen, faces in ((on_roof, other_roof), (~on_roof, other.faces)):  # a wall may be nearer to the roof
+        away[chosen] = _away(surface.vertices[chosen], other.vertices, faces)
     return away
 
 

@@ -1,8 +1,7 @@
 """Families of congruent triangles: as few as possible, each within a tolerance.
 
-Edge lengths are points of space, one per triangle. Triangles whose lengths, edge by edge, differ by at most
-the tolerance are those whose points lie in one cube with sides of that length. So families are a cover of
-the points by cubes, and few families are a cover by few cubes.
+The edge lengths of a triangle are a point of space. Triangles whose lengths differ by at most the tolerance
+are those whose points lie in one cube with sides of that length: families are a cover of points by cubes.
 """
 
 from __future__ import annotations
@@ -86,8 +85,8 @@ def family_of_face(surface: Surface) -> Floats:
 def _cover(points: Floats, tolerance: float, at_least: int) -> tuple[Ints, Ints]:
     """The family (m,) of each triangle, and its turn (m,), from points (m,w,3) in canonical order.
 
-    The best of several greedy covers, swept along different axes, is improved by search: families around a
-    random one are dissolved and covered anew, along another axis, which is kept if there are no more of them.
+    The best of several greedy covers is improved by search: families around a random one are dissolved and
+    covered anew, along another axis, which is kept if there are no more of them.
     """
     count, turns, _ = points.shape
     axes = (0, 1, 2) if turns == 1 else (0,)  # turning makes the axes alike

@@ -95,8 +95,6 @@ def fewer_families(
     rounds : the most that are made. It ends earlier where no way to join families helps.
     callback : called after each round with its number and the number of families so far.
 
-    Examples
-    --------
     >>> from generators import two_squares
     >>> from pcmc.solvers import solve
     >>> result = fewer_families(solve(two_squares(4, alpha_aux=1.0)).surface, 0.02, change=0.05)
@@ -226,9 +224,8 @@ class _Search:
         frame, damping = np.zeros_like(basis), np.full((*dimension.shape, 3), STIFF)
         sheet, curve = free & (dimension == 1), free & (dimension == 2)
         frame[sheet, 0], frame[sheet, 1] = perpendicular(basis[sheet, 0])
-        damping[sheet, :2] = DAMPING
         frame[curve, 0] = np.cross(basis[curve, 0], basis[curve, 1])
-        damping[curve, 0] = DAMPING
+        damping[sheet, :2] = damping[curve, :1] = DAMPING
         if not self.at_rest:
             frame[sheet, 2] = basis[sheet, 0]
             frame[curve, 1:] = basis[curve, :2]

@@ -14,12 +14,12 @@ SPACE, ROUNDING = 6.0, 1e-9  # mm: between panels; of their places
 TURNS = np.radians(np.arange(180.0))  # in which a panel is tried that does not fit as it lies
 
 
-def unfolded(P: Floats) -> Floats:
+def laid_flat(P: Floats) -> Floats:
     """(m,3,2) triangles with corners P (m,3,3) laid flat, their outside up: congruent, length.
 
     The longest edge lies on the x axis and starts at the origin; the third corner is above it.
 
-    >>> unfolded(np.array([[[0, 0, 1], [0, 0, 5], [0, 3, 1.0]]])).round(12).tolist()
+    >>> laid_flat(np.array([[[0, 0, 1], [0, 0, 5], [0, 3, 1.0]]])).round(12).tolist()
     [[[3.2, 2.4], [0.0, 0.0], [5.0, 0.0]]]
     """
     edges = edge_vectors(P)
@@ -138,8 +138,7 @@ def turned_to_fit(corners: Floats, wide: float, high: float) -> Floats | None:
     if (np.ptp(corners, axis=0) <= np.array([wide, high]) + ROUNDING).all():
         return corners
     cosine, sine = np.cos(TURNS), np.sin(TURNS)
-    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
-    turned = corners @ turn.transpose(0, 2, 1)
+    turned = corners @ np.array([[cosine, sine], [-sine, cosine]]).transpose(2, 0, 1)
     sizes = np.ptp(turned, axis=1)
     fit = np.flatnonzero((sizes <= np.array([wide, high]) + ROUNDING).all(axis=1))
     return turned[fit[sizes[fit, 1].argmin()]] if len(fit) else None

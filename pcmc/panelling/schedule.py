@@ -15,7 +15,7 @@ from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from .families import families
-from .flat import joints, unfolded
+from .flat import joints, laid_flat
 
 MIRROR_IMAGES = ("alike", "apart")
 SHOWN = 12  # families that ``print`` shows
@@ -30,10 +30,9 @@ class Panels:
 
     Attributes
     ----------
-    surface : the surface.
+    surface, certificate : the surface and its certificate.
     tolerance : corresponding edges of every two panels of a family differ in length by at most this.
     mirror_images : "alike", one family holds a panel and its mirror image; or "apart".
-    certificate : of the surface.
     families : a row per family: its number ``family``; ``count``, the number of its panels; ``mirrored``, how
         many are mirror images of the others, turned over; ``a``, ``b``, ``c``, the middle of the range of
         each edge's length, ascending; ``spread``, the largest difference of corresponding edges; ``area`` of
@@ -144,8 +143,6 @@ def panels(
     ------
     SurfaceError : the surface is not certified, or has no panels; the certificate is another surface's.
 
-    Examples
-    --------
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
@@ -168,17 +165,8 @@ def panels(
     lengths = np.linalg.norm(edge_vectors(corners), axis=2)
     parts = families(lengths, tolerance, mirror_images == "apart")
     table = _panel_table(surface, faces, lengths, parts.family, parts.order)
-    return Panels(
-        surface=surface,
-        tolerance=tolerance,
-        mirror_images=mirror_images,
-        certificate=certificate,
-        families=_family_table(table),
-        panels=table,
-        edges=_edge_table(surface, faces),
-        flat=unfolded(corners),
-        at_least=parts.at_least,
-    )
+    tables = _family_table(table), table, _edge_table(surface, faces)
+    return Panels(surface, tolerance, mirror_images, certificate, *tables, laid_flat(corners), parts.at_least)
 
 
 def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints) -> pd.DataFrame:
@@ -218,16 +206,11 @@ def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:
     pairs = joints(surface.vertices, surface.faces[faces], topo.edge_of_face[faces])
     edge = pairs["edge"].to_numpy()
     junction, boundary = (topo.junction_edge | topo.seam_edge)[edge], topo.boundary_edge[edge]
-    return pd.DataFrame(
-        {
-            "edge": edge,
-            "kind": np.where(junction, "junction", np.where(boundary, "boundary", "inside")),
-            "length": segment_lengths(surface.vertices, topo.edges[edge]),
-            "panel": pairs["first"] + 1,
-            "neighbour": pairs["second"] + 1,
-            "dihedral": pairs["dihedral"],
-        }
+    table = pairs[["edge"]].assign(
+        kind=np.where(junction, "junction", np.where(boundary, "boundary", "inside")),
+        length=segment_lengths(surface.vertices, topo.edges[edge]),
     )
+    return table.assign(panel=pairs["first"] + 1, neighbour=pairs["second"] + 1, dihedral=pairs["dihedral"])
 
 
 def _described(panel: pd.Series) -> str:

@@ -24,12 +24,10 @@ from ..surface import Surface, expect_surface
 from . import tables
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .words import ERROR_BARS, LEGEND, about_forces, panel_text, verdict_sentences
+from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-    from ..certificate.theorem import Theorem
-    from ..margins import Margin
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -49,17 +47,15 @@ class RoofReport:
     date: str = ""  # in their foot
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
-    theorem: Theorem | None = None
+    theorem: Statement | None = None
     targets: pd.DataFrame | None = None
-    margins: Sequence[Margin] = ()
+    margins: Sequence[Statement] = ()
     files: Mapping[str, str] = field(default_factory=dict)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the report as a PDF file; the same report gives the same bytes.
 
-        Raises
-        ------
-        FileError : for another suffix than .pdf, or a file that cannot be written.
+        FileError for another suffix than .pdf, or a file that cannot be written.
         """
         path = check_suffix(path)
         content = self.pdf()
@@ -98,14 +94,13 @@ class RoofReport:
         yield about_forces(units)
         if self.targets is not None:
             yield tables.target_table(self.targets, units)
-        yield tables.patch_table(surface, certificate, units)
+        yield tables.table_of_patches(surface, certificate, units)
         yield from tables.line_tables(certificate, units)
         yield from tables.cable_tables(certificate, units)
         if self.mesh_check is not None:
-            sentences = (self.mesh_check.verdict.value, self.mesh_check.detail, self.mesh_check.advice)
-            text = "; ".join(filter(None, sentences))
+            parts = (self.mesh_check.verdict.value, self.mesh_check.detail, self.mesh_check.advice)
             yield Heading("Mesh check")
-            yield f"{text[:1].upper()}{text[1:]}. {ERROR_BARS}"
+            yield f"{sentence('; '.join(filter(None, parts)))} {ERROR_BARS}"
             yield tables.mesh_table(self.mesh_check, units)
         elif self.mesh_failure:
             yield Heading("Mesh check")
@@ -143,8 +138,7 @@ def roof_report(
     certificate, schedule, figures : of the surface, where they are known; otherwise computed.
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
-        of a ``Design``; ``margins``, how far the roof is from the edge, a sentence each; ``files``, the name
-        of each file that belongs to the roof, and what it is.
+        of a ``Design``; ``margins``, a sentence each; ``files``, the name of each file and what it is.
 
     Raises
     ------
@@ -152,8 +146,6 @@ def roof_report(
     OptionError : the unit of length is missing; the tolerance is not above 0.
     MissingExtra : reportlab or matplotlib is not installed.
 
-    Examples
-    --------
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 from xml.sax.saxutils import escape
 
 from reportlab.lib.colors import HexColor
@@ -18,30 +18,27 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import Flowable, Image, KeepTogether, PageBreak, Paragraph, SimpleDocTemplate
 from reportlab.platypus import Table as Grid
 
-from ..drawings.pdf import BOLD, FONT, paint
+from ..drawings.pdf import BOLD, FONT, paint_sheet
 from .plan import PaperPlan
 from .tables import Block, Heading, Table
 
 INK, GREY, RED = "#202020", "#707070", "#C00000"
 SIDE, TOP, BOTTOM = 18.0 * mm, 20.0 * mm, 17.0 * mm  # margins of a page
 WIDTH = A4[0] - 2.0 * SIDE  # between the margins
-TEXT, CELL = 9.0, 7.5  # points
+CELL = 7.5  # points: letters of a table
 TALLEST = 118.0 * mm  # height of a picture at most
 
 
-class _Look(NamedTuple):
-    """How a paragraph looks: font, size, points before and after it, to the right, with what follows."""
-
-    font: str = FONT
-    size: float = TEXT
-    before: float = 0.0
-    after: float = 0.0
-    right: bool = False
-    keep: bool = False
+@cache
+def _style(font: str, size: float, right: bool = False, **more: Any) -> Any:
+    """How a paragraph looks; ``more`` are reportlab's names."""
+    look = {"fontName": font, "fontSize": size, "leading": 1.3 * size, "textColor": HexColor(INK)}
+    return ParagraphStyle("", **look, alignment=TA_RIGHT if right else TA_LEFT, **more)
 
 
-HEADING = _Look(BOLD, 12.0, 10.0, 4.0, keep=True)
-TITLE = _Look(BOLD, 9.5, 6.0, 2.0, keep=True)
+HEADING = _style(BOLD, 12.0, spaceBefore=10.0, spaceAfter=4.0, keepWithNext=True)
+TITLE = _style(BOLD, 9.5, spaceBefore=6.0, spaceAfter=2.0, keepWithNext=True)
+TEXT = _style(FONT, 9.0, spaceBefore=2.0, spaceAfter=2.0)
 
 
 def pdf(blocks: Sequence[Block], title: str, foot: str, mark: str) -> bytes:
@@ -98,7 +95,7 @@ def _flowables(block: Block) -> list[Any]:
     if isinstance(block, Heading):
         return [*([PageBreak()] if block.new_page else []), _paragraph(block.text, HEADING)]
     if isinstance(block, str):
-        return [_paragraph(block, _Look(before=2.0, after=2.0))]
+        return [_paragraph(block, TEXT)]
     if isinstance(block, PaperPlan):
         return [_Plan(block)]
     title = [_paragraph(block.title, TITLE)] if block.title else []
@@ -123,7 +120,7 @@ class _Plan(Flowable):
         return self.plan.size[0] * mm, self.plan.size[1] * mm
 
     def draw(self) -> None:
-        paint(self.canv, self.plan.lines, self.plan.texts, boxed=True)
+        paint_sheet(self.canv, self.plan.lines, self.plan.texts, boxed=True)
 
 
 def _grid(table: Table) -> Any:
@@ -136,11 +133,8 @@ def _grid(table: Table) -> Any:
         widths = _widths(rows, size)
     cells = []
     for k, row in enumerate(rows):
-        head = headed and not k
-        looks = [
-            _Look(BOLD if head else FONT, size, right=headed and j >= table.words) for j in range(len(row))
-        ]
-        cells.append([_paragraph(*cell) for cell in zip(row, looks, strict=True)])
+        styles = [_style(BOLD if headed and not k else FONT, size, right) for right in (False, headed)]
+        cells.append([_paragraph(text, styles[j >= table.words]) for j, text in enumerate(row)])
     everywhere = (0, 0), (-1, -1)
     look = [("VALIGN", *everywhere, "TOP"), ("LINEBELOW", *everywhere, 0.25, HexColor("#D8D8D8"))]
     look += [(f"{side}PADDING", *everywhere, 2.0) for side in ("TOP", "BOTTOM")]
@@ -163,21 +157,5 @@ def _widths(rows: Sequence[Sequence[str]], size: float) -> list[float]:
     return [min(width + 10.0, 60.0 * mm) for width in columns]
 
 
-def _paragraph(text: str, look: _Look) -> Any:
-    return Paragraph(escape(text), _style(look))
-
-
-@cache
-def _style(look: _Look) -> Any:
-    return ParagraphStyle(
-        "",
-        fontName=look.font,
-        fontSize=look.size,
-        leading=1.3 * look.size,
-        textColor=HexColor(INK),
-        spaceBefore=look.before,
-        spaceAfter=look.after,
-        keepWithNext=look.keep,
-        alignment=TA_RIGHT if look.right else TA_LEFT,
-        splitLongWords=True,
-    )
+def _paragraph(text: str, style: Any) -> Any:
+    return Paragraph(escape(text), style)

@@ -30,11 +30,9 @@ class PaperPlan:
 def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> PaperPlan:
     """Panels, ridges, rims, bottoms of walls and cables from above, with the numbers of the tables.
 
-    Raises
-    ------
-    OptionError : the plan does not fit a page at the smallest usual scale.
+    OptionError if it does not fit a page at the smallest usual scale.
     """
-    view = views.plan(surface, views.model_curves(surface), ())
+    view = views.plan_view(surface, views.model_curves(surface), ())
     sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None)
     panels = [line for line in sheet.lines if line.layer == "PCMC-PANEL"]
     edges = [float(np.linalg.norm(line.points[1] - line.points[0])) for line in panels]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -47,6 +47,7 @@ class Table(NamedTuple):
     words: int = 1
 
 
+Columns = dict[str, Iterable[Any]]
 Block = str | Heading | Picture | Table | PaperPlan
 """What the pages of a report are made of; a text alone is a paragraph."""
 
@@ -96,126 +97,117 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
     return Table("Key figures", [], rows)
 
 
-def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
+def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
     pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]
     columns = _numbers(table, ["tension"], units.tension) | _numbers(table, pressures, units.pressure)
-    columns |= _numbers(table, ["area"], units.area) | _numbers(
-        table, ["mean curvature"], f"1/{units.length}"
-    )
-    columns["its largest error"] = [small(x) for x in table["variational_max"].tolist()]
+    columns |= _numbers(table, ["area"], units.area)
+    columns |= _numbers(table, ["mean curvature"], f"1/{units.length}")
+    columns["its largest error"] = map(small, table["variational_max"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
-    kind = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
-    words = [[name, what] for name, what in zip(table["patch"], kind, strict=True)]
-    return _table("Patches", ["patch", "kind"], words, columns)
+    kinds = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
+    return _table("Patches", {"patch": table["patch"], "kind": kinds}, columns)
 
 
 def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     """Junctions and supports with their reactions, numbered as in the plan, and how far walls lean."""
     table, force = certificate.junctions, units.force or "force"
     if len(table):
-        words = [[f"J{k}", name] for k, name in enumerate(table["junction"], start=1)]
+        words: Columns = {"": [f"J{k + 1}" for k in range(len(table))], "between": table["junction"]}
         columns = _numbers(table, ["length", *MIDDLE], units.length)
-        columns[f"force left, {units.tension}"] = [small(x) for x in table["force_left"].tolist()]
-        yield _table("Junctions", ["", "between"], words, columns)
+        columns[f"force left, {units.tension}"] = map(small, table["force_left"])
+        yield _table("Junctions", words, columns)
     table = certificate.leaning
     if len(table):
-        columns = {
-            "lean, °": [f"{lean:.1f}" for lean in table["lean"]],
-            **_numbers(table, "xyz", units.length),
-        }
-        words = [[wall] for wall in table["wall"]]
-        yield _table("Walls: the largest angle from the vertical", ["wall"], words, columns)
+        leans: Columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
+        columns = leans | _numbers(table, "xyz", units.length)
+        yield _table("Walls: the largest angle from the vertical", {"wall": table["wall"]}, columns)
     table = certificate.supports
     if len(table):
-        words = table[["support", "name", "kind"]].to_numpy(str).tolist()
-        words = [[label, "" if name == label else name, kind] for label, name, kind in words]
+        own = table["name"].where(table["name"] != table["support"], "")
         columns = _numbers(table, "xyz", units.length)
         columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
         columns |= _vectors(table, "force", "R", force)
         columns[f"largest, {units.tension}"] = column(table["per_length_max"])
-        yield _table("Supports and their reactions", ["", "of", "kind"], words, columns)
+        words = {"": table["support"], "of": own, "kind": table["kind"]}
+        yield _table("Supports and their reactions", words, columns)
         balance = certificate.balance
         columns = _vectors(balance, "force", "F", force)
         columns |= _vectors(balance, "moment", "M", f"{force}·{units.length}")
-        yield _table("Balance", [""], [[part] for part in balance["of"]], columns)
+        yield _table("Balance", {"": balance["of"]}, columns)
 
 
 def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     """The cables with their forces, what holds their ends, and the rooms of prescribed volume."""
     table, force = certificate.cables, units.force or "force"
     if len(table):
-        columns = {f"force, {force}": column(table["tension"])}
+        columns: Columns = {f"force, {force}": column(table["tension"])}
         columns |= _numbers(table, ["length", *MIDDLE], units.length)
-        yield _table("Cables", ["cable"], [[name] for name in table["cable"]], columns)
+        yield _table("Cables", {"cable": table["cable"]}, columns)
     table = certificate.cable_ends
     if len(table):
-        held = ["held" if held else "free" for held in table["held"]]
-        words = [[name, end] for name, end in zip(table["cable"], held, strict=True)]
+        words: Columns = {
+            "cable": table["cable"],
+            "end": ["held" if held else "free" for held in table["held"]],
+        }
         columns = _numbers(table, "xyz", units.length) | _vectors(table, "force", "F", force)
-        yield _table("Ends of cables, and the forces on them", ["cable", "end"], words, columns)
+        yield _table("Ends of cables, and the forces on them", words, columns)
     table = certificate.rooms
     if len(table):
         columns = _numbers(table, ["volume", "prescribed"], units.volume)
         columns |= _numbers(table, ["pressure"], units.pressure)
-        yield _table("Rooms of prescribed volume", ["room"], [[name] for name in table["room"]], columns)
+        yield _table("Rooms of prescribed volume", {"room": table["room"]}, columns)
 
 
 def target_table(targets: pd.DataFrame, units: Units) -> Table:
     """What was wanted, and what is reached."""
-    words = [[str(name)] for name in targets.index]
-    columns = {
-        "wanted": [one(x) for x in targets["wanted"].tolist()],
-        "reached": [one(x) for x in targets["value"].tolist()],
+    columns: Columns = {
+        "wanted": map(one, targets["wanted"]),
+        "reached": map(one, targets["value"]),
         "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
         "met": ["yes" if met else "no" for met in targets["met"]],
     }
-    return _table("Targets", ["quantity"], words, columns)
+    return _table("Targets", {"quantity": targets.index}, columns)
 
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
     table = check.table
-    words = [[quantity, of] for quantity, of in zip(table["quantity"], table["of"], strict=True)]
-    kinds = map(dimension_of, table["quantity"])
-    columns = {
-        "on this mesh": [one(x) for x in table["value"].tolist()],
-        "error bar": [_bar(x) for x in table["error"].tolist()],
-        "limit": [one(x) for x in table["limit"].tolist()],
-        "its error bar": [_bar(x) for x in table["limit_error"].tolist()],
-        "unit": [units.behind(kind).strip() for kind in kinds],
+    columns: Columns = {
+        "on this mesh": map(one, table["value"]),
+        "error bar": map(_bar, table["error"]),
+        "limit": map(one, table["limit"]),
+        "its error bar": map(_bar, table["limit_error"]),
+        "unit": [units.behind(dimension_of(quantity)).strip() for quantity in table["quantity"]],
     }
-    return _table("", ["quantity", "of"], words, columns)
+    return _table("", {"quantity": table["quantity"], "of": table["of"]}, columns)
 
 
 def family_table(schedule: Panels, units: Units) -> Table:
     """The first families of panels, the largest first."""
     table = schedule.families.head(MOST_FAMILIES)
-    columns = {
-        "panels": [str(count) for count in table["count"]],
-        "turned over": [str(count) for count in table["mirrored"]],
-        **_numbers(table, "abc", units.length),
-        **_numbers(table, ["area"], units.area),
-    }
-    return _table("", ["family"], [[f"F{k}"] for k in table["family"]], columns)
+    columns: Columns = {"panels": table["count"], "turned over": table["mirrored"]}
+    columns |= _numbers(table, "abc", units.length) | _numbers(table, ["area"], units.area)
+    return _table("", {"family": [f"F{k}" for k in table["family"]]}, columns)
 
 
-def _table(title: str, head: list[str], words: list[list[str]], columns: dict[str, list[str]]) -> Table:
-    rows = [[*start, *rest] for start, rest in zip(words, zip(*columns.values(), strict=True), strict=True)]
-    return Table(title, [*head, *columns], rows, len(head))
+def _table(title: str, words: Columns, columns: Columns) -> Table:
+    """A table of columns of texts, those of ``words`` first."""
+    every = words | columns
+    return Table(title, [*every], [[*map(str, row)] for row in zip(*every.values(), strict=True)], len(words))
 
 
-def _vectors(table: pd.DataFrame, kind: str, letter: str, unit: str) -> dict[str, list[str]]:
+def _vectors(table: pd.DataFrame, kind: str, letter: str, unit: str) -> Columns:
     """Columns of vectors, with the decimals of their largest component."""
     numbers = table[[f"{kind}_{axis}" for axis in "xyz"]].to_numpy(float)
     texts = np.array(column(numbers.ravel())).reshape(-1, 3).T
     return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
-def _numbers(table: pd.DataFrame, keys: Iterable[str], unit: str) -> dict[str, list[str]]:
+def _numbers(table: pd.DataFrame, keys: Iterable[str], unit: str) -> Columns:
     return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key in keys}
 
 
@@ -228,6 +220,5 @@ def small(value: float) -> str:
 
 def _bar(value: float) -> str:
     """An error bar, to two digits; nothing for one without bound, and "given" where the value is given."""
-    if value == 0.0:
-        return "given"
-    return f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"
+    text = f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"
+    return text if value else "given"

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
-from ..certificate.balance import balance_sentence
+from ..certificate.supports import balance_sentence
 from ..panelling import Panels
 from .tables import MOST_FAMILIES, one, small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-    from ..certificate.theorem import Theorem
+
+
+class Statement(Protocol):
+    """A theorem, a margin: what is said about a roof in one sentence."""
+
+    def text(self, units: Units) -> str:
+        """The sentence."""
+
 
 VERDICTS = {
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
@@ -43,7 +50,7 @@ ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes
 def verdict_sentences(
     certificate: Certificate,
     check: MeshCheck | None = None,
-    theorem: Theorem | None = None,
+    theorem: Statement | None = None,
     units: Units = NO_UNITS,
 ) -> list[str]:
     """The verdict, its reason, and how exactly the roof keeps what it promises.
@@ -67,13 +74,11 @@ def verdict_sentences(
         share = f"{100.0 * certificate.load_ratio:.0f} %"
         sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
     if len(certificate.supports):
-        balance = balance_sentence(certificate.balance, certificate.symmetric_in)
-        sentences.append(f"{balance[:1].upper()}{balance[1:]}.")
+        sentences.append(sentence(balance_sentence(certificate.balance, certificate.symmetric_in)))
     if check is not None:
         sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
     if theorem is not None:
-        words = theorem.text(units)
-        sentences.append(f"{words[:1].upper()}{words[1:]}.")
+        sentences.append(sentence(theorem.text(units)))
     if certificate.symmetric_in:
         planes = ", ".join(certificate.symmetric_in)
         sentences.append(
@@ -83,6 +88,11 @@ def verdict_sentences(
     if len(certificate.pinched):
         sentences.append(f"The ridge rests on the plane at {len(certificate.pinched)} vertices.")
     return sentences
+
+
+def sentence(text: str) -> str:
+    """A text with a capital and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def about_forces(units: Units) -> str:

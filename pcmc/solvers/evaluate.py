@@ -9,16 +9,14 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
+from ..base.tolerances import FORCE_ROUNDING
 from ..forces import triangles
-from ..forces.flat_pieces import add_plane_forces, add_plane_volumes, flat_pieces
-from ..forces.functional import add_cables_and_weights, total
+from ..forces.functional import add_forces, elements, total
 from ..forces.motion_space import tension_forces
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, bounding_size, dot, point, scaled, vector
 from .result import Status
-
-ROUNDING = 1e-14  # of the triangles' forces: what is left of them to rounding where they cancel
 
 
 class Point(NamedTuple):
@@ -39,7 +37,7 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
     """‖∇E‖² up to which a run from a surface has converged, force²; 0 for none.
 
     The tolerance, times F² where the norm F of the single triangles' forces at the start is below 1, or a
-    small surface would be at rest in any shape; at least (ROUNDING · F)², which rounding leaves.
+    small surface would be at rest in any shape; at least (FORCE_ROUNDING · F)², which rounding leaves.
 
     >>> from pcmc import Patch, Surface
     >>> corners, faces = [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]]
@@ -50,14 +48,11 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
     if not tolerance:
         return 0.0
     forces = tension_forces(surface)
-    return max(tolerance * min(1.0, forces) ** 2, (ROUNDING * forces) ** 2)
+    return max(tolerance * min(1.0, forces) ** 2, (FORCE_ROUNDING * forces) ** 2)
 
 
 class Evaluator:
     """E and ∇E of ``surface`` with its vertices at other positions; ``count`` is the number of calls.
-
-    A run has converged at ``tolerance`` (see ``converged_below``), and diverged where the bounding box is
-    more than ``inflation`` times that of the surface.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
@@ -76,8 +71,7 @@ class Evaluator:
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
-        self._pieces = bool(flat_pieces(surface))
-        self._pulled = bool(surface.cables) or bool(surface.weights.any())
+        self._more = surface.heavy or any(True for _ in elements(surface, surface.vertices))
         self._single = len(blocks(surface.m, threads())) == 1
 
     def ending(self, point: Point) -> Status | None:
@@ -97,10 +91,7 @@ class Evaluator:
             triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), area, volume, G)
         else:
             area, volume, G = triangles.measure(self._mesh, X)
-        if self._pieces:
-            add_plane_volumes(self._surface, X, volume)
-            add_plane_forces(self._surface, pressure, X, G)
-        further = add_cables_and_weights(self._surface, X, G) if self._pulled else 0.0
+        further = add_forces(self._surface, X, G) if self._more else 0.0
         for plane, mask in self._others:
             G[mask] = plane.along(G[mask])
         squared = _apply_supports(G, *self._supports)

@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.checks import LARGEST, SMALLEST
-from ..surface.geometry import area_vectors, face_areas, vertex_sums
+from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 
 GRAVITY = 9.81  # m/s²
 
@@ -36,7 +36,7 @@ class SelfWeight:
     def __post_init__(self) -> None:
         if self.gravity is not None:
             gravity = validate.number("SelfWeight.gravity", self.gravity, least=SMALLEST, most=LARGEST)
-            object.__setattr__(self, "gravity", gravity)
+            vars(self)["gravity"] = gravity
         _check_name(self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
@@ -56,10 +56,9 @@ class Snow:
 
     def __post_init__(self) -> None:
         load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
-        object.__setattr__(self, "load", load)
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
-        object.__setattr__(self, "patches", tuple(self.patches))
+        vars(self).update(load=load, patches=tuple(self.patches))
         _check_name(self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
@@ -131,6 +130,9 @@ def load_steps(
     per_face = surface.weights[surface.patch_of_face] * face_areas(surface.vertices[surface.faces])
     downwards = -np.array(surface.plane.normal) / 3.0
     weight = vertex_sums(per_face[:, None] * downwards, surface.faces, surface.n)
+    ends, _, per_length = surface.cable_edges
+    per_edge = 1.5 * per_length * segment_lengths(surface.vertices, ends)
+    np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
     permanent = Step(name, surface.net_pressures, weight)
     steps = [permanent]

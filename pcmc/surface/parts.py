@@ -95,13 +95,16 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class Cable:
-    """A curve of edges with one line tension: E gains τ · length.
+    """A curve of edges with one line tension and weight: E gains τ · length + g · ∫ z ds.
 
     Parameters
     ----------
     name : unique in its surface; 1 to 100 printable characters, no blank at either end.
     tension : τ ≥ 0, force. A free edge of a flat membrane with tension α is at rest on arcs of radius τ/α.
     edges : (k,2) int, the vertices that each edge joins, in any order.
+    weight : g, force per length of the cable, against Π's normal, as of a heavy rope, a gutter or a row of
+        lamps; negative for a lift. The cable then pulls with τ + g z at the height z over Π, as a hanging
+        rope does: τ is its tension at Π.
 
     >>> Cable("east", 2.0, [[4, 3], [4, 5]]).edges.tolist()
     [[3, 4], [4, 5]]
@@ -110,13 +113,17 @@ class Cable:
     name: str
     tension: float
     edges: Ints
+    weight: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", checked_name("Cable.name", self.name, error=SurfaceError))
-        number = validate.number(
-            "tension", self.tension, least=0.0, most=checks.LARGEST, where=self.name, error=SurfaceError
-        )
-        object.__setattr__(self, "tension", number)
+        for key, least in (("tension", 0.0), ("weight", -checks.LARGEST)):
+            value, most = getattr(self, key), checks.LARGEST
+            number = validate.number(key, value, least=least, most=most, where=self.name, error=SurfaceError)
+            object.__setattr__(self, key, number)
+        if self.tension == 0.0 and self.weight != 0.0:
+            hint = "a cable that weighs something must pull; give it a tension"
+            validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
         edges = checks.edge_array(self.edges, f"cable {self.name!r}")
         object.__setattr__(self, "edges", read_only(edges))
 
@@ -155,10 +162,11 @@ class Cable:
 
 
 class CableEdges(NamedTuple):
-    """The edges of a surface that pull: ``ends`` (c,2) int, and the ``tension`` (c,) of each, force."""
+    """The edges of a surface that pull, with the tension and weight of each."""
 
-    ends: Ints
-    tension: Floats
+    ends: Ints  # (c,2)
+    tension: Floats  # (c,) force
+    weight: Floats  # (c,) force/length
 
 
 def cable_edges(cables: Sequence[Cable]) -> CableEdges:
@@ -169,8 +177,9 @@ def cable_edges(cables: Sequence[Cable]) -> CableEdges:
     """
     pulling = [cable for cable in cables if cable.tension > 0.0]
     ends = np.concatenate([np.empty((0, 2), dtype=np.int32), *(cable.edges for cable in pulling)])
-    tension = np.repeat([cable.tension for cable in pulling], [len(cable.edges) for cable in pulling])
-    return CableEdges(read_only(ends), read_only(tension.astype(float)))
+    laws = np.array([[cable.tension, cable.weight] for cable in pulling]).reshape(-1, 2).T
+    counts = [len(cable.edges) for cable in pulling]
+    return CableEdges(read_only(ends), *(read_only(np.repeat(law, counts)) for law in laws))
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,10 @@ def summary(surface: Any) -> str:
     parts = {
         "patches": patches[False],
         "walls": patches[True],
-        "cables": [f"{cable.name} (tension {cable.tension:g})" for cable in surface.cables],
+        "cables": [
+            f"{cable.name} (tension {cable.tension:g}{f', weight {cable.weight:g}' * bool(cable.weight)})"
+            for cable in surface.cables
+        ],
         "rooms": [f"{room.name} (volume {room.volume:g})" for room in surface.rooms],
         "planes": [str(plane) for plane, _ in surface.on_planes],
     }

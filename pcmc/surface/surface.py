@@ -12,11 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
+from ..base.arrays import Bools, Floats, Ints, cached_array, hand_over, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
+from ..base.tolerances import FAR
 from . import checks, supports
 from .checked import checked_parts
-from .geometry import FAR, bounding_size
+from .geometry import bounding_size
 from .guides import Guide, Plane
 from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
@@ -209,6 +210,11 @@ class Surface(supports.Supported):
     weights = _of_patches("weight")  # (k,) w, force/area
 
     @cached_property
+    def heavy(self) -> bool:
+        """Whether a patch or a cable has a weight."""
+        return bool(self.weights.any() or self.cable_edges.weight.any())
+
+    @cached_property
     def cable_edges(self) -> CableEdges:
         """The edges that carry a line tension, and how much."""
         return cable_edges(self.cables)
@@ -395,6 +401,6 @@ class Surface(supports.Supported):
             other.__dict__[name] = changes.get(name, getattr(self, name))
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin
-            if "flat_pieces" in vars(self) and "faces" not in changes:
-                vars(other)["flat_pieces"] = vars(self)["flat_pieces"]
+            if "faces" not in changes:
+                hand_over(self, other, "flat_pieces")
         return other

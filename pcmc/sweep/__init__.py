@@ -1,7 +1,7 @@
 """Sweeps: run a function over a grid of parameters, resumable, on any executor, one row per case.
 
 Gives ``Sweep`` (grid.py), ``run`` (running.py), the store (store.py) and its tables. Workers (workers.py) run
-each case in a process of its own (case_process.py, case_script.py). May import project and all rooms below.
+each case in a process of its own (case_script.py). May import project and all rooms below.
 
 >>> import pcmc.sweep
 >>> halves = pcmc.sweep.Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2]}, {"under": 2})
@@ -15,17 +15,5 @@ from .solving import solve_case
 from .store import Record, read_store
 from .tables import draw_sweep, provenance, short_table, table, write_table
 
-__all__ = [
-    "Progress",
-    "Record",
-    "Sweep",
-    "checked",
-    "draw_sweep",
-    "provenance",
-    "read_store",
-    "run",
-    "short_table",
-    "solve_case",
-    "table",
-    "write_table",
-]
+__all__ = ["Progress", "Record", "Sweep", "checked", "draw_sweep", "provenance", "read_store", "run"]
+__all__ += ["short_table", "solve_case", "table", "write_table"]

@@ -1,8 +1,5 @@
-"""The part of a case process that runs cases.
-
-``case_process`` loads this file by its path. It imports the standard library alone, so that a process starts
-in some hundredths of a second.
-"""
+"""What runs cases in a case process, which loads this file by its path. It imports the standard library
+alone, so that a process starts in some hundredths of a second."""
 
 from __future__ import annotations
 
@@ -40,9 +37,8 @@ def resolve(case: str) -> Callable[..., Any]:
 
 
 def scalar(value: object) -> bool | int | float | str | None:
-    """The plain Python value of a number, text, truth value or None; a TypeError for anything else.
-
-    Also for values that no file can hold: texts with lone surrogates, integers beyond the range of floats.
+    """The plain Python value of a number, text, truth value or None; a TypeError for anything else, and for
+    what no file can hold: texts with lone surrogates, integers beyond the range of floats.
 
     >>> import numpy as np
     >>> scalar(np.float64(0.1)), scalar(np.int32(3)), scalar(np.bool_(True))
@@ -105,9 +101,8 @@ def load(case: str) -> None:
 
 def run(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
     """Run one case that is loaded; its outcome. The process exits at the time limit."""
-    function = resolve(case)
-    started, begin, extra = datetime.now(UTC), time.perf_counter(), {}
-    process = os.getpid()
+    function, process, extra = resolve(case), os.getpid(), {}
+    started, begin = datetime.now(UTC).isoformat(timespec="milliseconds"), time.perf_counter()
     if time_limit is not None:
         # written in C: it works while compiled code holds the interpreter, and if the parent is dead
         faulthandler.dump_traceback_later(time_limit, exit=True)
@@ -121,12 +116,11 @@ def run(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> d
         if os.getpid() != process:
             os._exit(0)  # this is a fork that the case has made; only the case itself answers
         faulthandler.cancel_dump_traceback_later()
-    fields["wall_time"] = time.perf_counter() - begin
-    about = {"started": started.isoformat(timespec="milliseconds"), **extra, **provenance()}
+    seconds = time.perf_counter() - begin
     if not gc.isenabled():  # the first case has imported the rest
         gc.freeze()
         gc.enable()
-    return {**fields, "provenance": about}
+    return {**fields, "wall_time": seconds, "provenance": {"started": started, **extra, **provenance()}}
 
 
 def postpone(name: str) -> None:
@@ -135,13 +129,11 @@ def postpone(name: str) -> None:
     if package not in sys.modules or name in sys.modules:
         return
     spec = importlib.util.find_spec(name)
-    if spec is None or spec.loader is None:
-        return
-    spec.loader = importlib.util.LazyLoader(spec.loader)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    setattr(sys.modules[package], last, module)
+    if spec is not None and spec.loader is not None:
+        spec.loader = importlib.util.LazyLoader(spec.loader)
+        sys.modules[name] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        setattr(sys.modules[package], last, module)
 
 
 @cache

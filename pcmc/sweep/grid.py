@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.errors import OptionError, unknown
 from .case_script import WORDS, resolve, scalar
 
@@ -58,18 +59,16 @@ class Sweep:
     ) -> None:
         for what, values in (("grid", grid), ("fixed", fixed or {})):
             if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
-                text = f"{what}: expected a dict by parameter names, found {values!r:.60}"
-                raise OptionError(text, what=what, found=values)
+                validate.refuse(what, values, "a dict by parameter names")
         object.__setattr__(self, "case", case if isinstance(case, str) else _path(case))
         object.__setattr__(self, "grid", {name: _axis(name, grid[name]) for name in grid})
-        fixed = {name: _plain(value, name) for name, value in (fixed or {}).items()}
-        object.__setattr__(self, "fixed", fixed)
+        plain = {name: _plain(value, name) for name, value in (fixed or {}).items()}
+        object.__setattr__(self, "fixed", plain)
         if not self.grid:
             raise OptionError("the grid is empty; give at least one parameter a list of values", what="grid")
-        for name in self.grid:
-            if name in fixed:
-                text = f"{name!r} is in the grid and among the fixed; keep one"
-                raise OptionError(text, what="fixed", where=name)
+        for name in self.grid.keys() & plain.keys():
+            text = f"{name!r} is in the grid and among the fixed; keep one"
+            raise OptionError(text, what="fixed", where=name)
         self._check_parameters()
 
     def _check_parameters(self) -> None:
@@ -84,10 +83,9 @@ class Sweep:
             text = f"the case {case!r} is not a function but {function!r:.60}"
             raise OptionError(text, what="case", found=case)
         for name in names:
-            if name == "case" or name in WORDS:
-                raise OptionError(
-                    f"a parameter may not be called {name!r}: a column has that name", what=name
-                )
+            if name in ("case", *WORDS):
+                text = f"a parameter may not be called {name!r}: a column has that name"
+                raise OptionError(text, what=name)
         try:
             taken = inspect.signature(function).parameters
         except (TypeError, ValueError):
@@ -144,10 +142,8 @@ def _path(function: Callable[..., Any]) -> str:
 
 def _axis(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping | Set) or not np.iterable(values):
-        text = (
-            f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs to fixed"
-        )
-        raise OptionError(text, what="grid", where=name, found=values)
+        text = f"grid[{name!r}] must be a list of values, found {values!r:.60}"
+        raise OptionError(f"{text}; a single value belongs to fixed", what="grid", where=name, found=values)
     axis = [_plain(value, f"{name}[{i}]") for i, value in enumerate(values)]
     if not axis:
         raise OptionError(f"grid[{name!r}] is empty; give it at least one value", what="grid", where=name)

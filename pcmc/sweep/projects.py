@@ -14,7 +14,7 @@ from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
-from .solving import mesh_columns, row
+from .solving import case_row, mesh_columns
 from .tables import with_units
 
 
@@ -48,14 +48,12 @@ def project_sweep(
     (3, 'notebooks/roof.toml')
     """
     fixed = dict(fixed or {})
-    if method is not None:
-        find_method(method)
     about: dict[str, Any] = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
     if method is not None:
+        find_method(method)
         about["method"] = method
-    for name, value in {"mesh_check": mesh_check, "search": search}.items():
-        if validate.flag(name, value):
-            about[name] = True
+    flags = {"mesh_check": mesh_check, "search": search}
+    about |= {name: True for name, value in flags.items() if validate.flag(name, value)}
     sweep = Sweep(solve_project, grid, about | fixed)
     projects.check_varied(path, dict(sweep.grid) | {name: [value] for name, value in fixed.items()})
     return sweep
@@ -81,22 +79,13 @@ def solve_project(
 ) -> dict[str, Any]:
     """Build and solve a project, with its remeshing and targets and some of its numbers replaced.
 
-    Parameters
-    ----------
-    project, project_digest : its file, and ``pcmc.project.digest`` of it when the sweep was declared: a case
-        and its store belong to one state of the project.
-    method, mesh_check, search, values : as of ``project_sweep``, and ``pcmc.project.varied``.
+    ``project_digest`` is ``pcmc.project.digest`` of the file when the sweep was declared, as a case and its
+    store belong to one state of the project: FileError if it has changed. The rest as of ``project_sweep``.
 
-    Returns
-    -------
-    dict : as of ``solve_case``, without numbers of a shape that is not at rest; for each name in the
-        project's ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and
-        ``targets_met``, if the project has targets. With mirror planes it is that of the whole roof if the
-        project has ``whole = true``, and otherwise of the part between them; ``extent`` says which.
-
-    Raises
-    ------
-    FileError : the file has changed.
+    Returns numbers as ``solve_case``, but none of a shape that is not at rest; for each name in the
+    project's ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and
+    ``targets_met``, if there are targets. With mirror planes they are those of the whole roof if the project
+    has ``whole = true``, otherwise of the part between them; ``extent`` says which.
     """
     digest = projects.digest(project)
     if digest != project_digest:
@@ -109,7 +98,7 @@ def solve_project(
     outcome = projects.solve_project(replace(design, search=search), start)
     outcome = replace(outcome, project=design, unfold=design.output.whole)
     names = ("project", "project_digest", "method", "mesh_check", "search", *values)
-    answer = row(outcome.solved, names, outcome)
+    answer = case_row(outcome.solved, names, outcome)
     if mesh_check or design.mesh_check:
         answer |= mesh_columns(outcome)
     for what in design.margin if outcome.certificate.index is not None else ():

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any
 from ..base import validate
 from ..base.errors import OptionError, SweepError
 from ..base.interrupts import interrupts_handled, stop_requested
-from .case_process import failed_outcome
 from .grid import Sweep
 from .store import Record, open_store
 from .tables import table
-from .workers import OWN_VERSION, Submit, open_workers
+from .workers import OWN_VERSION, Submit, failed_outcome, open_workers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,10 +51,11 @@ def run(
     on_record: Callable[[Progress], object] | None = None,
     on_resume: Callable[[int, int], object] | None = None,
 ) -> pd.DataFrame:
-    """Run every case of the sweep that its store does not hold yet.
+    """Run every case of the sweep that its store does not hold yet; a row per case (see ``table``).
 
     Each case runs on one thread, in a process of its own. A case that raises, exceeds the time limit or
-    kills its process becomes a row with that status; the others go on.
+    kills its process becomes a row with that status; the others go on. After Ctrl-C the table has the cases
+    stored so far.
 
     Parameters
     ----------
@@ -70,10 +70,6 @@ def run(
     on_record : called with a Progress after each stored case. Raise StopIteration to stop as Ctrl-C does;
         any other exception passes through.
     on_resume : called once, before any case runs, with how many cases the store holds and how many remain.
-
-    Returns
-    -------
-    DataFrame : one row per case (see ``table``); after Ctrl-C only the cases stored so far.
 
     Raises
     ------
@@ -199,12 +195,9 @@ def _batches(
     due, stopped = 0.0, False
     while pending and not stopped:
         batch: list[tuple[Future[dict[str, Any]], int]] = []
-        while pending and not stopped:
-            wait = due - time.monotonic()
-            if batch and wait <= 0.0:
-                break
+        while pending and not stopped and not (batch and time.monotonic() >= due):
             with suppress(Empty):  # on Windows, Ctrl-C arrives only between two waits
-                future = finished.get(timeout=wait if batch else PACE)
+                future = finished.get(timeout=max(due - time.monotonic(), 0.0) if batch else PACE)
                 stopped = future is None
                 if not stopped:
                     batch.append((future, pending.pop(future)))

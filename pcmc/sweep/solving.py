@@ -63,19 +63,17 @@ def solve_case(
     generator : a function that returns a Surface: ``"generators:two_caps"``.
     method, search : as of ``pcmc.solve``; with a search ``message`` has what was tried, and any proof.
     mesh_check : whether to solve each surface at rest on two finer meshes, too (``pcmc.check_mesh``).
-    arguments : parameters of the generator and options of the method. A name that both have is the
-        generator's.
+    arguments : of the generator, and options of the method. A name that both have is the generator's.
 
     Returns
     -------
     dict : ``status`` (the solver's, in small letters), ``verdict`` of the certificate, ``message``;
-        ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the paper's
-        squared sum); the certificate's numbers, those of its tables as ``large.area``, ``junction 0.length``,
-        ``boundary 0.reaction_z``; and, of a surface at rest, the key figures of the roof:
-        ``large.apex``, and ``rise`` of the whole roof. A number with the name of one of the arguments is
-        called ``name_reached``. With ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the
-        height, volume, energy, reaction and lowest eigenvalue ``height_error``, ``height_limit``,
-        ``height_limit_error``, ``height_order`` and so on.
+        ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖²); the
+        certificate's numbers, those of its tables as ``large.area``, ``junction 0.length``,
+        ``boundary 0.reaction_z``; of a surface at rest, the key figures: ``large.apex``, and ``rise`` of the
+        whole roof. A number with the name of one of the arguments is called ``name_reached``. With
+        ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, ``height_error``, ``height_limit``,
+        ``height_limit_error``, ``height_order``, and so on for volume, energy, reaction, lowest eigenvalue.
 
     Raises
     ------
@@ -88,7 +86,7 @@ def solve_case(
     build, shape, solver = _split(generator, method, arguments)
     solve = existence.solve if search else solvers.solve
     result = solve(build(**shape), method, **solver)
-    answer = row(result, arguments)
+    answer = case_row(result, arguments)
     if mesh_check:
         from ..project import Outcome  # takes long to import
 
@@ -96,7 +94,7 @@ def solve_case(
     return answer
 
 
-def row(result: Result, names: Container[str], outcome: Outcome | None = None) -> dict[str, Any]:
+def case_row(result: Result, names: Container[str], outcome: Outcome | None = None) -> dict[str, Any]:
     """The answer of a case: see ``solve_case``. ``names`` are the names of its parameters.
 
     With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between

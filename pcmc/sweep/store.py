@@ -1,12 +1,9 @@
 """The file of a sweep: an SQLite database with one row per finished case.
 
-A row's key is the parameters of its case, so a grid may grow or shrink: only new cases are run, and rows of
-cases that left the grid stay. The journal is SQLite's rollback journal and not a write-ahead log, which
-fails on network drives and keeps two files beside the store. So a store is one file between transactions,
-and a program that is killed or loses power loses only the transaction it was in.
-
-The sweep that runs holds SQLite's write lock all the time: others can read, and a second sweep is refused.
-The lock ends with its process.
+A row's key is the parameters of its case, so a grid may grow or shrink. The journal is SQLite's rollback
+journal: a write-ahead log fails on network drives. So a store is one file between transactions, and a program
+that is killed loses only the transaction it was in. The sweep that runs holds SQLite's write lock, which ends
+with its process: others can read, and a second sweep is refused.
 """
 
 from __future__ import annotations
@@ -23,6 +20,8 @@ from pathlib import Path
 from typing import Any
 from warnings import warn
 
+import numpy as np
+
 from ..base.errors import FileError, FileWarning
 from ..base.files import check_regular, system_error
 from .case_script import WORDS, answer, version
@@ -30,6 +29,7 @@ from .grid import Sweep
 
 FORMAT = 2  # 1 was lines of JSON
 COLUMNS = ["parameters", "record", "crc"]  # of the table of cases
+FIELDS = (*WORDS, "numbers", "wall_time", "provenance")  # of a Record, in the second of them
 SQLITE, LINES = b"SQLite format 3\0", b'{"pcmc sweep"'  # how files of the two formats begin
 READERS = 60.0  # seconds that a commit waits for programs that read the store
 FAILED = ("raised", "timed out", "killed")  # statuses that ``run`` gives; a case gives all others
@@ -70,9 +70,7 @@ class Store:
         new = {record.case: record for record in records}
         rows = []
         for record in new.values():
-            fields = dict(vars(record))
-            del fields["case"]
-            key, text = _key(fields.pop("parameters")), json.dumps(fields)
+            key, text = _key(record.parameters), json.dumps({name: getattr(record, name) for name in FIELDS})
             rows.append((key, text, zlib.crc32((key + text).encode())))  # SQLite has no checksums
         try:
             self.database.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?, ?)", rows)
@@ -89,10 +87,7 @@ class Store:
 def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
     """Open the store of ``sweep`` for writing; make the file if it is missing.
 
-    Raises
-    ------
-    FileError : the file is no store, belongs to another sweep or another version of pcmc, is in use, or
-        cannot be opened.
+    FileError if it is no store, of another sweep or another version of pcmc, in use, or cannot be opened.
     """
     path = Path(path)
     declared = {"case": sweep.case, "grid": dict(sweep.grid), "fixed": dict(sweep.fixed)}
@@ -112,10 +107,9 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
 
 
 def read_store(path: str | os.PathLike[str]) -> list[Record]:
-    """The records of a store, in the order of the grid; a sweep may be running on it.
+    """The records of a store, in the order of the last sweep's grid; a sweep may be running on it.
 
-    Cases whose values the last sweep on it had no longer in its grid are not returned. FileError if the file
-    cannot be read, or is no store.
+    FileError if the file cannot be read, or is no store.
     """
     with _connected(Path(path), "rw") as database:
         database.execute("BEGIN")
@@ -155,8 +149,7 @@ def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
 def _lock(path: Path, database: sqlite3.Connection) -> None:
     """Begin a transaction that keeps a second sweep off the store.
 
-    A sweep releases the lock for some microseconds between two transactions. If the lock is free three
-    times, moments apart, no sweep is running.
+    A sweep frees the lock for microseconds between transactions: free three times, no sweep is running.
     """
     try:
         database.execute("PRAGMA busy_timeout = 0")
@@ -240,9 +233,7 @@ def _records(
             case = {name: places[name][values[name]] for name in axes}
         except (ValueError, TypeError, AttributeError, KeyError, RecursionError):
             continue
-        number = 0
-        for name, place in case.items():
-            number = number * len(axes[name]) + place
+        number = int(np.ravel_multi_index(tuple(case.values()), [len(axis) for axis in axes.values()]))
         parameters = {name: axes[name][place] for name, place in case.items()}
         try:
             if zlib.crc32((key + str(text)).encode()) != crc:
@@ -255,11 +246,8 @@ def _records(
 
 
 def _record(number: int, parameters: dict[str, Any], fields: Mapping[str, Any]) -> Record:
-    """The record of a case; ValueError or TypeError for one that no case can have.
-
-    A table puts a record's parameters, words and numbers side by side, so a number with the name of one of
-    the others would take its place.
-    """
+    """The record of a case; ValueError or TypeError for one that no case can have, such as one with a number
+    that would take the place of a parameter or a word in a table."""
     record = Record(case=number, parameters=parameters, **fields)
     words = (record.status, record.verdict, record.message)
     tables = (record.numbers, record.provenance)

@@ -8,11 +8,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..base.errors import MissingExtra, OptionError
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units
+from .case_script import WORDS
 from .store import Record
 
 if TYPE_CHECKING:
@@ -35,10 +34,7 @@ def table(records: Iterable[Record]) -> pd.DataFrame:
     from run to run, are in ``provenance``. A number that a case did not return is missing.
     """
     return _frame(
-        {"case": r.case}
-        | r.parameters
-        | {"status": r.status, "verdict": r.verdict, "message": r.message}
-        | r.numbers
+        {"case": r.case, **r.parameters} | {word: getattr(r, word) for word in WORDS} | r.numbers
         for r in records
     )
 
@@ -153,33 +149,30 @@ def draw_sweep(
     varied = [name for name in parameters if table[name].nunique() > 1]
     if len(varied) not in (1, 2) or not all(table[name].dtype.kind in "if" for name in varied):
         text = f"a sweep is drawn over one or two varied numbers, and {len(varied)} vary here"
-        raise OptionError(
-            f"{text}: {', '.join(varied) or 'none'}; fix the others", what="plot", found=len(varied)
-        )
+        text += f": {', '.join(varied) or 'none'}; fix the others"
+        raise OptionError(text, what="plot", found=len(varied))
     names, good = labels or {}, table["verdict"].isin(GOOD)
     quantity = show or ("apex" if len(varied) == 1 else "rise")
     columns = [c for c in columns_of(table, quantity, parameters) if table[c].notna().any()]
     if not columns:
         raise OptionError(f"no case of this sweep has a shape with {quantity} to draw", what="plot", found=0)
+    last, shown = columns[-1], [names.get(name, name) for name in varied]
+    certified = table[columns].where(good).astype(float)
     if len(varied) == 1:
-        x = table[varied[0]].to_numpy(float)
-        order = np.argsort(x)
-        heights = {c.rpartition(".")[0] or "roof": np.where(good, table[c], np.nan) for c in columns}
+        frame = certified.set_index(table[varied[0]]).sort_index().dropna(axis="columns", how="all")
+        x = frame.index.to_numpy(float)
+        curves = {str(c).rpartition(".")[0] or "roof": (x, y.to_numpy()) for c, y in frame.items()}
         if not show:
-            heights.pop("roof", None)  # the highest of the others
-        curves = {name: (x[order], y[order]) for name, y in heights.items() if np.isfinite(y).any()}
+            curves.pop("roof", None)  # the highest of the others
         if not curves:
             raise OptionError("no case of this sweep is certified; see its table", what="plot", found=0)
-        last = columns[-1]
         label = names.get(last, last).removeprefix(f"{last.rpartition('.')[0]}.")
-        return lines(curves, path, x=names.get(varied[0], varied[0]), y=label, markers=True)
-    across, up = varied
-    drawn = columns[-1]
-    value = table.assign(**{drawn: table[drawn].where(good)}).pivot_table(drawn, up, across, dropna=False)
-    lost = (~good).groupby([table[up], table[across]]).any().unstack(fill_value=True)
-    title = f"{drawn} of the certified cases (×: not certified)"
-    marks = {title: lost.reindex(index=value.index, columns=value.columns, fill_value=True).to_numpy(bool)}
+        return lines(curves, path, x=shown[0], y=label, markers=True)
+    places = [table[name] for name in reversed(varied)]
+    value = certified[last].groupby(places).mean().unstack()
+    lost = (~good).groupby(places).any().unstack(fill_value=True)
+    title = f"{last} of the certified cases (×: not certified)"
     xs, ys = value.columns.to_numpy(float), value.index.to_numpy(float)
-    tables, label = {title: value.to_numpy(float)}, names.get(drawn, "")
-    across, up = (names.get(name, name) for name in varied)
+    tables, marks = {title: value.to_numpy()}, {title: lost.to_numpy(bool)}
+    (across, up), label = shown, names.get(last, "")
     return heatmap(xs, ys, tables, path, marks=marks, xlabel=across, ylabel=up, label=label, width=900)

@@ -19,7 +19,7 @@ import pandas as pd
 from generators import bezier_hall, spherical_cap, two_caps
 from pcmc import Material, Snow, StructuralModel, Surface, certify, project, solve
 from pcmc.base.arrays import Floats
-from pcmc.certificate.reactions import support_forces
+from pcmc.certificate.forces import Forces
 from pcmc.certificate.supports import boundary_view, support_table
 from pcmc.structure import StepResults
 from pcmc.surface.geometry import face_areas
@@ -131,7 +131,7 @@ def by_support(model: StructuralModel, form: StepResults) -> list[Row]:
     """The force of each held boundary curve, ours and theirs, and their difference over the larger side."""
     axes = ["reaction_x", "reaction_y", "reaction_z"]
     tables = [
-        boundary_view(support_table(support_forces(model.standing, f)))
+        boundary_view(support_table(Forces.of(model.standing, f)))
         for f in (certify(model.surface, modes=0).reactions, form.reactions)
     ]
     rows: list[Row] = []

@@ -15,7 +15,7 @@ from pcmc.accuracy import adaptive, check_mesh
 from pcmc.accuracy.adaptive import AccuracyStatus, goals_in
 from pcmc.accuracy.estimator import _FineMesh, _held_vertices, _slope, error_shares, size_field
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
-from pcmc.certificate.reactions import reactions
+from pcmc.certificate.forces import reactions
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy, volume
 from pcmc.meshing.held_curves import onto_held_curves

@@ -10,8 +10,7 @@ from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap,
 from generators import spherical_cap_exact
 from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
 from pcmc.certificate import Verdict
-from pcmc.certificate.reactions import support_forces
-from pcmc.certificate.tables import conormal_sum
+from pcmc.certificate.forces import Forces, sheet_pulls
 from pcmc.forces.functional import patch_areas, volume
 from pcmc.forces.pinching import standing_part
 from pcmc.meshing.quality import triangle_quality
@@ -102,9 +101,9 @@ def test_conormals_add_up_with_their_tensions():
     tensions = np.array([1.0, 2.5, 0.7])
     surface = three_sheets(tensions, angles)
     expected = -np.stack([0 * angles, np.cos(angles), np.sin(angles)], axis=1).T @ tensions
-    junction = np.flatnonzero(surface.topology.junction_edge)
+    junction = surface.topology.edges[surface.topology.junction_edge]
     assert len(junction) == 2
-    np.testing.assert_allclose(conormal_sum(surface, junction), [expected, expected], atol=1e-14)
+    np.testing.assert_allclose(sheet_pulls(surface, junction), [expected, expected], atol=1e-14)
     row = certify(surface).junctions.iloc[0]
     assert row["junction"] == "sheet 0 | sheet 1 | sheet 2"
     assert row["length"] == 1.0
@@ -207,7 +206,7 @@ def test_the_standing_part_is_computed_once_for_each_surface():
     assert part.surface.m < surface.m
     with mock.patch("pcmc.forces.pinching.find_walls", side_effect=AssertionError):
         certify(surface)
-        support_forces(surface)
+        Forces.of(surface)
         assert standing_part(surface) is part
     moved = surface.moved(two_squares(6, alpha_aux=3.0).vertices)
     assert standing_part(moved).surface is moved

@@ -7,8 +7,8 @@ from support_cases import cables_between_walls, half_with_mirror
 import pcmc
 from generators import spherical_cap, two_squares
 from pcmc import Parameter, Patch, Plane, Surface, Target
+from pcmc.certificate.forces import Forces
 from pcmc.certificate.quantities import figures
-from pcmc.certificate.reactions import support_forces
 from pcmc.design.targets import measure
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
@@ -112,7 +112,7 @@ def test_forces_at_points_are_those_of_cables():
     sizes = np.linalg.norm(ends[["force_x", "force_y", "force_z"]], axis=1)
     np.testing.assert_allclose(np.sort(sizes), np.sort(sail.cables[0].tension * np.ones(len(sizes))))
     left = [
-        np.linalg.norm(left_by_the_mesh(support_forces(s)), axis=1).max()
+        np.linalg.norm(left_by_the_mesh(Forces.of(s)), axis=1).max()
         for s in refined(two_squares(4, alpha_aux=1.0))
     ]
     assert left[1] < 0.75 * left[0]
@@ -121,12 +121,12 @@ def test_forces_at_points_are_those_of_cables():
 
 def test_vertex_forces_are_pulls_ends_of_cables_and_what_the_mesh_leaves():
     for make in (cables_between_walls, half_with_mirror):
-        acting = support_forces(pcmc.solve(make(), target="stationary").surface)
+        acting = Forces.of(pcmc.solve(make(), target="stationary").surface)
         pulls = np.nan_to_num(acting.per_length) * acting.lengths[:, None]
         on_lines = acting.lengths > 0.0
         images = [k for k, (plane, _) in enumerate(acting.surface.on_planes, 1) if plane.mirror]
         total = pulls + left_by_the_mesh(acting) + acting.points + acting.by_plane[images].sum(axis=0)
-        np.testing.assert_allclose(total[on_lines], acting.forces[on_lines], atol=1e-12)
+        np.testing.assert_allclose(total[on_lines], acting.reactions[on_lines], atol=1e-12)
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.5])

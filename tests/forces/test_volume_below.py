@@ -16,7 +16,7 @@ from pcmc.forces.functional import patch_volumes, volume
 from pcmc.forces.volume_below import volume_below, volume_below_gradient, volumes_below
 from pcmc.plan import Divider, Plan
 from pcmc.surface.geometry import area_vectors
-from pcmc.sweep.solving import row
+from pcmc.sweep.solving import case_row
 from studies.forces.cases import tube
 
 TIGHT = {"tolerance": 1e-13, "min_quality": 0.0}
@@ -139,7 +139,7 @@ def test_volume_has_one_meaning(make):
     assert measure(surface, Target("volume")).value == pytest.approx(volume, rel=1e-12)
     shown = [f.value for f in figures(surface, found) if (f.quantity, f.owner) == ("volume", "roof")]
     assert shown == [pytest.approx(volume, rel=1e-12)]
-    assert row(result, ())["volume"] == pytest.approx(volume, rel=1e-12)
+    assert case_row(result, ())["volume"] == pytest.approx(volume, rel=1e-12)
     name, goal = surface.patches[0].name, 1.01 * volume
     if surface.held.any():
         branch = pcmc.follow(surface, name, until={"volume": goal}, steps=3, min_quality=0.0)

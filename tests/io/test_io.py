@@ -370,8 +370,8 @@ def test_damaged_native_files(tmp_path):
             np.savez(file, **{**arrays, "meta": np.array(json.dumps({**meta, **changes}))})
         return path
 
-    with refused(FileError, where="version", found=8, expected=7):
-        pcmc.read(changed(version=8))
+    with refused(FileError, where="version", found=9, expected=8):
+        pcmc.read(changed(version=9))
     with refused(FileError, where="format", found="other", expected="pcmc surface"):
         pcmc.read(changed(format="other"))
     with refused(FileError, where="metadata", found="{}"):

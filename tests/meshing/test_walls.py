@@ -15,7 +15,7 @@ from pcmc.explore.page_data import _controls, outline
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
-from pcmc.report.tables import patch_table
+from pcmc.report.tables import table_of_patches
 from pcmc.surface.colours import SHEETS, patch_colors, rgb
 
 BOX = [[0, 0], [8, 0], [8, 6], [0, 6]]
@@ -279,7 +279,7 @@ def test_files_tables_and_pictures_show_a_sail_as_roof(tmp_path):
     text = (tmp_path / "hall.ifc").read_text()
     assert (text.count("IFCSLAB("), text.count("IFCWALL(")) == (2, 1)
     np.testing.assert_array_equal(patch_colors(hall)[:2], [rgb(color) for color in SHEETS[:2]])
-    rows = patch_table(hall, certificate, Units("m")).rows
+    rows = table_of_patches(hall, certificate, Units("m")).rows
     assert [row[1] for row in rows] == ["roof", "roof", "wall"]
     assert [patch["wall"] for patch in outline(hall, np.zeros(3))[0]["patches"]] == [False, False, True]
     assert [group["wall"] for group in _controls(hall)] == [False, False, True]

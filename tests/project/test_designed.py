@@ -16,8 +16,7 @@ import pcmc
 from pcmc import cli, explore
 from pcmc.base.units import Units
 from pcmc.certificate.quantities import QUANTITIES, dimension_of
-from pcmc.design.quantities import MEASURES
-from pcmc.design.targets import KINDS, SHORT
+from pcmc.design.targets import KINDS, MEASURES, SHORT
 from pcmc.explore.page_data import unit_texts
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
 

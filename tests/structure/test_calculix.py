@@ -11,8 +11,7 @@ from structures import FABRIC, model_of, pyramid, square
 
 import pcmc
 from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, Wind
-from pcmc.certificate.balance import load
-from pcmc.certificate.reactions import reactions
+from pcmc.certificate.forces import load, reactions
 from pcmc.surface.geometry import face_areas
 from studies.questions import structure
 from studies.reference import calculix

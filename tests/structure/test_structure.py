@@ -17,7 +17,7 @@ from generators import hypar_roof
 from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
-from pcmc.certificate.balance import load
+from pcmc.certificate.forces import load
 from pcmc.forces.functional import patch_areas
 from pcmc.project import Structure
 from pcmc.surface.geometry import face_areas

@@ -7,7 +7,7 @@ from structures import LOADS, dat_text, frd_text, model_of, pyramid, square
 
 import pcmc
 from pcmc.base.errors import FileError
-from pcmc.certificate.reactions import reactions
+from pcmc.certificate.forces import reactions
 
 
 @pytest.mark.parametrize("text_of", [dat_text, frd_text])

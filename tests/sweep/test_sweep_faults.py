@@ -9,7 +9,7 @@ from tables import same
 from pcmc.base import child_process
 from pcmc.base.compiled import threads
 from pcmc.base.errors import OptionError
-from pcmc.sweep import Sweep, case_process, case_script, provenance, read_store, run
+from pcmc.sweep import Sweep, case_script, provenance, read_store, run, workers
 
 CHAOS = Sweep("sweep_cases:chaos", {"rate": [3.6, 3.8, 4.0], "seed": [0.1, 0.2, 0.3]})
 
@@ -88,11 +88,11 @@ def test_a_case_that_is_interrupted_does_not_leave_its_answer_to_the_next(monkey
     with monkeypatch.context() as patch:
         patch.setattr(child_process.pickle, "load", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            case_process.run_case("team", "sweep_cases:echo", {"value": 1}, 60.0)
+            workers.run_case("team", "sweep_cases:echo", {"value": 1}, 60.0)
     try:
-        outcome = case_process.run_case("team", "sweep_cases:echo", {"value": 2}, 60.0)
+        outcome = workers.run_case("team", "sweep_cases:echo", {"value": 2}, 60.0)
     finally:
-        case_process.retire("team")
+        workers.retire("team")
     assert outcome["numbers"]["back"] == "2"
 
 

@@ -69,7 +69,7 @@ class Page {
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
     this.name = answer.header.session;
     this.startViewer();
-    this.variants = new Variants(find("#variants"), (name, body) => this.act(name, body), () => this.canvas());
+    this.variants = new Variants(find("#variants"), (name, body) => this.act(name, body), () => this.viewer?.drawn());
     this.begin(answer);
     this.addExports(answer.header.formats);
     this.addActs();
@@ -79,15 +79,16 @@ class Page {
 
   /** Everything that depends on the mesh: at the start, and when the file behind the page was saved. */
   begin({ header, arrays }, opened = true) {
-    Object.assign(this, { size: header.size, units: header.units, mesh: header.mesh, download: header.name });
-    find("#title").textContent = header.title || "pcmc explore";
-    document.title = header.title ? `${header.title} – pcmc explore` : "pcmc explore";
-    find("#units").textContent = this.units.given
-      ? `Tension in ${this.units.tension}, pressure in ${this.units.pressure}.`
+    const { size, units, mesh, name: download, title } = header;
+    Object.assign(this, { size, units, mesh, download });
+    find("#title").textContent = title || "pcmc explore";
+    document.title = title ? `${title} – pcmc explore` : "pcmc explore";
+    find("#units").textContent = units.given
+      ? `Tension in ${units.tension}, pressure in ${units.pressure}.`
       : "Any consistent units. With metres and kilonewtons: tension kN/m, pressure kN/m², curvature 1/m.";
     const piece = { 1: "", 2: "the half", 4: "the quarter" }[header.whole] ?? "the piece";
-    find("#piece").hidden = !piece;
-    find("#piece").textContent = `All numbers are of ${piece} between the mirror planes; the picture shows the whole.`;
+    const about = `All numbers are of ${piece} between the mirror planes; the picture shows the whole.`;
+    Object.assign(find("#piece"), { hidden: !piece, textContent: about });
     this.underPressure = new Uint8Array(header.vertices);
     arrays.sheet_patch.forEach((p, i) => {
       if (!header.patches[p].wall) this.underPressure[arrays.sheet_vertex[i]] = 1;
@@ -110,11 +111,6 @@ class Page {
     this.begin(await ask("api/open", { session: this.name }), opened);
   }
 
-  canvas() {
-    this.viewer?.draw();
-    return this.viewer ? find("#canvas") : null;
-  }
-
   startViewer() {
     try {
       this.viewer = new Viewer(find("#canvas"), (spacing) => {
@@ -125,10 +121,10 @@ class Page {
         (name, place, final) => this.panel.movePoint(name, place, final));
     } catch (error) {
       find("#canvas").hidden = true;
-      find("#no-graphics").hidden = false;
-      find("#no-graphics").textContent = error.message === "no WebGL 2"
+      const textContent = error.message === "no WebGL 2"
         ? "This browser cannot show the surface: WebGL 2 is missing or switched off. Everything else works."
         : `The 3D picture cannot be drawn: ${error.message}`;
+      Object.assign(find("#no-graphics"), { hidden: false, textContent });
     }
   }
 
@@ -168,27 +164,27 @@ class Page {
   /** Send a request and show its answer; returns the header. Errors are shown, or thrown if `raise`. */
   async send(act, values, raise = false) {
     const began = performance.now();
-    let [result, failure] = [null, null];
     this.pending += 1;
     this.since = began;
     this.showWork();
     try {
       const answer = await ask(`api/${this.name}/${act}`, values);
-      result = answer.header;
+      const { header } = answer;
       if (act === "follow") this.lasted = performance.now() - began;
-      if (!result.superseded && result.number > this.header.number) {
-        await this.show(answer, !["follow", "settle"].includes(act) || Boolean(result.way));
+      if (!header.superseded && header.number > this.header.number) {
+        await this.show(answer, !["follow", "settle"].includes(act) || Boolean(header.way));
       }
+      return header;
     } catch (error) {
-      failure = error;
-      if (!raise) this.notify(error.message);
       if (!this.next) this.panel.show(this.header.values, true);
+      if (raise) throw error;
+      this.notify(error.message);
+      return null;
+    } finally {
+      this.pending -= 1;
+      this.showWork();
+      this.pump();
     }
-    this.pending -= 1;
-    this.showWork();
-    this.pump();
-    if (failure && raise) throw failure;
-    return result;
   }
 
   showWork() {
@@ -228,12 +224,12 @@ class Page {
     }
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
-    const { at_rest: atRest, findings, figures, verdict } = header;
+    const [{ at_rest: atRest, findings, figures, verdict }, { units }] = [header, this];
     showVerdict(find("#verdict"), header);
-    showFindings(find("#findings tbody"), findings, figures, this.units);
-    showParts(find("#parts"), figures, this.units);
-    if (findings.supports) showSupports(find("#supports"), findings, this.units);
-    this.variants.show(header, this.units);
+    showFindings(find("#findings tbody"), findings, figures, units);
+    showParts(find("#parts"), figures, units);
+    if (findings.supports) showSupports(find("#supports"), findings, units);
+    this.variants.show(header, units);
     if (!this.next) this.panel.show(header.values, values);
     const enabled = { check: atRest, margin: atRest, verify: atRest, undo: header.undo, redo: header.redo };
     for (const [id, on] of Object.entries(enabled)) find(`#${id}`).disabled = !on;

@@ -42,15 +42,16 @@ export function choice(type, label, checked, chosen, attributes) {
   return element("label", element("input", { type, checked, onchange }, attributes), label);
 }
 
-/** A row of a table: its head, and a cell for each further text or node. */
-export const tableRow = (head, cells) =>
-  element("tr", element("th", { scope: "row" }, head), ...cells.map((cell) => element("td", cell)));
+/** A row of a table: its head, across the table where there are no cells, and a cell for each text or node. */
+export const tableRow = (head, cells = []) =>
+  element("tr", element("th", { scope: "row", colSpan: cells.length ? 1 : 9 }, head),
+    ...cells.map((cell) => element("td", cell)));
 
-/** A table with a heading; columns are [name, unit], rows [name, texts]. */
+/** A table with a heading; columns are [name, unit], rows [name, texts], or [name] across the table. */
 export function tableOf(title, columns, rows) {
   const heads = columns.map(([name, unit]) =>
     element("th", { scope: "col" }, name, ...(unit ? [element("span.unit", unit)] : [])));
   return element("table.parts", element("caption", title),
     element("thead", element("tr", element("td"), ...heads)),
-    element("tbody", ...rows.map(([name, texts]) => tableRow(name, texts))));
+    element("tbody", ...rows.map((row) => tableRow(...row))));
 }

@@ -31,11 +31,11 @@ export function showVerdict(root, header) {
 }
 
 /** Which surface the page shows if there is none for the values asked for. */
-function drawn({ asked, shown }) {
+function drawn({ values: { asked, shown } }) {
   const near = (a, b) => Math.abs(a - b) <= 1e-9 * Math.abs(b);
-  const values = shown.flatMap((p, i) => [["tension", "α"], ["pressure", "p"]]
-    .filter(([kind]) => !near(p[kind], asked[i][kind]))
-    .map(([kind, sign]) => `${p.name} ${sign} = ${digits(p[kind])}`));
+  const values = Object.keys(shown.tensions).flatMap((name) => [["tensions", "α"], ["pressures", "p"]]
+    .filter(([kind]) => name in shown[kind] && !near(shown[kind][name], asked[kind][name]))
+    .map(([kind, sign]) => `${name} ${sign} = ${digits(shown[kind][name])}`));
   if (!values.length) return "Shown: the surface as given";
   const listed = values.slice(0, 3).join(", ") + (values.length > 3 ? ", …" : "");
   return `Shown: the last surface at rest, ${listed}`;

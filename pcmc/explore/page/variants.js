@@ -1,10 +1,6 @@
 // Variants: surfaces kept side by side, their numbers, and the differences from one of them.
 
-import { button, capital, digits, element, tableRow } from "./elements.js";
-
-/** The row that begins the rows of a patch, or of all, across the table. */
-const heading = (text, kind = "part") =>
-  element("tr", element("th", { scope: "row", colSpan: 5 }, element(`span.${kind}`, text)));
+import { button, capital, digits, element, tableOf } from "./elements.js";
 
 export class Variants {
   pictures = new Map();
@@ -41,11 +37,10 @@ export class Variants {
     this.header = header;
     const { variants, compared, figures } = header;
     this.root.querySelector("ul").replaceChildren(...variants.map((variant, k) => this.item(variant, k, compared)));
-    const table = this.root.querySelector("table");
-    table.hidden = compared === null;
+    const differences = this.root.querySelector(".differences");
+    differences.replaceChildren();
     if (compared === null) return;
     const other = variants[compared];
-    table.querySelector("caption").textContent = `Differences from ${other.name}`;
     const key = ({ quantity, of, owner }) => `${quantity} ${of} ${owner}`;
     const values = new Map(other.figures.map((row) => [key(row), row.value]));
     const rows = figures.map((row) => ({ ...row, then: values.get(key(row)) }))
@@ -55,17 +50,18 @@ export class Variants {
     const difference = ({ quantity, dimension, value, then }) => {
       const unit = units.given ? [element("span.unit", ` ${units[dimension]}`)] : [];
       const percent = then ? signed((100 * (value - then)) / Math.abs(then)) : "";
-      return tableRow(element("span", capital(quantity), ...unit),
-        [digits(then), digits(value), signed(value - then), percent]);
+      return [element("span", capital(quantity), ...unit),
+        [digits(then), digits(value), signed(value - then), percent]];
     };
     const parts = ["", ...new Set(changed.map(({ of }) => of).filter(Boolean))]; // all, then each
     const shown = parts.flatMap((part) => {
       const own = changed.filter(({ of }) => of === part);
-      return own.length ? [heading(part || "all"), ...own.map(difference)] : [];
+      return own.length ? [[element("span.part", part || "all")], ...own.map(difference)] : [];
     });
     const alike = rows.length - changed.length;
     const words = changed.length ? `${alike} more numbers are the same to four digits` : "No number differs in four digits";
-    table.querySelector("tbody").replaceChildren(...shown, ...(alike ? [heading(words, "unit")] : []));
+    differences.append(tableOf(`Differences from ${other.name}`, [["Variant"], ["Shown"], ["Change"], ["%"]],
+      [...shown, ...(alike ? [[element("span.unit", words)]] : [])]));
   }
 
   item({ name, word, figures }, number, compared) {

@@ -348,9 +348,14 @@ export class Viewer {
     return total / Math.max(ends.length / 6, 1);
   }
 
+  /** The canvas with the picture as it is now. */
+  drawn() {
+    this.draw();
+    return this.canvas;
+  }
+
   /** The picture as a PNG. */
   picture() {
-    this.draw();
-    return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
+    return new Promise((resolve) => this.drawn().toBlob(resolve, "image/png"));
   }
 }

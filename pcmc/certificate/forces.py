@@ -1,0 +1,320 @@
+"""The forces on a surface, by cause and by support: every table of forces is a sum of these.
+
+Along a line a support holds the pull of the sheets there, Σ (α + w z) n per length with their outward
+co-normals n, as far as it can: a plane holds the part across itself. The forces at the vertices are
+
+    f_v = Σ ½ L_e Σ (α + w z) n_e over the held edges e at v + the ends of cables + r_v,
+
+with r_v half the same sums over the other edges at v, less ⅓ Σ p A_T ν_T. Where sheets are smooth r_v is
+O(h²), as curvature balances pressure, and beside corners and where junctions end O(h): nothing of it is
+left in the limit. Forces at points are those of cables that end, and of points held alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import EXCESS
+from ..forces import cable_weights, cables
+from ..forces.cables import directions, pull_along
+from ..forces.elements import add_values
+from ..forces.pinching import standing_part
+from ..forces.triangles import add_weights, energy_mesh, measure
+from ..surface import Surface
+from ..surface.checks import lying
+from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
+from ..surface.parts import Cable
+from ..surface.supports import apply_supports, symmetric_part
+from ..surface.topology import EdgeCurve
+
+CableEnd = tuple[Cable, int, Floats]
+
+
+def loads(surface: Surface) -> Floats:
+    """(m + c,3) the force on each triangle, (p - s) A ν of pressure and snow, -w A n of weight; and -g ℓ n on
+    each edge of cables."""
+    patch, vector = surface.patch_of_face, area_vectors(surface.vertices[surface.faces])
+    found = surface.net_pressures[patch, None] * vector
+    ends, _, weight = surface.cable_edges
+    heavy = np.append(
+        surface.weights[patch] * np.linalg.norm(vector, axis=1),
+        weight * segment_lengths(surface.vertices, ends),
+    )
+    found = np.concatenate([found, np.zeros((len(ends), 3))])
+    return found - heavy[:, None] * np.array(surface.plane.normal) if surface.heavy else found
+
+
+def load_places(surface: Surface) -> Floats:
+    """(m + c,3) where the forces of ``loads`` act: the middles of the triangles and of the cables' edges."""
+    X = surface.vertices
+    return np.concatenate([X[surface.faces].mean(axis=1), X[surface.cable_edges.ends].mean(axis=1)])
+
+
+def load(surface: Surface) -> float:
+    """The force of pressure, snow and weight along Π's normal."""
+    return along_normal(surface, loads(surface))
+
+
+def along_normal(surface: Surface, forces: Floats) -> float:
+    """The sum of forces (k,3) along Π's normal."""
+    return float((forces @ np.array(surface.plane.normal)).sum())
+
+
+def by_cause(surface: Surface) -> dict[str, Floats]:
+    """(n,3) the forces on the vertices: of tension, cables, weight, and of pressure less snow.
+
+    Of tension -Σ α ∂A, of pressure ⅓ Σ p A_T ν_T, a third of each triangle's. At a boundary these are not
+    -∇E: there the volume is that of a cone to the point of Π, whose side is under no pressure.
+    """
+    X = surface.vertices
+    tension = measure(energy_mesh(surface, pressure=np.zeros(len(surface.patches))), X)[2]
+    cable, weight = np.zeros((2, *X.shape))
+    add_values(cables.elements(surface, X), cable)
+    add_values(cable_weights.elements(surface, X), weight)
+    add_weights(surface, X, weight)
+    third = area_vectors(X[surface.faces]) / 3.0 * surface.net_pressures[surface.patch_of_face, None]
+    pressure = vertex_sums(third, surface.faces, surface.n)
+    return {"tension": -tension, "cable": -cable, "weight": -weight, "pressure": pressure}
+
+
+def reactions(surface: Surface) -> Floats:
+    """(n,3) forces of the supports: the whole force where fixed, its part normal to the plane where sliding.
+
+    In a mirror plane this part is the pull of the image.
+    """
+    total = sum(by_cause(surface).values(), np.zeros_like(surface.vertices))
+    return apply_supports(surface, total.copy()) - total
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """The forces on the part of a surface that stands. ``along``, ``points`` and the pull of images are all
+    of the ``reactions``."""
+
+    surface: Surface
+    standing: Surface  # the part of it that stands, which the supports hold
+    loads: Floats  # (m + c,3) on its triangles and cable edges
+    reactions: Floats  # (n,3) of all supports
+    along: Floats  # (n,3) the reactions on lines and sheets
+    points: Floats  # (n,3) at single points, and of the cables that end on a line
+    lines: Bools  # (e,2) the ends of edges that are held as lines: of the boundary, of lines inside the
+    # surface, and of junctions that a plane holds, as on an upright wall, or that rest on Π
+    lengths: Floats  # (n,) half the length of the edges of ``lines`` at each vertex; 0 where there is none
+    pulls: Floats  # (e,3) force per length that holds the sheets along the edges of ``lines``; else 0
+    clamped: Bools  # (n,) the vertices that cannot move, or only along a line that was given
+    single: Bools  # (n,) those of them that are in no line
+    on_boundary: Bools  # (n,) the vertices of the held boundary
+    by_plane: Floats  # (1 + planes,n,3) what Π and each of ``on_planes`` carry at the vertices on them
+    by_plane_ends: Floats  # (1 + planes,n,3) the part of these that holds the ends of cables
+    cable_ends: list[CableEnd]
+
+    @classmethod
+    def of(cls, surface: Surface, given: Floats | None = None, standing: Surface | None = None) -> Forces:
+        """The forces on a surface, with its own reactions or ``given`` ones (n,3).
+
+        A vertex on several planes divides its force among them: Σ c_i n_i of their normals. Where a fixed
+        vertex lies in mirror planes, these take the part across them.
+
+        >>> from pcmc import Patch
+        >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+        ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+        >>> acting = Forces.of(square)
+        >>> acting.reactions[1].tolist()[:2], acting.pulls[0].tolist()  # the edge from (1, 1) to (-1, 1)
+        ([-1.0, 1.0], [0.0, 1.0, 0.0])
+        """
+        standing = standing_part(surface).surface if standing is None else standing
+        forces = reactions(standing) if given is None else given
+        topo, cables = surface.topology, cable_ends(standing)
+        ends = np.zeros_like(forces)
+        for _, vertex, force in cables:
+            ends[vertex] += force
+        ends -= apply_supports(standing, ends.copy())
+        clamped, on, by_plane, by_plane_ends = _divided(standing, forces, ends)
+        mirror = np.array([False, *(plane.mirror for plane, _ in standing.on_planes)])
+        boundary, held = held_boundary(surface), standing.fixed | standing.on_plane
+        on_boundary, used = np.zeros((2, surface.n), dtype=bool)
+        on_boundary[topo.edges[boundary]] = True
+        used[standing.faces] = used[standing.cable_edges.ends] = True
+        for plane, mask in standing.on_planes:
+            held = held | (mask & (not plane.mirror))
+        single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
+        between = topo.junction_edge | topo.seam_edge
+        junction = between & at_both_ends(held, topo.edges)
+        drawn = (between | surface.edges_on_curves.drawn) & ~topo.boundary_edge
+        inner = at_both_ends(single, topo.edges) | (drawn & at_both_ends(clamped, topo.edges))
+        lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
+
+        some = np.flatnonzero(lines.any(axis=1))
+        half = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[some])[:, None], 2, axis=1)
+        lengths = np.bincount(topo.edges[some][lines[some]], half[lines[some]], surface.n).astype(float)
+        pulls = np.zeros((len(lines), 3))
+        pulls[some] = sheet_pulls(standing, topo.edges[some])
+        part = some[~at_both_ends(clamped, topo.edges[some])]  # a plane holds the part across itself
+        common = (on | clamped)[:, topo.edges[part]].all(axis=2) & ~mirror[:, None]
+        pulls[part] = _by_normal(_normals(standing), common, pulls[part]).sum(axis=0)
+        inside, alone = forces - by_plane[mirror].sum(axis=0), single & (lengths == 0.0)
+        points = np.where(lengths[:, None] > 0.0, ends - by_plane_ends[mirror].sum(axis=0), 0.0)
+        points[alone] = inside[alone]
+        return cls(
+            surface=surface,
+            standing=standing,
+            loads=loads(standing),
+            reactions=forces,
+            along=inside - points,
+            points=points,
+            lines=lines,
+            lengths=lengths,
+            pulls=pulls,
+            clamped=clamped,
+            single=alone,
+            on_boundary=on_boundary,
+            by_plane=by_plane,
+            by_plane_ends=by_plane_ends,
+            cable_ends=cables,
+        )
+
+    @property
+    def per_length(self) -> Floats:
+        """(n,3) the mean of ``pulls`` along the lines at a vertex, force/length; NaN where there is none."""
+        edges, force = self.surface.topology.edges, np.zeros_like(self.reactions)
+        half = 0.5 * segment_lengths(self.surface.vertices, edges)[:, None] * self.pulls
+        for side in (0, 1):
+            np.add.at(force, edges[:, side], half * self.lines[:, [side]])
+        share = self.lengths[:, None]
+        return np.divide(force, share, out=np.full(force.shape, np.nan), where=share > 0.0)
+
+    def along_patch(self, patch: int | None) -> Bools:
+        """(e,) the edges of lines that belong to a patch, or all of them."""
+        topo = self.surface.topology
+        own = np.full(len(topo.edges), patch is None)
+        own[topo.edge_of_face[self.surface.patch_of_face == patch]] = True
+        return own & self.lines.any(axis=1)
+
+    def largest_per_length(self, patch: int | None = None) -> float | None:
+        """The largest of ``pulls`` on lines at the edges of a patch, or on all; None without any."""
+        sizes = np.linalg.norm(self.pulls[self.along_patch(patch)], axis=1)
+        return float(sizes.max()) if len(sizes) else None
+
+
+def at_both_ends(mask: Bools, edges: Ints) -> Bools:
+    """(e,) whether both ends of edges (e,2) are in a mask (n,)."""
+    return np.asarray(mask[edges[:, 0]] & mask[edges[:, 1]])
+
+
+def held_boundary(surface: Surface) -> Bools:
+    """(e,) edges of the boundary that are held at both ends, but for those in mirror planes."""
+    topo = surface.topology
+    return topo.boundary_edge & ~surface.mirror_edge & at_both_ends(surface.held, topo.edges)
+
+
+def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
+    """(k,3) Σ (α + w z) n of the sheets at edges, given by their ends (k,2); 0 where there is none.
+
+    n is the outward co-normal; force/length. Along a junction of smooth surfaces at rest (7) without a cable
+    it is zero, of triangles only in the limit.
+    """
+    side, total = Sides.at(surface, ends), np.zeros((len(ends), 3))
+    np.add.at(total, side.edge, side.tension / np.where(side.height > 0.0, side.height, 1.0) * side.out)
+    return total
+
+
+class Sides(NamedTuple):
+    """The sides of triangles at some edges. Each goes from a to b, and has the corner c opposite."""
+
+    edge: Ints  # (s,) which of the edges
+    patch: Ints  # (s,)
+    corners: Ints  # (s,3) c, a and b
+    length: Floats  # (s,1)
+    tangent: Floats  # (s,3) from a to b
+    foot: Floats  # (s,1) how far from a to b the foot of c is, length
+    out: Floats  # (s,3) from c to its foot; outward, along the co-normal
+    height: Floats  # (s,1) the length of ``out``
+    z: Floats  # (s,1) height over Π of the middle
+    tension: Floats  # (s,1) α + w z there
+
+    @classmethod
+    def at(cls, surface: Surface, ends: Ints) -> Sides:
+        """Those at edges that are given by their ends (k,2); none where there is no edge."""
+        numbers = surface.topology.edge_numbers(ends)
+        row = np.full(len(surface.topology.edges), -1)
+        row[numbers[numbers >= 0]] = np.flatnonzero(numbers >= 0)
+        edge = row[surface.topology.edge_of_face]
+        face, corner = np.nonzero(edge >= 0)
+        corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
+        c, a, b = surface.vertices[corners].transpose(1, 0, 2)
+        length = np.linalg.norm(b - a, axis=1)[:, None]
+        tangent = (b - a) / np.where(length > 0.0, length, 1.0)
+        foot = np.einsum("ij,ij->i", c - a, tangent)[:, None]
+        out = a - c + foot * tangent
+        height = np.linalg.norm(out, axis=1)[:, None]
+        k, z = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
+        tension = (surface.tensions[k] + surface.weights[k] * z)[:, None]
+        return cls(edge[face, corner], k, corners, length, tangent, foot, out, height, z[:, None], tension)
+
+
+def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
+    """The parts of each cable of tension > 0 between its ends, branches and the supports in between.
+
+    A support in between is a mast that it runs over: a fixed vertex beside one that moves.
+    """
+    parts = []
+    for cable in surface.cables:
+        if cable.tension > 0.0:
+            mast = np.zeros(surface.n, dtype=bool)
+            leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
+            mast[leading] = surface.fixed[leading]
+            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, mast)]
+    return parts
+
+
+def cable_ends(surface: Surface) -> list[CableEnd]:
+    """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it."""
+    return [
+        (
+            cable,
+            int(pair[0]),
+            -pull_along(surface, cable, pair[:1]) * directions(surface.vertices, pair[None])[0][0],
+        )
+        for cable, curve in cable_parts(surface)
+        if not curve.closed
+        for pair in (curve.vertices[:2], curve.vertices[:-3:-1])
+    ]
+
+
+def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Bools, Floats, Floats]:
+    """The vertices (n,) that lines and points hold, those on Π and each of the other planes (1 + planes,n),
+    and what these, (1 + planes,n,3), carry of the reactions (n,3), and of those at the ends of cables.
+    """
+    X, mirror = surface.vertices, np.array([[False], *([plane.mirror] for plane, _ in surface.on_planes)])
+    ground = surface.on_plane | (surface.fixed & lying(surface.plane.height(X), X))
+    on = np.array([ground, *(mask for _, mask in surface.on_planes)])
+    clamped = surface.given_supports.fixed_and_sliding()[0]
+    least = EXCESS * float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    across = [part - symmetric_part(surface.on_planes, part.copy()) for part in (forces, ends)]
+    for _ in range(2):  # again with those clamped that planes cannot carry, as where a held bottom is pinched
+        here = np.where(clamped, on & mirror, on)
+        carried, of_cables = (
+            _by_normal(_normals(surface), here, np.where(clamped[:, None], mirrored, part))
+            for part, mirrored in zip((forces, ends), across, strict=True)
+        )
+        clamped = clamped | (np.linalg.norm(forces - carried.sum(axis=0), axis=1) > least)
+    return clamped, on, carried, of_cables
+
+
+def _normals(surface: Surface) -> Floats:
+    return np.array([surface.plane.normal, *(plane.normal for plane, _ in surface.on_planes)])
+
+
+def _by_normal(normals: Floats, on: Bools, vectors: Floats) -> Floats:
+    """(k,n,3) the parts c_i n_i of vectors (n,3), n_i the normals (k,3) of the planes each is ``on``."""
+    parts = np.zeros((len(normals), *vectors.shape))
+    some = np.flatnonzero(on.any(axis=0))
+    for pattern in np.unique(on[:, some], axis=1).T:
+        here, own = some[(on[:, some] == pattern[:, None]).all(axis=0)], normals[pattern]
+        sizes = vectors[here] @ np.linalg.pinv(own)
+        parts[np.ix_(pattern, here)] = sizes.T[:, :, None] * own[:, None, :]
+    return parts
