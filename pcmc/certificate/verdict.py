@@ -28,7 +28,7 @@ NO_TENSION = "no patch has a tension: every shape is at rest"
 class Verdict(Enum):
     """What kind of equilibrium a surface is, or why it is none. The value is a sentence."""
 
-    STABLE = "stable: at rest, and every small change of shape raises the energy"
+    STABLE = "stable: at rest, and every small change of shape of this mesh raises the energy"
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"

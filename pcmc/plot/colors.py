@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra
+from ..base.libraries import require
 from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL, Image
 from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Rendering
@@ -38,7 +38,6 @@ class ColorScale:
         return colors
 
     def bar(self, figure: Any, axes: Sequence[Any], label: str) -> None:
-        """Draw the scale below the axes."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
@@ -58,11 +57,9 @@ def color_bar(figure: Any, mappable: Any, axes: Sequence[Any], label: str) -> An
 
 
 def color_map(name: str) -> Any:
-    """The matplotlib colour map of this name."""
-    try:
-        from matplotlib import colormaps
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    require("matplotlib", extra="plot")
+    from matplotlib import colormaps
+
     return colormaps[validate.choice("cmap", name, sorted(colormaps))]
 
 
@@ -101,14 +98,14 @@ def legend_entries(pictures: Iterable[Picture]) -> tuple[dict[str, Any], dict[st
             ("fixed", surface.pinned, FIXED_DOT),
             ("sliding", surface.held & ~surface.pinned, SLIDING_DOT),
         ):
-            if dotted and held[shown].any() and _visible(image, rgb(dot)):
+            if dotted and held[shown].any() and _visible(image, rgb(dot), step=1):
                 dots[name] = dot
     return colors, dots
 
 
-def _visible(image: Image, color: Floats) -> bool:
-    """Whether a square of four pixels has the colour, in any shade: thinner lines are mixed colours."""
-    image = image[::2, ::2].astype(np.float32)
+def _visible(image: Image, color: Floats, step: int = 2) -> bool:
+    """Whether a square of 2 ``step`` pixels has the colour, in any shade: thinner lines are mixed colours."""
+    image = image[::step, ::step].astype(np.float32)
     size, reference = np.linalg.norm(image, axis=2), float(np.linalg.norm(color))
     direction = image / np.maximum(size, 1.0)[..., None]
     alike = np.linalg.norm(direction - color / reference, axis=2) < ALIKE
@@ -117,7 +114,6 @@ def _visible(image: Image, color: Floats) -> bool:
 
 
 def add_legend(figure: Any, pictures: Iterable[Picture]) -> None:
-    """The legend at the foot of the figure."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch as Swatch
 

@@ -20,12 +20,12 @@ from ..certificate.forces import Forces
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import add_legend, color_scale
-from .figure import INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
+from .figure import DPI, INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
 from .raster import paint
 from .scene import Camera, Rendering, mean_edge, scene, view_of
 
 if TYPE_CHECKING:
-    from ..panelling import Panels
+    from .. import Panels
 
 ViewName = str | tuple[float, float]
 
@@ -33,6 +33,7 @@ MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
 EDGES_FROM = 9.0  # pixels: a mesh edge shorter than this is not drawn
 DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
 CELL_WIDTH = 700  # pixels of a picture in a notebook
+ABOVE = 7.0  # pixels above a title and below a picture
 TALLEST = 1.1  # height of a picture at most, as a part of its width
 ARROW, AT_POINTS = "#B2182B", "#2166AC"
 
@@ -48,11 +49,11 @@ def draw(
     width: int = 900,
     **options: Any,
 ) -> Image:
-    """A picture of a surface, in parallel projection.
+    """A picture of a surface, in parallel projection: an (h,w,3) uint8 array.
 
     Parameters
     ----------
-    path : PNG file to write, or None.
+    path : PNG, SVG or PDF file to write, or None.
     view : "diagonal", "elevation" (along Π), "plan" (onto Π), or (azimuth, elevation) in degrees.
     scalars : (n,) or (m,) values shown as colours, with a scale; NaN is grey. None: patch colours.
     label : what the scalars are, beneath the scale.
@@ -67,25 +68,14 @@ def draw(
     width : of the picture in pixels.
     renderer : "pyvista", "matplotlib", or "auto": pyvista for many triangles where the system has OpenGL.
 
-    Returns
-    -------
-    (h,w,3) uint8 array, the picture.
-
     Raises
     ------
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
     """
-    return panel(
-        [surface],
-        path,
-        views=[view],
-        scalars=None if scalars is None else [scalars],
-        numbers=None if numbers is None else [numbers],
-        titles=[title] if title else (),
-        width=width,
-        **options,
-    )
+    given = {"views": view, "scalars": scalars, "numbers": numbers}
+    one: dict[str, Any] = {name: None if value is None else [value] for name, value in given.items()}
+    return panel([surface], path, titles=[title] if title else (), width=width, **one, **options)
 
 
 def panel(
@@ -133,8 +123,7 @@ def compose(
 ) -> Image:
     """The picture of all drawings; the options are those of ``draw`` and ``panel``.
 
-    Points ``around`` (k,2) have a place in it, too, as has a text at its ``foot``; ``overlay`` draws on the
-    last of the axes.
+    Points ``around`` (k,2) and a text at the ``foot`` have a place; ``overlay`` draws on the last axes.
     """
     points = [np.concatenate([drawing.points(one_scale), *around]) for drawing in drawings]
     frames = frames_of(points, columns, width, one_scale)
@@ -143,6 +132,8 @@ def compose(
     colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
     heights = [frame.size[1] for frame in frames[::columns]]
     figure = new(width, sum(heights) + 100.0, pad=0.0)
+    if any(drawing.title for drawing in drawings):
+        figure.get_layout_engine().set(h_pad=ABOVE / DPI)
     axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):
         place.set_axis_off()
