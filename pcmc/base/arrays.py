@@ -44,6 +44,11 @@ def kept_with_owner(compute: Callable[[Any], Result]) -> Callable[[Any], Result]
     return kept
 
 
+def hand_over(owner: Any, other: Any, *names: str) -> None:
+    """Give ``other`` the values of these names that ``owner`` keeps."""
+    vars(other).update({name: vars(owner)[name] for name in names if name in vars(owner)})
+
+
 def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
     """``cached_property`` for an array, which can then no longer be written to."""
 
