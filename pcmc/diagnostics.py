@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from .base.arrays import Floats
+from .base.tolerances import DIFFERENCE_ROUNDING
 from .forces.functional import energy_and_gradient, energy_at
 from .forces.second_variation import hessian
 from .surface import Surface, expect_surface
 from .surface.geometry import segment_lengths
 
 STEPS: Floats = 0.5 ** np.arange(5.0, 10.0)
-ROUNDING = 1e3 * float(np.finfo(float).eps)  # of the values: a remainder below is rounding
 WITHIN = 0.15  # of the order: a slope that counts as right
 
 
@@ -62,7 +62,7 @@ def taylor(
     remainders = np.array([value(X + h * move) - start for h in STEPS]) - STEPS * float((first * move).sum())
     if second is not None:
         remainders -= 0.5 * STEPS**2 * float(move.ravel() @ (second @ move.ravel()))
-    seen = np.abs(remainders) > ROUNDING * abs(start)
+    seen = np.abs(remainders) > DIFFERENCE_ROUNDING * abs(start)
     slope = np.inf
     if seen.sum() > 1:
         slope = float(np.polyfit(np.log(STEPS[seen]), np.log(np.abs(remainders[seen])), 1)[0])

@@ -1,4 +1,4 @@
-"""``python -m studies list | run NAME ... | reproduce | benchmark | readme``."""
+"""``python -m studies list | run NAME ... | reproduce | stale | check NAME ... | benchmark | readme``."""
 
 from __future__ import annotations
 
@@ -44,6 +44,13 @@ def _parser() -> argparse.ArgumentParser:
     act = acts.add_parser("reproduce", help="every study of the paper, then the comparison")
     _running(act)
     act.set_defaults(act=lambda asked: _run(of_the_paper(), asked, STEPS))
+    act = acts.add_parser("stale", help="which stored results come from other code than today's, and why")
+    act.add_argument("--results", type=Path, help="where they are (default: results/)")
+    act.set_defaults(act=_stale)
+    act = acts.add_parser("check", help="run studies anew, elsewhere, and compare with the stored numbers")
+    act.add_argument("names", nargs="+", metavar="NAME")
+    act.add_argument("--results", type=Path, help="where they are (default: results/)")
+    act.set_defaults(act=_check)
     act = acts.add_parser("benchmark", help="how fast it is on this machine, evolver beside it")
     act.add_argument("--quick", action="store_true", help="small meshes; within a minute")
     act.add_argument("--results", type=Path, help="where to write (default: results/)")
@@ -86,6 +93,30 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
     show(*tables, console)
     console.print(f"{time.perf_counter() - start:.1f} s; written to {results}")
     return 1 if any(outcome.error for outcome in outcomes) else 0
+
+
+def _stale(asked: argparse.Namespace) -> int:
+    from .stored import ages
+
+    found = ages(STUDIES.values(), asked.results or HOME / "results")
+    width = max(map(len, found))
+    for name, age in found.items():
+        print(f"{name:{width}}  {age or 'no result'}")
+    stale = [name for name, age in found.items() if age is None or age.changed != ()]
+    if stale:
+        print(f"\nto compute them anew: python -m studies run {' '.join(stale)}")
+    return 0
+
+
+def _check(asked: argparse.Namespace) -> int:
+    from .stored import check
+
+    wrong = 0
+    for study in chosen(asked.names):
+        lines = check(study, asked.results or HOME / "results")
+        wrong += len(lines)
+        print("\n".join(lines) or f"{study.name}: every number is as stored")
+    return 1 if wrong else 0
 
 
 def _benchmark(asked: argparse.Namespace) -> int:

@@ -25,11 +25,14 @@ def curve_panels(
     ylabel: str,
     width: int = 1200,
     height: int = 250,
+    ticks: Sequence[float] = (),
 ) -> None:
     """Curves y(x) by label in panels by title, logarithmic axes, one scale, one legend below.
 
-    Curves that lie on each other all stay visible.
+    Curves that lie on each other all stay visible. With ``ticks`` along x both axes have plain numbers.
     """
+    from matplotlib.ticker import FuncFormatter, NullLocator
+
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, grid, new, overlap_style, style
 
     rows = math.ceil(len(panels) / columns)
@@ -47,10 +50,51 @@ def curve_panels(
         for label, (x, y) in curves.items():
             place.plot(x, y, **looks[label])
         last = k + columns >= len(panels)
+        if ticks:
+            place.xaxis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+            place.xaxis.set_minor_locator(NullLocator())
+            place.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         place.tick_params(labelsize=SMALL - 0.8, pad=1.0, labelbottom=True)
         place.set_title(title, fontsize=SMALL, color=INK, pad=2.5)
         place.set_ylabel("" if k % columns else ylabel, fontsize=SMALL, color=INK, labelpad=2.0)
         place.set_xlabel(xlabel if last else "", fontsize=SMALL, color=INK, labelpad=1.5)
+    _legend(figure, {}, TEXT, columns=3, lines=looks)
+    finish(figure, path)
+
+
+def eigenvalue_panels(panels: Mapping[str, Curves], path: Path) -> None:
+    """Lowest eigenvalues by label against the edge length, in panels by title, each with its own scale.
+
+    A dashed line is at 0, below which an equilibrium is a saddle.
+    """
+    from matplotlib.ticker import LogLocator
+
+    from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, grid, new, style
+
+    columns = 4
+    figure = new(1500, 370.0 * math.ceil(len(panels) / columns) + 60.0, pad=8.0)
+    axes, _ = grid(figure, len(panels), columns, sharex=True)
+    labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
+    looks = {
+        label: {"color": CURVES[k], "marker": "os"[k % 2], "markersize": 2.6, "linewidth": 1.0}
+        for k, label in enumerate(labels)
+    }
+    for k, (place, (title, curves)) in enumerate(zip(axes, panels.items(), strict=True)):
+        style(place)
+        place.set_xscale("log")
+        for label, (x, y) in curves.items():
+            place.plot(x, y, **looks[label])
+        values = np.concatenate([[0.0], *(np.asarray(y, dtype=float) for _, y in curves.values())])
+        room = 0.1 * float(np.ptp(values))
+        place.set_ylim(float(values.min()) - room, float(values.max()) + room)
+        place.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (5, 3)), zorder=1.5)
+        place.xaxis.set_major_locator(LogLocator(numticks=5))
+        place.tick_params(labelsize=SMALL - 0.8, pad=1.0, labelbottom=True)
+        place.set_title(title, fontsize=SMALL, color=INK, pad=2.5)
+        place.set_ylabel("" if k % columns else "lowest eigenvalue, α/size²", fontsize=SMALL, color=INK)
+        below = k + columns >= len(panels)
+        place.set_xlabel("edge length at the end / size" if below else "", fontsize=SMALL, color=INK)
+    looks["below: a saddle"] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (5, 3))}
     _legend(figure, {}, TEXT, columns=3, lines=looks)
     finish(figure, path)
 

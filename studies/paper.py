@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,13 @@ import pandas as pd
 
 from pcmc.base.errors import FileError
 
+from .words import fill, keys
+
 PAPER = Path(__file__).with_name("paper.toml")
 HOLDS, NEAR, DIFFERS, MISSING = "reproduced", "near", "differs", "not measured"
 REPRODUCED, CONDITIONAL, NOT = "reproduced", "conditionally reproduced", "not reproduced"
 OWN = "; our addition"
+OWN_FIELDS = {"ours", "paper", "instead"}
 FIGURE_COLUMNS = ["figure", "shows", "study", "label", "claims", "reason"]
 RELATIONS = {
     "=": lambda ours, paper, tolerance: abs(ours - paper) <= tolerance,
@@ -50,6 +53,9 @@ class Claim:
     instead : ``ours`` of another claim that says the same of another reading of the paper, or of
         another mesh; where this one fails and that one holds, that reading is the condition.
     fails : how it reads where it does not hold, with {ours}, {paper} and {instead} in it.
+    chosen : what we chose so that it holds, "the mesh" or "the iteration"; it is then no test of the method.
+
+    ``says`` and ``fails`` may have other fields, ``{study.number}``: see ``words``.
     """
 
     says: str
@@ -65,6 +71,7 @@ class Claim:
     bound: bool = False
     instead: str = ""
     fails: str = ""
+    chosen: str = ""
 
     @property
     def kind(self) -> str:
@@ -86,12 +93,14 @@ class Figure:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim beside what we measure."""
+    """A claim beside what we measure; ``says`` and ``fails`` are the claim's, their fields filled."""
 
     claim: Claim
     paper: float
     ours: float
     verdict: str
+    says: str
+    fails: str
 
     @property
     def difference(self) -> float:
@@ -102,9 +111,9 @@ class Finding:
         """The claim without its example, and what we find, in words that stand alone."""
         digits = 4 if self.claim.kind == "sentence" else 5
         ours, target = f"{self.ours:.4g}", f"{self.paper:.{digits}g}"
-        if self.claim.fails:
-            return self.claim.fails.format(ours=ours, paper=target, instead=f"{instead:.4g}")
-        says = self.claim.says.partition(": ")[2] or self.claim.says
+        if self.fails:
+            return self.fails.format(ours=ours, paper=target, instead=f"{instead:.4g}")
+        says = self.says.partition(": ")[2] or self.says
         if self.claim.kind == "sentence":
             return f"{says}: ours {ours}, to hold it must be {self.claim.relation} {target}"
         if self.claim.relation != "=":
@@ -129,11 +138,9 @@ def paper(path: Path = PAPER) -> tuple[list[Claim], list[Figure]]:
             raise _wrong(path, claim, "figures", missing.pop(), tuple(sorted(numbers)))
         if claim.instead and claim.instead not in measured:
             raise _wrong(path, claim, "instead", claim.instead, "the key of another claim")
-        try:
-            claim.fails.format(ours=0, paper=0, instead=0)
-        except (KeyError, IndexError, ValueError):
-            fields = "no fields but {ours}, {paper} and {instead}"
-            raise _wrong(path, claim, "fails", claim.fails, fields) from None
+        if wrong := {key for key in keys(claim.fails) if "." not in key} - OWN_FIELDS:
+            fields = "no fields but {ours}, {paper}, {instead} and {study.number}"
+            raise _wrong(path, claim, "fails", claim.fails, f"{fields}, not {wrong}")
     return claims, figures
 
 
@@ -167,7 +174,8 @@ def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
         verdict = NEAR
     else:
         verdict = DIFFERS
-    return Finding(claim, value, ours, verdict)
+    own = {key: f"{{{key}}}" for key in OWN_FIELDS}
+    return Finding(claim, value, ours, verdict, fill(claim.says, measured), fill(claim.fails, measured, own))
 
 
 def label(figure: Figure, findings: Sequence[Finding]) -> tuple[str, str, str]:
@@ -208,17 +216,20 @@ def compare(measured: Mapping[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
             {
                 "study": f.claim.ours.split(".")[0],
                 "kind": f.claim.kind,
-                "what": f.claim.says,
+                "what": f.says,
                 "where": f.claim.where + (OWN if f.claim.own else ""),
                 "relation": f.claim.relation,
                 "paper": f.paper,
                 "ours": f.ours,
                 "difference": f.difference,
                 "verdict": f.verdict,
+                "chosen": f.claim.chosen,
+                "threshold": "ours" if f.claim.bound else "",
             }
             for f in findings
         ]
     )
+    figures = [replace(figure, unknown=fill(figure.unknown, measured)) for figure in figures]
     rows = [(f.number, f.shows, f.study, *label(f, findings)) for f in figures]
     return comparison, pd.DataFrame(rows, columns=FIGURE_COLUMNS)
 

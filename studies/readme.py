@@ -10,8 +10,8 @@ import pandas as pd
 from pcmc.base.errors import FileError
 
 from .folder import Folder, write_bytes
-from .paper import CONDITIONAL, HOLDS, NEAR, NOT, OWN, REPRODUCED
-from .report import HEADS, comparison_cells, table, write_report
+from .paper import HOLDS, NEAR
+from .report import HEADS, comparison_cells, headline, of_the_paper, table, write_report
 
 ROWS = 5
 
@@ -30,7 +30,7 @@ def up_to_date(readme: str, results: Path) -> str:
     lines = [
         *table(HEADS["number"], comparison_cells(summary(comparison), "number")),
         "",
-        counts(comparison, figures),
+        headline(comparison, figures),
     ]
     return with_block(readme, "summary", lines)
 
@@ -40,27 +40,6 @@ def summary(comparison: pd.DataFrame) -> pd.DataFrame:
     printed = of_the_paper(comparison, "number")
     agrees = printed.verdict.isin([HOLDS, NEAR])
     return printed.loc[agrees.sort_values(kind="stable").index[:ROWS].sort_values()]
-
-
-def counts(comparison: pd.DataFrame, figures: pd.DataFrame) -> str:
-    """One sentence: how many figures, numbers, statements and inputs are reproduced."""
-    figure = [int((figures.label == label).sum()) for label in (REPRODUCED, CONDITIONAL, NOT)]
-    numbers, sentences, inputs = (
-        of_the_paper(comparison, kind).verdict for kind in ("number", "sentence", "input")
-    )
-    hold, near = int((numbers == HOLDS).sum()), int((numbers == NEAR).sum())
-    return (
-        f"Of the paper's {len(figures)} figures, {figure[0]} is reproduced, {figure[1]} are reproduced"
-        f" conditionally and {figure[2]} is not; of its {len(numbers)} printed numbers, {hold} hold,"
-        f" {near} are near and {len(numbers) - hold - near} differ; {(sentences == HOLDS).sum()} of its"
-        f" {len(sentences)} statements hold; {(inputs == HOLDS).sum()} of its {len(inputs)} inputs are"
-        " used as printed."
-    )
-
-
-def of_the_paper(comparison: pd.DataFrame, kind: str) -> pd.DataFrame:
-    """The paper's own claims of a kind, without our additions."""
-    return comparison[(comparison.kind == kind) & ~comparison["where"].str.endswith(OWN)]
 
 
 def with_block(readme: str, name: str, lines: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import pandas as pd
 
 from .examples.flow import NOISE, NOISE_RESIDUAL
 from .folder import Folder, write_bytes
-from .paper import HOLDS, compare, read_measured
+from .paper import CONDITIONAL, HOLDS, NEAR, NOT, OWN, REPRODUCED, compare, paper, read_measured
+from .words import fill, listed
 
 HEADS = {
     "sentence": ["What the paper says", "Where", "Holds if", "Ours", "Verdict"],
@@ -18,10 +20,14 @@ HEADS = {
 }
 FIGURES = ["Figure", "What it shows", "Label", "Claims that hold", "Why not fully"]
 
+WIDTH = 110  # columns of a line of text
+
 HEADER = """\
 # The paper beside this package
 
 `python -m studies reproduce` writes this file. Do not edit it.
+
+{headline}
 
 Each thing that the paper's text says or prints about a figure is a claim, compared with what we measure.
 `studies/paper.toml` lists all claims with their tolerances; `studies/paper.py` holds these rules:
@@ -32,21 +38,86 @@ Each thing that the paper's text says or prints about a figure is a claim, compa
   the figure shows is not in the text.
 - **not reproduced**: a claim fails.
 
-A number is **near** within 5 % for ‖∇E‖² of an initial shape, 2 % for its mean curvature, a fifth for
-Example 4's best iteration, and a half for its errors and ‖∇E‖² on the way. The paper's inputs and our
-additions do not count for a label. We did not compare the pictures themselves."""
+A number is **near** within {near_example2.initial_gradient_squared:.0%} for ‖∇E‖² of an initial shape,
+{near_example2.initial_curvature_small:.0%} for its mean curvature, {near_example4.best_iteration:.0%} for
+Example 4's best iteration, and {near_example4.best_largest_error:.0%} for its errors and ‖∇E‖² on the
+way. The paper's inputs and our additions do not count for a label. We did not compare the pictures
+themselves."""
+
+CHOSEN = """\
+A number that is "chosen so" is no test of the method: of many meshes, or of a run's iterations, we took
+one on which it holds."""
+
+GIVEN = """\
+The studies use {used} of the {inputs} inputs that the paper prints (tensions, lengths, steps) as
+printed{rest}. They are constants of the studies, and no results."""
+
+THRESHOLDS = """\
+"(ours)" marks a threshold that we chose to stand for the paper's words: in {paper:.0f} of the paper's
+{papers:.0f} statements, and in {own:.0f} of our {owns:.0f} additions."""
 
 SOLVERS = """\
-The study `solvers` runs each method from the same start on Examples 1 to 4, on four meshes each, from
-coarse to fine. It uses the paper's tensions, except for a wall of 1 in Example 1, where 2 is a saddle on
-fine meshes. Residuals and errors are relative. With `target="stationary"` the geometric solver reaches
-equilibrium every time; on Example 3 that is a saddle. With the default, `target="minimum"`, it leaves the
-saddles and descends until triangles collapse; the verdict then names the worst triangle."""
+The study `solvers` runs each method from the same start on the paper's {solvers.examples} examples, on
+{solvers.meshes} meshes each, from coarse to fine. It uses the paper's tensions, except for a wall of
+{solvers.wall_of_example1} in Example 1, where {example1.alpha_aux_histories} is a saddle on fine meshes.
+Residuals and errors are relative. With `target="stationary"` the geometric solver comes to rest in
+{solvers.at_rest_newton} of {solvers.runs_newton} runs, with the default, `target="minimum"`, in
+{solvers.at_rest_newton_minimum} of {solvers.runs_newton_minimum}. {solvers.saddles_newton} and
+{solvers.saddles_newton_minimum} of these are saddles, {saddles}: there `"minimum"` looks for a minimum,
+finds none, and returns the saddle under that name. Its worst triangle has quality
+{solvers.worst_quality_newton_minimum:.2g}."""
+
+CORNERS = """\
+The study `corners` solves the examples on meshes that get finer only near the ends of their junctions. Where
+the solver fails on a level, that level is solved anew from the initial shape. Then, and where the solver
+spreads vertices to keep triangles sound, they come to lie elsewhere along the same shape, and the energy of
+flat triangles depends on where they lie. `corners/jumps.csv` has, for each example and support, the largest
+step of the energy that is larger than the one before it: between the meshes of the two levels, and with
+every triangle of both cut into four.
+
+In Example 1 with a wall of 1 and held bottoms the energy steps by {corners.example1-1_held_jump_step:.2g}
+at level {corners.example1-1_held_jump_level}, after steps of less and less. That level is solved anew,
+and the junction comes down on its bottom. Its vertices are up to {corners.example1-1_held_jump_slid:.2g}
+from where they were. With every triangle cut into four the same two shapes differ by
+{corners.example1-1_held_jump_step_halved:.2g}. So the step is no other equilibrium; it is a part of the
+mesh's error, of which the energy has {corners.example1-1_held_jump_mesh_error:.2g} on this mesh."""
+
+ACCURACY = """\
+The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. For
+{accuracy.bars_worse} of them the adaptive meshes need more triangles: {worse}. The table
+`accuracy/savings.csv` has what equal shares of the error would save (`estimated`). It is no bound:
+{accuracy.above_estimate} of the {accuracy.bars_on_mesh} savings for a value on the mesh exceed it, by up
+to {above:.0%}."""
+
+CHECK = """\
+The study `mesh_check` checks {mesh_check.quantities} quantities of {mesh_check.closed_forms} surfaces
+with known values. {mesh_check.inside:.0%} of the bars of values on the mesh hold the true error; the
+median bar is {mesh_check.width_median:.2f} times as wide as that. {mesh_check.limit_inside:.0%} of the
+bars of limits hold theirs; the median bar is {mesh_check.limit_width_median:.2g} times as wide, 1 in 20
+more than {mesh_check.limit_width_95:.0f} times, and one {mesh_check.limit_width_largest:.0f} times: a
+limit may happen to be nearly exact."""
+
+PANELS = """\
+The study `panels` moves vertices of roofs at rest so that fewer different panels are needed. In
+{panels.same_verdict_after:.0%} of its runs the roof has the verdict that it had before; in
+{panels.stable_after:.0%} it is stable, in the others it was a saddle and stays one."""
 
 SPEED = """\
 Surface Evolver solves the same mesh of Example 1, and the same cap, in the same run. `python -m studies
-benchmark` writes this table, and `benchmark/scaling.csv` and `scaling.png`, which show how time and memory
-grow with the number of triangles. Unlike all others here, they differ from run to run."""
+benchmark` writes this table, and `benchmark/scaling.csv` and `scaling.png`, which show how time and
+memory grow with the number of triangles. Unlike all others here, they differ from run to run."""
+
+FAIR_PAIRS = {  # rows of the benchmark: theirs, ours
+    "step": ("Newton step, evolver", "Newton step, pardiso"),
+    "plain": ("evolver, linear", "height of one mesh"),
+    "extrapolated": ("evolver, linear, extrapolated by us", "height, extrapolated"),
+}
+FAIR = """\
+Fair pairs do the same work to the same end. A Newton step on the same mesh takes Evolver {step:.1f} times
+as long as ours. The height of the cap by flat triangles of one mesh takes it {plain:.1f} times as long;
+both extrapolated, {extrapolated:.2g} times, {faster}. The row "its linear elements over ours" puts plain
+values beside extrapolated ones, and "its script over ours" a run that has not converged beside one that
+has: neither compares the programs."""
 
 
 def write_comparison(results: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -67,21 +138,130 @@ def report(results: Path) -> str:
     """The text of ``REPORT.md``; a section is left out if its study has not run."""
     comparison = Folder(results).read_table("comparison")
     figures = Folder(results).read_table("figures")
+    measured = read_measured(results)
+    near = {f"near_{claim.ours}": claim.near for claim in paper()[0]}
+    header = fill(HEADER, near, {"headline": headline(comparison, figures)})
     sections = {
         "Figures": table(FIGURES, figure_cells(figures)),
         "Printed numbers": [
             *table(HEADS["number"], comparison_cells(comparison, "number")),
             "",
+            CHOSEN,
+            "",
             given_sentence(comparison),
         ],
-        "Statements": table(HEADS["sentence"], comparison_cells(comparison, "sentence")),
+        "Statements": [
+            fill(THRESHOLDS, thresholds(comparison)),
+            "",
+            *table(HEADS["sentence"], comparison_cells(comparison, "sentence")),
+        ],
     }
     if (results / "solvers" / "summary.csv").is_file():
-        sections["Solvers"] = [SOLVERS, "", *solver_table(results)]
+        words = {"saddles": _saddles(results)}
+        sections["Solvers"] = [fill(SOLVERS, measured, words), "", *solver_table(results)]
+    if (results / "corners" / "jumps.csv").is_file():
+        sections["Ends of junctions"] = [fill(CORNERS, measured), "", *jump_table(results)]
+    if (results / "accuracy" / "savings.csv").is_file():
+        above = {"above": measured["accuracy.most_over_estimate"] - 1.0}
+        sections["Adaptive meshes"] = [fill(ACCURACY, measured | above, {"worse": _worse(results)})]
+    for title, study, text in (("Mesh check", "mesh_check", CHECK), ("Panels", "panels", PANELS)):
+        if (results / study / "measured.csv").is_file():
+            sections[title] = [fill(text, measured)]
     if (results / "benchmark" / "full.csv").is_file():
-        sections["Speed"] = [SPEED, "", *speed_table(results)]
+        sections["Speed"] = [SPEED, "", *fair_pairs(results), *speed_table(results)]
     parts = ["\n".join([f"## {title}", "", *lines]) for title, lines in sections.items()]
-    return "\n\n".join([HEADER, *parts]) + "\n"
+    return "\n\n".join(map(wrapped, "\n\n".join([header, *parts]).split("\n\n"))) + "\n"
+
+
+def wrapped(paragraph: str) -> str:
+    """A paragraph in lines of WIDTH; headings, lists and tables as they are.
+
+    >>> len(wrapped("a word, " * 20).splitlines())
+    2
+    """
+    if paragraph.startswith(("#", "- ", "|")):
+        return paragraph
+    return textwrap.fill(" ".join(paragraph.split()), WIDTH, break_on_hyphens=False, break_long_words=False)
+
+
+def headline(comparison: pd.DataFrame, figures: pd.DataFrame) -> str:
+    """One sentence: how many figures, numbers and statements are reproduced, and how many by choice."""
+    figure = [int((figures.label == label).sum()) for label in (REPRODUCED, CONDITIONAL, NOT)]
+    numbers, sentences = (of_the_paper(comparison, kind) for kind in ("number", "sentence"))
+    hold, near = (int((numbers.verdict == verdict).sum()) for verdict in (HOLDS, NEAR))
+    chosen = [str(what) for what in numbers.chosen[numbers.verdict == HOLDS].fillna("") if what]
+    why = f" ({len(chosen)} of them because we chose {listed(chosen)} so)" if chosen else ""
+    held = sentences[sentences.verdict == HOLDS]
+    return (
+        f"Of the paper's {len(figures)} figures, {figure[0]} is reproduced, {figure[1]} are reproduced"
+        f" conditionally and {figure[2]} is not; of its {len(numbers)} printed numbers, {hold} hold{why},"
+        f" {near} are near and {len(numbers) - hold - near} differ; {len(held)} of its {len(sentences)}"
+        f" statements hold, {(held.threshold == 'ours').sum()} of them by a threshold of ours."
+    )
+
+
+def of_the_paper(comparison: pd.DataFrame, kind: str) -> pd.DataFrame:
+    """The paper's own claims of a kind, without our additions."""
+    return comparison[(comparison.kind == kind) & ~comparison["where"].str.endswith(OWN)]
+
+
+def thresholds(comparison: pd.DataFrame) -> dict[str, float]:
+    """How many statements, the paper's and our additions, there are, and rest on a threshold of ours."""
+    every = comparison[comparison.kind == "sentence"]
+    papers = of_the_paper(comparison, "sentence")
+    ours, added = (float((rows.threshold == "ours").sum()) for rows in (papers, every))
+    rest = float(len(every) - len(papers))
+    return {"paper": ours, "papers": float(len(papers)), "own": added - ours, "owns": rest}
+
+
+def _saddles(results: Path) -> str:
+    """The examples in which the geometric solver ends on saddles."""
+    records = Folder(results / "solvers").read_table("records")
+    examples = sorted(records.example[records.verdict == "saddle"].unique())
+    return f"all in Example{'s' if len(examples) > 1 else ''} " + listed(
+        [str(name).removeprefix("example") for name in examples]
+    )
+
+
+def _worse(results: Path) -> str:
+    """The error bars for which adaptive meshes need more triangles than uniform ones."""
+    savings = Folder(results / "accuracy").read_table("savings")
+    worse = savings[savings.saving < 1.0]
+    rows = zip(worse.quantity, worse.family, worse.bar_of, 1.0 / worse.saving, strict=True)
+    words = [f"the {what} of `{of}`, {bar}, {times:.2f} times as many" for what, of, bar, times in rows]
+    return listed(words or ["none"])
+
+
+def jump_table(results: Path) -> list[str]:
+    """The steps of the energy that ``corners`` looks into."""
+    head = ["Example", "Bottoms", "Level", "Solved anew", "Vertices moved", "Step of E", "On halved meshes"]
+    rows = Folder(results / "corners").read_table("jumps").to_dict("records")
+    cells = [
+        [
+            row["case"],
+            row["bottom"],
+            row["level"],
+            "yes" if row["anew"] else "no",
+            *(f"{row[key]:.2g}".replace("nan", "") for key in ("slid", "step", "step_halved")),
+        ]
+        for row in rows
+    ]
+    return table(head, cells)
+
+
+def fair_pairs(results: Path) -> list[str]:
+    """The benchmark's rows in which both programs do the same work; no line where one of them is missing."""
+    rows = Folder(results / "benchmark").read_table("full").drop_duplicates("what")
+    # of rows with one name the first: of Newton steps that on the smaller mesh
+    seconds = {str(what): float(median) for what, median in zip(rows["what"], rows["median"], strict=True)}
+    ratios = {
+        key: seconds.get(theirs, math.nan) / seconds.get(ours, math.nan)
+        for key, (theirs, ours) in FAIR_PAIRS.items()
+    }
+    if any(map(math.isnan, ratios.values())):
+        return []
+    faster = f"so {'Evolver' if ratios['extrapolated'] < 1.0 else 'pcmc'} is the faster one"
+    return [fill(FAIR, ratios, {"faster": faster}), ""]
 
 
 def given_sentence(comparison: pd.DataFrame) -> str:
@@ -89,14 +269,15 @@ def given_sentence(comparison: pd.DataFrame) -> str:
     given = comparison[comparison.kind == "input"]
     differ = given[given.verdict != HOLDS].what.tolist()
     rest = f"; not so: {', '.join(differ)}" if differ else ""
-    used = len(given) - len(differ)
-    return f"{used} of the {len(given)} inputs that the paper prints are used as printed{rest}."
+    used = {"used": float(len(given) - len(differ)), "inputs": float(len(given))}
+    return " ".join(fill(GIVEN, used, {"rest": rest}).split())
 
 
 def comparison_cells(comparison: pd.DataFrame, kind: str) -> list[list[str]]:
     """A row of words for each claim of a kind."""
     cells = []
-    for row in comparison[comparison.kind == kind].to_dict("records"):
+    shown = comparison.assign(**comparison[["chosen", "threshold"]].fillna(""))
+    for row in shown[shown.kind == kind].to_dict("records"):
         equal = row["relation"] == "="
         paper = f"{'' if equal else row['relation'] + ' '}{row['paper']:.7g}"
         ours = f"{row['ours']:.6g}"
@@ -104,7 +285,9 @@ def comparison_cells(comparison: pd.DataFrame, kind: str) -> list[list[str]]:
         difference = [f"{row['difference']:+.3g}" if known else ""] if kind == "number" else []
         if kind == "sentence":
             paper, ours = f"{row['relation']} {row['paper']:.4g}", f"{row['ours']:.4g}"
-        cells.append([row["what"], row["where"], paper, ours, *difference, row["verdict"]])
+            paper += " (ours)" if row["threshold"] == "ours" else ""
+        so = f"; {row['chosen']} is chosen so" if row["chosen"] and row["verdict"] == HOLDS else ""
+        cells.append([row["what"], row["where"], paper, ours, *difference, row["verdict"] + so])
     return cells
 
 

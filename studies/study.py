@@ -13,6 +13,7 @@ from typing import Any
 
 import pandas as pd
 
+from .code import code_of
 from .folder import Folder, write_json
 
 STEPS = ("data", "table", "figure")
@@ -87,8 +88,9 @@ def provenance(study: Study, folder: Folder, short: bool, seconds: Mapping[str, 
     """What the numbers came from, apart from the numbers."""
     return {
         "study": study.name,
-        "commit": _git("rev-parse", "HEAD"),
-        "uncommitted_changes": bool(_git("status", "--porcelain", "--", "*.py", "*.toml")),
+        "commit": git("rev-parse", "HEAD"),
+        "uncommitted_changes": bool(git("status", "--porcelain", "--", "*.py", "*.toml")),
+        "code": code_of(study.data.__module__),
         "short": short,
         "parameters": dict(study.parameters),
         "meshes": folder.mesh_hashes(),
@@ -98,7 +100,7 @@ def provenance(study: Study, folder: Folder, short: bool, seconds: Mapping[str, 
     }
 
 
-def _git(*words: str) -> str:
+def git(*words: str) -> str:
     """What git answers about the checkout this file is in; empty where there is none."""
     command = ["git", "-C", str(Path(__file__).parent), *words]
     try:

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import FAILED
 from ..certificate import Certificate
 from ..certificate.balance import overload
 from ..certificate.tables import names_of
@@ -32,7 +33,6 @@ RUNNING_AWAY = {
     Status.DIVERGED: "it inflates without bound",
     Status.VANISHED: "it shrinks to nothing",
 }
-FAILED_QUALITY = 0.05  # triangle quality that shows where a solve failed
 
 
 class MeshVerdict(Enum):
@@ -65,7 +65,7 @@ def lost(start: Surface, result: Result) -> Finding:
     if result.status in RUNNING_AWAY:
         what = f"{RUNNING_AWAY[result.status]}, most"
         vertices = np.linalg.norm(surface.vertices - start.vertices, axis=1).argmax(keepdims=True)
-    elif quality[worst] < FAILED_QUALITY:
+    elif quality[worst] < FAILED:
         what, vertices = "its triangles collapse", surface.faces[worst]
     else:
         left = np.linalg.norm(Equilibrium.of(surface).unbalanced, axis=1)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.arrays import Bools
+from ..base.tolerances import EXCESS, HARDLY, ON, PARALLEL
 from ..forces.cables import cable_pulls
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
@@ -14,9 +15,6 @@ from ..surface.supports import common_point, uncancelled_pressures
 from ..surface.values import balanced_wall
 from .forces import load
 from .proof import Overload, UnbalancedJunction, Unheld
-
-ROUNDED = 1e-9  # a load, or a tension, that exceeds what balances it by less may do so by rounding alone
-HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 
 
 def load_name(surface: Surface) -> str:
@@ -62,7 +60,7 @@ def overload(surface: Surface) -> Overload | None:
         return None
     fixed = np.asarray(surface.pinned[surface.topology.edges].all(axis=1))
     ratio = abs(load(surface)) / (_capacity(surface, fixed) or np.inf)
-    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 + ROUNDED else None
+    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 + EXCESS else None
 
 
 def load_is_given(surface: Surface) -> bool:
@@ -83,7 +81,7 @@ def load_is_given(surface: Surface) -> bool:
     pulling = surface.faces[surface.tensions[surface.patch_of_face] > 0.0]
     normals = [np.dot(plane.normal, surface.plane.normal) for plane, _ in surface.on_planes]
     varies = surface.rooms or surface.heavy or surface.given_supports.on_line
-    if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > 1e-9 for up in normals):
+    if varies or surface.on_ground[pulling].any() or any(abs(float(up)) > PARALLEL for up in normals):
         return False
     alone = pinned.copy()
     alone[topo.edges[pinned[topo.edges].all(axis=1)]] = False
@@ -137,7 +135,7 @@ def coarseness(surface: Surface) -> float:
     return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
-def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + ROUNDED) -> UnbalancedJunction | None:
+def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + EXCESS) -> UnbalancedJunction | None:
     """A junction whose tensions cannot balance at any angles; None if there is none.
 
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others, or here ``share`` of it. A
@@ -262,7 +260,7 @@ def _scaled(surface: Surface) -> list[tuple[int, bool]]:
         planes = [(surface.plane, given.on_plane), *surface.on_planes]
         there = [plane for plane, mask in planes if (mask & (parts == part)).any()]
         point = common_point(np.array(there[0].point), there) if len(there) > 1 else None
-        if point is None or all(abs(plane.height(point)) <= 1e-9 * surface.size for plane in there):
+        if point is None or all(abs(plane.height(point)) <= ON * surface.size for plane in there):
             loose.append((part, bool(part in pressed)))
     return loose
 

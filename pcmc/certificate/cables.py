@@ -10,13 +10,12 @@ from scipy.optimize import brentq
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
+from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.geometry import cross_2d
 from ..surface.symmetry import mirrored
 from .forces import cable_parts
 from .proof import WeakCable
-
-FLAT = 1e-9  # of the size: fixed points this near to one plane lie in it; the least excess that counts
 
 
 def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
@@ -93,7 +92,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     if plane is None:
         return None
     topo, fixed = surface.topology, surface.fixed
-    found: tuple[float, WeakCable | None] = 1.0 + FLAT, None
+    found: tuple[float, WeakCable | None] = 1.0 + ON, None
     alpha = float(surface.tensions[surface.patch_of_face[0]])
     inner = fixed[topo.edges].all(axis=1) & ~topo.boundary_edge
     disc = surface.n - len(topo.edges) + surface.m == 1 and not np.ptp(topo.components)
@@ -125,7 +124,7 @@ def _plane_of_sail(surface: Surface) -> Floats | None:
     if loads or slides or not len(outer) or not outer.all() or topo.valence.max() > 2 or len(X) < 2:
         return None
     _, sizes, axes = np.linalg.svd(X - X.mean(axis=0))
-    flat = len(X) < 3 or sizes[2] <= FLAT * sizes[0]
+    flat = len(X) < 3 or sizes[2] <= ON * sizes[0]
     return axes[:2].T if flat and not np.ptp(tensions) and tensions[0] > 0.0 else None
 
 
@@ -153,7 +152,7 @@ def _angles(chords: Floats) -> Floats:
     """(k,) the angle β at the start of each side (k,2) of a polygon; infinite where it does not turn once."""
     before = np.roll(chords, 1, axis=0)
     turns = np.arctan2(cross_2d(before, chords), np.einsum("ij,ij->i", before, chords))
-    once = abs(abs(turns.sum()) - 2.0 * math.pi) < FLAT
+    once = abs(abs(turns.sum()) - 2.0 * math.pi) < ON
     return np.asarray(math.pi - np.sign(turns.sum()) * turns if once else np.full(len(turns), math.inf))
 
 
@@ -164,6 +163,6 @@ def _least_factor(small: float, large: float, angle: float) -> float:
     def excess(factor: float) -> float:
         return math.asin(0.5 * small / factor) + math.asin(min(1.0, 0.5 * large / factor)) - angle
 
-    if least == 0.0 or excess(least) <= 0.0 or angle < FLAT:
+    if least == 0.0 or excess(least) <= 0.0 or angle < ON:
         return least
     return float(brentq(excess, least, 2.0 * (small + large) / min(1.0, angle)))

@@ -17,6 +17,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
+from ..base.tolerances import AT_REST, COLLAPSED, NEAR_NEUTRAL, NEUTRAL
 from ..base.units import NO_UNITS, Units
 from ..forces.functional import energy
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
@@ -24,7 +25,7 @@ from ..forces.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import NEAR, NEUTRAL, Spectrum, count_soft, lowest
+from ..stability.modes import Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
 from .balance import load_ratio, pressures_left_over
@@ -40,9 +41,7 @@ from .tables import (
     patch_table,
     room_table,
 )
-from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
-
-TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
+from .verdict import Evidence, Findings, Verdict, judge
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +263,7 @@ def certify(
     surface: Surface,
     *,
     modes: int = 1,
-    tolerance: float = TOLERANCE,
+    tolerance: float = AT_REST,
     evidence: Evidence | None = None,
     tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
@@ -379,7 +378,7 @@ def _stability(
     """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
     square = equilibrium.shape.size**2
     clear = clear if clear is not None and clear.of.same_as(equilibrium) else None
-    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR / square, clear)
+    spectrum, system = count_soft(equilibrium, NEUTRAL / square, NEAR_NEUTRAL / square, clear)
     if system is not None and modes > 0:
         try:
             return spectrum, *lowest(system, modes)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import EXCESS
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import add_values
@@ -30,7 +31,6 @@ from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
 
 CableEnd = tuple[Cable, int, Floats]
-SPAN = 1e-9  # of the largest force: what planes leave of the forces that they carry
 
 
 def loads(surface: Surface) -> Floats:
@@ -282,7 +282,7 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Boo
     ground = surface.on_plane | (surface.fixed & lying(surface.plane.height(X), X))
     on = np.array([ground, *(mask for _, mask in surface.on_planes)])
     clamped = surface.given_supports.fixed_and_sliding()[0]
-    least = SPAN * float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    least = EXCESS * float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     across = [part - symmetric_part(surface.on_planes, part.copy()) for part in (forces, ends)]
     for _ in range(2):  # again with those clamped that planes cannot carry, as where a held bottom is pinched
         here = np.where(clamped, on & mirror, on)

@@ -9,11 +9,11 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import PINCHED
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from .forces import held_boundary
 
-PINCHED = 0.1  # of the held curves' length: a neck shorter than this has pinched off
 UNITS = 500_000_000  # of the length of all edges: the flow counts in whole numbers
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import PARALLEL, SAME_PLACE
 from ..surface import Plane, Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, EdgeCurve, vertex_kind
@@ -18,7 +19,6 @@ from .tables import middle, names_of
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
 COLUMNS = ["support", "name", "kind", "length", *"xyz", *FORCE, *MOMENT, "per_length_max"]
 LETTERS = {"point": "S", "cable end": "C"}  # of the kinds whose forces act at one point; B for the others
-STEEP = 1e-9  # of a normal's part along that of Π, up to which a plane is upright
 COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
 NONE: Ints = np.empty(0, dtype=np.int64)
 
@@ -60,7 +60,7 @@ def support_table(acting: Forces) -> pd.DataFrame:
     """
     rows, X, edges = [], acting.surface.vertices, acting.surface.topology.edges
     for part in _labelled(acting):
-        at = np.where(np.abs(part.place) <= 1e-12 * acting.surface.size, 0.0, part.place)
+        at = np.where(np.abs(part.place) <= SAME_PLACE * acting.surface.size, 0.0, part.place)
         moment = np.cross(X[part.vertices] - at, part.forces).sum(axis=0)
         _, pulls = _pulled(acting, part)
         most = float(np.linalg.norm(pulls, axis=1).max()) if len(pulls) else np.nan
@@ -286,5 +286,5 @@ def _support_of_edge(surface: Surface) -> Ints:
 
 
 def _kind(surface: Surface, plane: Plane) -> str:
-    steep = abs(float(np.dot(plane.normal, surface.plane.normal))) <= STEEP
+    steep = abs(float(np.dot(plane.normal, surface.plane.normal))) <= PARALLEL
     return "upright plane" if steep else "plane"

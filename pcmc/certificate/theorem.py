@@ -27,6 +27,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import AT_REST, PARALLEL
 from ..base.units import NO_UNITS, Units
 from ..forces.motion_space import MotionSpace
 from ..forces.pinching import StandingPart
@@ -36,7 +37,6 @@ from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
 from ..surface import Surface, expect_surface
 from .balls import SAFE, U
-from .certificate import TOLERANCE
 from .lipschitz import lipschitz
 from .system import System, system
 
@@ -44,7 +44,6 @@ STEPS = 5  # of inverse iteration for the least eigenvalue: then mostly within a
 SHARE = 0.8  # of that estimate: the first σ; each failure halves it
 TRIES = 5
 REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
-LEVEL = 1e-9  # of a unit motion along Π: a part across it that is rounding
 MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
 
 
@@ -142,7 +141,7 @@ def _proved(surface: Surface) -> Theorem:
     at = Equilibrium.of(surface)
     part, space, free = at.part, at.space, at.rigid
     _refuse(part, space, at.rigid_motions if free.shape[1] else at.rigid_motions[:0])
-    if not at.residual <= TOLERANCE:
+    if not at.residual <= AT_REST:
         raise _Unproved(f"it is not at rest: the residual is {at.residual:.1e}; solve it first")
     found = system(part, space, free)
     index, gap, newton = _inertia(found)
@@ -200,7 +199,8 @@ def _refuse(part: StandingPart, space: MotionSpace, rigid: Floats) -> None:
         raise _Unproved("a cable has a weight, for which no bounds are known")
     n = np.array(surface.plane.normal)
     level = (
-        not len(rigid) or max(np.abs(rigid[:, 0] @ n).max(), np.abs(np.cross(rigid[:, 1], n)).max()) < LEVEL
+        not len(rigid)
+        or max(np.abs(rigid[:, 0] @ n).max(), np.abs(np.cross(rigid[:, 1], n)).max()) < PARALLEL
     )
     if len(rigid) and (surface.uncancelled.any() or (surface.weights.any() and not level)):
         raise _Unproved("its weight or pressure pushes along rigid motions that no support resists")

@@ -10,9 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.tolerances import COLLAPSED, NEAR_NEUTRAL, NEUTRAL, NOISE, WEAK
 from ..forces.cables import compressed_cables
 from ..forces.triangles import compressed, effective_tensions
-from ..stability.modes import NEAR, NEUTRAL, Spectrum
+from ..stability.modes import Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
@@ -20,17 +21,14 @@ from .diagnosis import describe_saddle, held_wall_down, where_collapsed
 from .neck import Neck, pinched_neck
 from .proof import Attempt, Overload, Proof
 
-NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 NO_TENSION = "no patch has a tension: every shape is at rest"
-COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
 
 
 class Verdict(Enum):
     """What kind of equilibrium a surface is, or why it is none. The value is a sentence."""
 
-    STABLE = "stable: at rest, and every small change of shape raises the energy"
+    STABLE = "stable: at rest, and every small change of shape of this mesh raises the energy"
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
@@ -243,7 +241,7 @@ def _saddle(f: Findings) -> list[object]:
 
 def _near_fold(f: Findings) -> str:
     """Names what nearly lets go, so that the certificate of a fold says where it is; else empty."""
-    count, band = (f.spectrum.soft, NEUTRAL) if f.spectrum.soft else (f.spectrum.near, NEAR)
+    count, band = (f.spectrum.soft, NEUTRAL) if f.spectrum.soft else (f.spectrum.near, NEAR_NEUTRAL)
     if not count:
         return ""
     index = f.spectrum.index
@@ -268,7 +266,7 @@ RULES: tuple[Rule, ...] = (
     (Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
     (Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
     (Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
-    (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > SMALL * f.tolerance, _weak_patch),
+    (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > WEAK * f.tolerance, _weak_patch),
     (Verdict.SADDLE, lambda f: compressed(f.surface).any(), _compressed),
     (Verdict.SADDLE, lambda f: compressed_cables(f.surface).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),

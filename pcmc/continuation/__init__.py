@@ -1,6 +1,6 @@
 """Following a branch of equilibria as tensions, pressures or the boundary change, and others that leave it.
 
-Gives ``follow``, ``Direction`` and ``BoundaryMotion``. May import ``solvers`` and the rooms below it.
+Gives ``follow``, ``Direction`` and ``BoundaryMotion``. May import ``solvers`` and below.
 """
 
 from .boundary_motion import BoundaryMotion

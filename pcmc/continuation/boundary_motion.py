@@ -19,12 +19,12 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..base.tolerances import ON
 from ..forces.functional import energy_and_gradient
 from ..surface import Surface
 from .direction import ParameterLine
 
 DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ
-SAME_PLACE = 1e-9  # of the surface's size: how far P(start) may be from the fixed vertices
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class BoundaryMotion:
             raise OptionError(message, what="parameter", found=name)
         line = BoundaryLine(self.start, {}, {}, self.positions, int(surface.pinned.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.pinned], axis=1)
-        if off.max() > SAME_PLACE * surface.size:
+        if off.max() > ON * surface.size:
             worst = int(np.flatnonzero(surface.pinned)[off.argmax()])
             message = f"BoundaryMotion: positions({self.start:g}) is not the surface's boundary: fixed vertex"
             raise OptionError(
@@ -95,7 +95,6 @@ class BoundaryLine(ParameterLine):
         return abs(self.value) or 1.0
 
     def surface_at(self, surface: Surface, value: float) -> Surface:
-        """The surface itself."""
         return surface
 
     def boundary(self, value: float) -> Floats:

@@ -12,12 +12,11 @@ import pandas as pd
 
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..certificate.parameters import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
 from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
-from .direction import Direction, ParameterLine
+from .direction import Direction, Named, ParameterLine
 from .options import Ending, FollowOptions
 from .state import QUANTITIES, BranchMesh
 from .tracing import Tracer
@@ -29,13 +28,13 @@ class Branch:
 
     Attributes
     ----------
-    points : one row per point: arclength s (a number), parameter λ, the values that vary (``tension NAME``,
+    points : a row per point: arclength s (a number), parameter λ, the values that vary (``tension NAME``,
         ``pressure NAME``), energy (force·length), volume (length³, that of certificates), height over Π
         (length), index, lowest_eigenvalue (force/length³), residual (relative), quality of the worst
         triangle, slope dλ/ds, iterations of Newton's method.
-    events : one row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
-        arclength, the index before and after it, and, of a change of index, along_branch: the cosine between
-        the mode that turns and the branch: 1 at a fold; 0 where the branch goes on and others leave it.
+    events : a row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
+        arclength, the index before and after, and along_branch, the cosine between the mode that turns and
+        the branch: 1 at a fold; 0 where the branch goes on and others leave it.
     surfaces, event_surfaces : by row of ``points``, and of ``events``.
     ending, detail : why the branch ends, and the last difficulty.
     """
@@ -97,13 +96,12 @@ class Branch:
 
         Raises
         ------
-        OptionError : the event is not a bifurcation: a fold, a change of contact, or without a mode of
-            eigenvalue 0; or several modes turn at once.
+        OptionError : the event is no bifurcation, or several modes turn at once.
 
         Notes
         -----
         The mesh must have the symmetry that makes the bifurcation. On another mesh the branches pass
-        each other at a small distance: the one followed bends away smoothly, without an event.
+        each other at a small distance, without an event.
 
         The event is where an eigenvalue of the Hessian passes 0. The equations of equilibrium on a mesh
         are singular a little beside it, to second order in the edge length; there the branches leave.
@@ -177,7 +175,7 @@ def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
 
 def follow(
     surface: Surface,
-    parameter: str | Parameter | Direction | BoundaryMotion,
+    parameter: str | Named | Direction | BoundaryMotion,
     stop: float | None = None,
     *,
     until: Mapping[str, float] | None = None,
@@ -247,7 +245,7 @@ def follow(
         raise MissingExtra("mmgpy", "remesh")
     goals = _goals(stop, until)
     direction: object = Direction({parameter: 1.0}) if isinstance(parameter, str) else parameter
-    if isinstance(parameter, Parameter):
+    if isinstance(parameter, Named):
         by_kind: dict[str, Any] = {parameter.key: dict.fromkeys(parameter.names, 1.0)}
         direction = Direction(**by_kind)
     if not isinstance(direction, Direction | BoundaryMotion):

@@ -1,12 +1,8 @@
 """A point of a branch with its tangent, its index and its lowest eigenvalues; and where other branches leave.
 
-At a bifurcation an eigenvalue of J passes 0 with a mode φ, and the branch does not turn. There equilibria
-that leave along ±φ are searched for on the planes across φ,
-
-    r(X, λ) = 0,    ⟨φ, X - X*⟩ = ±ε,
-
-with λ free: they have the distance ε along φ, so Newton's method cannot fall back on the known branch,
-which passes through X* across φ or at an angle (Keller 1977; Seydel 2010, ch. 5).
+At a bifurcation an eigenvalue of J passes 0 with a mode φ, and the branch does not turn. Equilibria that
+leave along ±φ are searched for with r(X, λ) = 0 and ⟨φ, X - X*⟩ = ±ε, λ free: at the distance ε along φ
+Newton's method cannot fall back on the known branch (Keller 1977; Seydel 2010, ch. 5).
 """
 
 from __future__ import annotations
@@ -20,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..base.tolerances import NULL_MODE
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from .correction import BorderedMatrix, NotOnBranch, correct, fixed_arclength
@@ -27,7 +24,6 @@ from .options import FollowOptions
 from .state import BranchMesh, BranchState
 
 TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
-NULL = 0.05  # of the next eigenvalue: how far from 0 that of the mode may be
 DRIFT = 1e-6  # of the size: mean displacement of a mode of size 1 below which it has no direction
 ALONG = 0.5  # cosine between mode and branch from which the branch itself turns: a fold
 
@@ -80,10 +76,7 @@ class BranchPoint:
 
 
 def branch_point(at: BranchState, before: Tangent | float) -> BranchPoint:
-    """The point of the branch at a state on it.
-
-    ``before`` gives the sense of the tangent: a tangent nearby, or the sign of dλ/ds.
-    """
+    """The point of the branch at a state on it, its tangent as one nearby or with this sign of dλ/ds."""
     scale = at.mesh.line.scale
     if isinstance(before, Tangent):
         matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
@@ -128,20 +121,15 @@ def along_branch(at: BranchPoint, count: int) -> float:
 def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int) -> list[BranchPoint]:
     """The first point of the branch along φ and of that along -φ, from the bifurcation on a mesh.
 
-    φ has the sign with which the surface rises over Π in the mean; where it does not, the one with which
-    it moves along Π's first axis, or its second.
-
-    Raises
-    ------
-    OptionError
-        If no mode has the eigenvalue 0 there, or no other branch is found; ``where`` is ``row``.
+    With φ the surface rises over Π in the mean or, if it does not, moves along Π's first axis, or its second.
+    OptionError if no mode has the eigenvalue 0 there, or no other branch is found.
     """
     at = BranchState(mesh, mesh.surface.vertices, parameter)
     try:
         values, modes = soft_modes(at, 2)
     except NotOnBranch as reason:
         raise OptionError(f"event {row}: {reason}", what="event", where=row) from None
-    if len(values) > 1 and not abs(values[0]) <= NULL * abs(values[1]):
+    if len(values) > 1 and not abs(values[0]) <= NULL_MODE * abs(values[1]):
         message = (
             f"no mode turns at event {row}: the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"
         )

@@ -4,8 +4,8 @@ The unknowns are the positions X and the parameter λ:
 
     r(X, λ) = B(X)ᵀ ∇E(X; λ) = 0,    g(X, λ) = 0
 
-with g a condition on arclength, volume, height or λ itself. (Where λ moves the boundary, X moves along
-with it, and derivatives by λ are total ones.) A Newton step solves
+with g a condition on arclength, volume, height or λ itself. Where λ moves the boundary, derivatives by λ are
+total ones. A Newton step solves
 
     [ J   f ] [ s ]     [ -r ]        J s = dr along s,  f = Bᵀ ∂∇E/∂λ
     [ cᵀ  d ] [ δλ]  =  [ -g ]        c = Bᵀ ∂g/∂X,  d = ∂g/∂λ
@@ -24,14 +24,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import BRANCH_END, ON_BRANCH
 from ..stability.bordered import BorderedFactor, solve_preconditioned
 from ..stability.factorisation import SingularMatrix
 from .state import BranchMesh, BranchState
 
 ITERATIONS = 12  # most Newton steps of a correction
 SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
-LEAST_QUALITY = 0.02  # triangle quality below which no point is accepted
-CONSTRAINT_TOLERANCE = 1e-9  # |g| that counts as zero
 
 
 class NotOnBranch(ArithmeticError):
@@ -64,7 +63,6 @@ class Constraint:
 
 
 def fixed_parameter(parameter: float, scale: float) -> Constraint:
-    """λ is given."""
     return Constraint(
         lambda at: (at.parameter - parameter) / scale, lambda at: np.zeros_like(at.X), 1.0 / scale, parameter
     )
@@ -80,24 +78,22 @@ def fixed_arclength(near: BranchState, row: Floats, rate: float) -> Constraint:
 
 
 def fixed_volume(mesh: BranchMesh, volume: float) -> Constraint:
-    """The volume is given."""
-    unit = mesh.full.size**3
+    unit = mesh.size**3
     return Constraint(lambda at: (at.volume - volume) / unit, lambda at: at.volume_gradient / unit, 0.0)
 
 
 def fixed_height(mesh: BranchMesh, vertex: int, height: float) -> Constraint:
     """The height of one vertex over Π is given."""
-    plane, unit = mesh.surface.plane, mesh.full.size
-    row = np.zeros((mesh.full.n, 3))
+    plane, unit = mesh.surface.plane, mesh.size
+    row = np.zeros((mesh.surface.n, 3))
     row[vertex] = np.array(plane.normal) / unit
     return Constraint(lambda at: float(plane.height(at.X[vertex]) - height) / unit, lambda _: row, 0.0)
 
 
 class BorderedMatrix:
-    """The matrix [[J, f], [cᵀ, d]] at a state, with H factorised.
+    """The matrix [[J, f], [cᵀ, d]] at a state, with A factorised.
 
-    The last row is ⟨row, motion⟩ + rate δλ, where the motion takes in what follows the boundary as λ
-    changes; ``unit`` brings it to the size of the others.
+    The last row is ⟨row, motion⟩ + rate δλ, with what follows the boundary, in a ``unit`` like the others.
     """
 
     def __init__(self, at: BranchState, row: Floats, rate: float) -> None:
@@ -140,24 +136,24 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
     for iteration in range(1, ITERATIONS + 2):
         if not mesh.line.allows(at.parameter):
             raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
-        if iteration > 1 and at.quality < LEAST_QUALITY:
+        if iteration > 1 and at.quality < BRANCH_END:
             raise MeshCollapsed("triangles collapse")
         if iteration > 1 and mesh.reaches_plane(at.X).any():
             raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method
         g = constraint.value(at)
-        if at.residual <= tolerance and abs(g) <= CONSTRAINT_TOLERANCE:
+        if at.rest.residual <= tolerance and abs(g) <= ON_BRANCH:
             return at
-        error = at.residual + abs(g)
+        error = at.rest.residual + abs(g)
         slow = 0 if error < SLOW * last else slow + 1
-        if slow >= 3 or not np.isfinite(at.residual + g):
+        if slow >= 3 or not np.isfinite(at.rest.residual + g):
             break
         last = error
         matrix = BorderedMatrix(at, constraint.gradient(at), constraint.rate)
         s, change = matrix.solve(-at.rest.defects, -g, 1e-3)
         size = at.rest.space.size
         step = at.motion(s[:size], change)
-        if not np.abs(step).max() < mesh.full.size:
+        if not np.abs(step).max() < mesh.size:
             break
         value = at.parameter + change if asked is None else asked
-        at = at.step(step, value, iteration, at.with_rooms(s[size:]))
-    raise NotOnBranch(f"Newton's method does not converge (residual {at.residual:.1e})")
+        at = at.step(step, value, iteration, s[size:])
+    raise NotOnBranch(f"Newton's method does not converge (residual {at.rest.residual:.1e})")

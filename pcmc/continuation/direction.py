@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..base.tolerances import ON_BRANCH
 from ..forces.parameters import Rates, energy_by, gradient_by
 from ..forces.rooms import refuse_varied_pressure
 from ..surface import Surface
@@ -23,7 +25,17 @@ from ..surface.supports import apply_supports
 from ..surface.values import KINDS, part_index, part_values, rates_of
 
 VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
-SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same λ
+
+
+@runtime_checkable
+class Named(Protocol):
+    """What names the parts whose value varies, and one of ``VARIED``, such as ``pcmc.Parameter``."""
+
+    @property
+    def key(self) -> str: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -110,7 +122,7 @@ class Direction:
         ]
         (first, value), *others = given
         for name, other in others:
-            if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
+            if abs(other - value) > ON_BRANCH * max(abs(value), abs(other)):
                 text = (
                     f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give weights"
                 )

@@ -1,8 +1,7 @@
 """The part of a branch between two of its points: where it meets a goal, turns, or changes its index.
 
-Everything is a function of the arclength t from the first point, on the mesh of that point. A quantity
-that turns on the way may pass a goal twice, with both ends on one side of the goal. So its turning point
-is located first, and the goal is searched for before and behind it.
+Everything is a function of the arclength t from the first point, on the mesh of that point. A quantity that
+turns on the way may pass a goal twice: the goal is searched for before and behind its turning point.
 """
 
 from __future__ import annotations
@@ -14,13 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.tolerances import EVENT_ACCURACY, FOLD_ACCURACY, GOAL_ACCURACY
 from ..forces.functional import patch_volumes
 from .branch_point import BranchPoint, branch_point
 from .state import BranchState
-
-EVENT_ACCURACY = 2e-5  # arclength to which events are located, and so λ relative to its scale
-FOLD_ACCURACY = 1e-3  # the same for folds, over the segment's length: λ hardly changes with t there
-GOAL_ACCURACY = 1e-12  # arclength to which goals are met
 
 
 def crosses_goal(before: BranchState, after: BranchState, goals: Mapping[str, float]) -> bool:
@@ -32,10 +28,7 @@ def crosses_goal(before: BranchState, after: BranchState, goals: Mapping[str, fl
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The branch between two of its points, which are ``length`` of arclength apart.
-
-    ``solve`` gives the state on the branch at t from ``start``, on the mesh of ``start``.
-    """
+    """The branch from ``start`` over a ``length`` to ``end``; ``solve`` gives the state at t."""
 
     start: BranchPoint
     end: BranchPoint
@@ -64,13 +57,13 @@ class Segment:
         if name == "parameter":
             return tangent.slope
         if name == "height":
-            normal = np.array(state.surface.plane.normal)
+            normal = np.array(state.rest.surface.plane.normal)
             return float(tangent.direction[state.highest_vertex] @ normal)
         if name == "volume":
             return float((state.volume_gradient * tangent.direction).sum())
         by_position = float((state.rest.gradient * tangent.direction).sum())
-        by_parameter = state.mesh.line.energy_derivative(state.surface, state.X, state.parameter)
-        cones = state.surface.room_signs @ patch_volumes(state.surface.moved(state.X))
+        by_parameter = state.mesh.line.energy_derivative(state.rest.surface, state.X, state.parameter)
+        cones = state.rest.surface.room_signs @ patch_volumes(state.rest.shape)
         return by_position + by_parameter * tangent.slope - float(cones @ at.room_rates)
 
     def turning_point(self, name: str) -> float | None:

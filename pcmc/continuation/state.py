@@ -1,4 +1,4 @@
-"""A mesh on a branch, and on it positions X and a parameter λ, with the equations r = B(X)ᵀ ∇E(X; λ) = 0."""
+"""Positions X on a mesh of a branch and a parameter λ, with the equations r = B(X)ᵀ ∇E(X; λ) = 0."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..forces.motion_space import MotionSpace
-from ..forces.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
+from ..forces.pinching import standing_part
 from ..forces.rooms import with_room_pressures
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
@@ -26,27 +26,21 @@ QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a go
 
 
 class BranchMesh:
-    """What the points of a branch share as long as neither the mesh nor the contact with Π changes.
+    """What the points of a branch share as long as neither the mesh nor what rests on Π changes.
 
-    ``full`` is the surface with all its walls, ``line`` its values and boundary as functions of λ, ``part``
-    what stands of it, without the walls that vanish where a junction rests on Π; ``surface`` is that of it.
+    ``surface`` is the standing part's; ``line`` has its values and boundary as functions of λ.
     """
 
     def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
-        self.full, self.line, self._backend = surface, line, backend
+        self.line, self.size, self._backend = line, surface.size, backend
         self.part = part = standing_part(surface)
-        self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
+        self.surface = part.surface
         self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
         least = LEAST_VOLUME * surface.size**3
-        self._last = Equilibrium(part, self.surface.vertices, backend, least)
-
-    def equilibrium(self, surface: Surface, X: Floats) -> Equilibrium:
-        """That of a surface of this mesh with its vertices at X; factors are valid until the next one's."""
-        self._last = self._last.at(X, surface)
-        return self._last
+        self.last = Equilibrium(part, self.surface.vertices, backend, least)  # that asked for last
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
@@ -66,21 +60,9 @@ class BranchMesh:
         w[surface.pinned] = change
         return w
 
-    def full_surface(self, X: Floats) -> Surface:
-        """The surface with all its walls; those that vanish lie on Π."""
-        if not self.resting.any():
-            return self.full.moved(X)
-        return self.full.moved(place_pinched_walls(self.full, self.walls, self.resting, X))
-
-    def surface_in_contact(self, X: Floats) -> Surface:
-        """The full surface, with the vertices that came down to Π placed on it."""
-        X = put_down(self.surface, self.walls, X, self.reaches_plane(X))
-        return self.full_surface(place_wall_rows(self.surface, self.walls, X))
-
     def reaches_plane(self, X: Floats) -> Bools:
         """(n,) bool, junction vertices that stood off Π and are now on it or beyond."""
-        standing_off = self.walls.top_free & ~self.resting
-        return coming_down(self.surface, self.walls, standing_off, self.surface.vertices, X, 0.0)
+        return self.part.coming_down(X, self.surface.vertices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,24 +85,20 @@ class BranchState:
 
     @cached_property
     def rest(self) -> Equilibrium:
-        """The equations and their derivatives by the positions."""
-        return self.mesh.equilibrium(self.with_values(self.mesh.surface), self.X)
+        """The equations and their derivatives by the positions; factors are valid until the next one's."""
+        self.mesh.last = self.mesh.last.at(self.X, self.mesh.part.with_values(self.with_values))
+        return self.mesh.last
 
     @property
-    def surface(self) -> Surface:
-        """The mesh's surface with the tensions and pressures at λ; its positions are not X."""
-        return self.rest.surface
-
-    @property
-    def residual(self) -> float:
-        """‖r‖, with the defects of volumes, over the norm of the single triangles' forces."""
-        return self.rest.residual
+    def whole(self) -> Surface:
+        """The surface with all its walls; those that vanish lie on Π."""
+        return self.rest.part.whole_at(self.X)
 
     @cached_property
     def parameter_derivative(self) -> Floats:
         """(N+r,) dr/dλ = Bᵀ ∂∇E/∂λ, and Bᵀ Df[v] where λ moves the boundary; -dV̄/dλ in units of force."""
         rest, line = self.rest, self.mesh.line
-        change = rest.space.to_coordinates(line.gradient(self.surface, self.X))
+        change = rest.space.to_coordinates(line.gradient(rest.surface, self.X))
         if self.carried is not None:
             change = change + rest.jacobian.times(self.carried)
         return np.append(change, -rest.volume_units * line.volume_rates)
@@ -167,39 +145,33 @@ class BranchState:
     def area_weights(self) -> Floats:
         """(n,) the area around each vertex over all area, over size², 1/length²."""
         area = vertex_area_vectors(self.X, self.mesh.part.classes.faces)[1]
-        return area / (area.sum() * self.mesh.full.size**2)
+        return area / (area.sum() * self.mesh.size**2)
 
     @cached_property
     def aligned(self) -> Floats:
         """X (n,3) with the rows of walls below their junction; motions count from here."""
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X, self.rest.space)
+        return self.mesh.part.follow(self.X, self.rest.space)
 
     def motion(self, s: Floats, change: float = 0.0) -> Floats:
-        """The motion Bs (n,3), in which the insides of the sheets follow their curves.
-
-        With a change of λ, and so of the boundary, what follows that is added to first order.
-        """
+        """``BranchMesh.motion``; and what follows a change of λ, and so of the boundary, to first order."""
         d = self.mesh.motion(self.rest.space, self.X, s)
         return d if self.carried is None or not change else d + change * self.carried
 
-    def with_rooms(self, change: Floats) -> tuple[float, ...]:
-        """The rooms' pressures after a change (r,) of them, given in units of the borders."""
-        before = self.room_changes or np.zeros(len(change))
-        return tuple((before + self.rest.volume_units * change).tolist())
-
     def step(
-        self, d: Floats, parameter: float, iterations: int = 0, rooms: tuple[float, ...] | None = None
+        self, d: Floats, parameter: float, iterations: int = 0, rooms: Floats | None = None
     ) -> BranchState:
-        """The state at X + d (n,3) and λ, its boundary where λ has it, with these ``room_changes``."""
-        X = self.moved(d)
+        """The state at X + d (n,3) and λ, its boundary there, and ``rooms`` (r,) more in units of borders."""
+        X, changes = self.moved(d), self.room_changes
+        if rooms is not None:
+            before = np.array(changes) if changes else np.zeros(len(rooms))
+            changes = tuple((before + self.rest.volume_units * rooms).tolist())
         boundary = self.mesh.line.boundary(parameter)
         if boundary is not None:
             fixed = self.mesh.surface.pinned
             X = self.moved(d + self.mesh.carried(boundary - X[fixed], self.X))
             X[fixed] = boundary
-        return BranchState(self.mesh, X, parameter, iterations, self.room_changes if rooms is None else rooms)
+        return BranchState(self.mesh, X, parameter, iterations, changes)
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their junction."""
-        X = onto_circles(self.mesh.surface, self.X + d)
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, X, self.rest.space)
+        return self.mesh.part.follow(onto_circles(self.mesh.surface, self.X + d), self.rest.space)

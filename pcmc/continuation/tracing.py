@@ -1,8 +1,7 @@
 """From point to point along a branch: steps, the events between them, and the mesh.
 
-A step goes along the tangent, and Newton's method brings it back onto the branch (``correction``).
-Steps shorten where the branch bends. Where a goal, a fold or a change of index lies between two points,
-the branch is searched there (``segment``).
+A step goes along the tangent, and Newton's method brings it back onto the branch (``correction``). Where a
+goal, a fold or a change of index lies between two points, the branch is searched there (``segment``).
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from typing import Any, NamedTuple
 
 from ..base.errors import NoBranch, SurfaceError
 from ..base.interrupts import stop_requested
+from ..base.tolerances import EVENT_ACCURACY, START_RESIDUAL
 from ..forces.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
@@ -34,10 +34,9 @@ from .correction import (
 )
 from .direction import ParameterLine
 from .options import Ending, FollowOptions
-from .segment import EVENT_ACCURACY, Segment, crosses_goal
+from .segment import Segment, crosses_goal
 from .state import BranchMesh, BranchState
 
-START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
 QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
 CLEARLY_BETTER = 1.02  # ratio of the qualities of a redistributed mesh and the old one
 CONTACT_STEP = 0.02  # length of a step at which a new contact, solved for by itself, is near enough
@@ -56,10 +55,7 @@ class BranchStep(NamedTuple):
 
 
 class Tracer:
-    """A branch while it is followed; ``here`` is its last point.
-
-    It starts at ``first``, if that is given, and otherwise at the surface.
-    """
+    """A branch while it is followed from ``first``, or else from a surface; ``here`` is its last point."""
 
     def __init__(
         self,
@@ -89,12 +85,12 @@ class Tracer:
             message = f"follow: nothing holds the surface against {free} rigid motions"
             hint = "it would drift instead of following the parameter; hold it with fixed= or on_plane="
             raise NoBranch(f"{message}; {hint}", what="surface", found=free, expected=0)
-        if not (start.parameter_derivative.any() or mesh.resting.any()):  # a wall may come back
+        if not (start.parameter_derivative.any() or mesh.part.resting.any()):  # a wall may come back
             reasons = "its patches have no free vertex, or they are flat and only their tension varies"
             raise NoBranch(f"the parameter changes no force: {reasons}", what="parameter")
         try:
-            if not start.residual <= START_RESIDUAL:
-                raise NotOnBranch(f"relative residual {start.residual:.1e}")
+            if not start.rest.residual <= START_RESIDUAL:
+                raise NotOnBranch(f"relative residual {start.rest.residual:.1e}")
             if start.rest.excess_pull.any():
                 raise NotOnBranch("a junction is pulled off the plane harder than its wall can hold")
             given = fixed_parameter(start.parameter, self.line.scale)
@@ -103,19 +99,18 @@ class Tracer:
         except NotOnBranch as reason:
             message = f"follow: the surface is not at rest ({reason}); solve it first, with"
             message += " pcmc.solve(surface, target='stationary').surface where it is a saddle"
-            found = start.residual
+            found = start.rest.residual
             raise NoBranch(message, what="surface", found=found, expected=START_RESIDUAL) from None
 
     def run(self) -> tuple[Ending, str]:
         """Follow the branch to its end; why it ends, and the last difficulty."""
         try:
-            return self.advance()
+            return self._advance()
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
             return Ending.STOPPED, ""
 
-    def advance(self) -> tuple[Ending, str]:
-        """Step after step."""
+    def _advance(self) -> tuple[Ending, str]:
         self.record()
         if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
             return Ending.REACHED, ""
@@ -208,9 +203,10 @@ class Tracer:
 
     def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        surface = near.with_values(near.mesh.surface_in_contact(near.X))
         tolerance, backend = self.options.tolerance, self.options.backend
-        result = solve(surface, "newton", target="stationary", tolerance=tolerance, backend=backend)
+        part = near.rest.part
+        X = part.landed(near.X, near.mesh.reaches_plane(near.X))
+        result = solve(part.whole_at(X), "newton", target="stationary", tolerance=tolerance, backend=backend)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
@@ -228,7 +224,7 @@ class Tracer:
         here, tangent = self.here.state, self.here.tangent
         if self.options.remesh is not None and here.quality < wanted:
             try:
-                mesh = self.mesh(remesh(self.surface_at(here), self.options.remesh))
+                mesh = self.mesh(remesh(here.whole, self.options.remesh))
             except SurfaceError:
                 return
             start = BranchState(mesh, mesh.surface.vertices, here.parameter)
@@ -237,8 +233,7 @@ class Tracer:
     def continue_from(self, start: BranchState, tangent: Tangent) -> None:
         """Go on from the point of the branch near a state, on the plane across a tangent.
 
-        Stay on the old mesh if a goal lies between, or an event unless the mesh is very poor: on the
-        old mesh they are located.
+        Stay on the old mesh if a goal lies between, or an event unless the mesh is very poor.
         """
         here = self.here
         constraint = fixed_arclength(start, tangent.row, tangent.rate)
@@ -259,7 +254,7 @@ class Tracer:
         start, end, length = segment.start, segment.end, segment.length
         if not segment.same_mesh or length <= 2.0 * EVENT_ACCURACY:
             events = self.events_between(start, end, length)
-            if (start.state.mesh.resting != end.state.mesh.resting).any():
+            if (start.state.mesh.part.resting != end.state.mesh.part.resting).any():
                 events.insert(0, self.event("contact", end.state, length, start.index, end.index))
             return events
         located, fold = [], segment.fold
@@ -291,7 +286,7 @@ class Tracer:
             "index_before": before,
             "index_after": after,
             "along_branch": along,
-            "surface": self.surface_at(at),
+            "surface": at.whole,
         }
 
     def record(self) -> None:
@@ -302,7 +297,7 @@ class Tracer:
             "arclength": self.arclength,
             "index": here.index,
             "lowest_eigenvalue": here.eigenvalues[0],
-            "residual": here.state.residual,
+            "residual": here.state.rest.residual,
             "quality": here.state.quality,
             "slope": here.tangent.slope,
             "iterations": here.state.iterations,
@@ -310,20 +305,16 @@ class Tracer:
         self.rows.append(row)
         if (number - 1) % self.options.keep:
             self.surfaces.pop(number - 1, None)
-        self.surfaces[number] = self.surface_at(self.here.state)
+        self.surfaces[number] = self.here.state.whole
         if self.callback is not None:
-            self.callback(Progress(number, lambda: self.surface_at(here.state), self.rows[-1]))
+            self.callback(Progress(number, lambda: here.state.whole, self.rows[-1]))
 
     def columns(self, at: BranchState) -> dict[str, Any]:
         """The columns of both tables."""
-        rooms = zip(at.surface.rooms, room_pressures(at.surface).tolist(), strict=True)
+        rooms = zip(at.rest.surface.rooms, room_pressures(at.rest.surface).tolist(), strict=True)
         return {
             "parameter": at.parameter,
-            **self.line.columns(at.mesh.full, at.parameter),
+            **self.line.columns(at.mesh.surface, at.parameter),
             **{f"pressure {room.name}": pressure for room, pressure in rooms},
             **{name: getattr(at, name) for name in ("energy", "volume", "height")},
         }
-
-    def surface_at(self, at: BranchState) -> Surface:
-        """The whole surface at a state."""
-        return at.with_values(at.mesh.full_surface(at.X))

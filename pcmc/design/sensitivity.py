@@ -21,10 +21,9 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
-from ..certificate.certificate import TOLERANCE
+from ..base.tolerances import AT_REST
 from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
-from ..forces.pinching import place_wall_rows
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
@@ -137,24 +136,23 @@ def _slopes(
 
 def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tuple[Floats, Floats]]:
     """dX/dλ (n,3) and dδ/dλ (r,) while values change at these rates."""
-    if at.residual_with_pull > TOLERANCE:
+    if at.residual_with_pull > AT_REST:
         found = at.residual_with_pull
         message = f"sensitivities: the surface is not at rest (residual {found:.1e}); solve it first"
-        raise SurfaceError(message, what="surface", found=found, expected=TOLERANCE)
+        raise SurfaceError(message, what="surface", found=found, expected=AT_REST)
     try:
         inverse = at.factorised(soften=False).bordered
     except SingularMatrix:
         raise SurfaceError(AT_FOLD, what="surface") from None
-    surface, space, walls = at.surface, at.space, at.part.walls
+    surface, space = at.surface, at.space
     count, units = space.size, at.volume_units
-    walls_follow = bool((walls.top_free & ~at.part.resting).any())
+    walls_follow = bool(at.part.standing.any())
 
     def motion(s: Floats) -> Floats:  # walls that hang from their junction follow it, as in the solver
         d = space.to_vectors(s)
         if not walls_follow:
             return d
-        ahead, here = (place_wall_rows(surface, walls, X, space) for X in (at.X + d, at.X))
-        return ahead - here
+        return at.part.follow(at.X + d, space) - at.part.follow(at.X, space)
 
     def times(z: Floats) -> Floats:
         return at.times(motion(z[:count]), z[count:])

@@ -1,7 +1,4 @@
-"""Homotopies: from an easier surface at rest along the branch of equilibria to the one asked for.
-
-What grows is the load, the share of the way from equal tensions, or the distance between held curves.
-"""
+"""Homotopies: from an easier surface at rest along the branch of equilibria to the one asked for."""
 
 from __future__ import annotations
 
@@ -15,6 +12,7 @@ import numpy as np
 from .. import solvers
 from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
+from ..base.tolerances import HOMOTOPY_END, SOUND
 from ..certificate.balance import load_name, load_ratio
 from ..certificate.neck import held_groups
 from ..certificate.proof import Attempt
@@ -22,11 +20,8 @@ from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..forces.functional import gradient
 from ..solvers.result import Callback, Progress, Result, Status
 from ..surface import Surface
-from .starts import low_start
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
-SOUND = 0.2  # triangle quality from which a turn counts as the surface's, not the mesh's
-LEAST_QUALITY = 0.1  # triangle quality at which a branch is given up
 MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
 LOADS = (0.5, 0.2, 0.05, 0.01)  # of the loads, or of what the boundary carries, at which to begin
 DISTANCES = (0.5, 0.25, 0.1, 0.03)  # of the distance between held curves, at which to begin
@@ -46,7 +41,7 @@ class HomotopyStart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Homotopy:
-    """A way to a surface: starts, tried in turn until one is at rest, and how the branch is followed from it.
+    """Starts, tried in turn until one is at rest, and how the branch is followed from there.
 
     ``way`` is as in Attempt, ``note`` a sentence with the start's ``share``, ``unit`` the share of what is
     asked for at λ = 1, ``options`` those of the first solve, ``back`` as in ``classify_end``.
@@ -73,12 +68,11 @@ class HomotopyOutcome:
     attempt: Attempt | None = None
 
 
+@dataclass(eq=False)
 class LimitReached(Exception):
     """A solve of the search has taken as many steps as it may; ``result`` is its end."""
 
-    def __init__(self, result: Result) -> None:
-        super().__init__()
-        self.result = result
+    result: Result
 
 
 @dataclass
@@ -111,10 +105,9 @@ class Solves:
     def follow(
         self, surface: Surface, parameter: Direction | BoundaryMotion, homotopy: Homotopy
     ) -> Branch | None:
-        """Follow a branch until it arrives or turns; StopIteration if that was stopped.
+        """A branch until it arrives or turns, in no more steps than a solve may take; None if none starts.
 
-        None where no branch starts: rigid motions are free, or the parameter moves nothing. It has no more
-        points than a solve may take steps.
+        StopIteration if it was stopped.
         """
         interrupted: list[BaseException] = []
 
@@ -198,7 +191,7 @@ def until_turned(
         if extra is not None:
             extra(progress)
         slack = BACK * farthest if back is None else back
-        if progress.row["parameter"] < farthest - slack or progress.row["quality"] < LEAST_QUALITY:
+        if progress.row["parameter"] < farthest - slack or progress.row["quality"] < HOMOTOPY_END:
             raise StopIteration
 
     return watch
@@ -207,9 +200,8 @@ def until_turned(
 def classify_end(branch: Branch, back: float | None = None) -> BranchEnd:
     """How a branch ends that was followed towards larger values.
 
-    It folds where the parameter turns for good, with an eigenvalue that changes its sign not far from
-    the turn and triangles that are sound: otherwise the mesh may be what turns. ``back`` is how far from the
-    turn; by default 0.03 of the farthest value.
+    It folds where the parameter turns for good, with sound triangles and an eigenvalue that changes its sign
+    within ``back`` of the turn, by default 0.03 of the farthest value: otherwise the mesh may be what turns.
     """
     points, folds = branch.points, branch.folds.parameter
     if branch.ending is Ending.REACHED:
@@ -269,12 +261,12 @@ def relax_tensions(low: Surface) -> Homotopy | None:
     return Homotopy("tensions", note, low, starts, 1.0, {"levels": 0}, 40, 3e-4, BACK)
 
 
-def continue_in_distance(surface: Surface) -> Homotopy | None:
+def continue_in_distance(surface: Surface, low: Surface) -> Homotopy | None:
     """The distance between the held curves grows to the surface's; None where they cannot be moved."""
     scaling = BoundaryScaling.of(surface)
     if scaling is None:
         return None
-    shapes = [start.vertices for start in (surface, low_start(surface)) if start is not None]
+    shapes = surface.vertices, low.vertices
     starts = (
         HomotopyStart(scaling.at(share, shape), BoundaryMotion(scaling.boundary, start=share), share)
         for share, shape in product(DISTANCES, shapes)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from ..base.arrays import Bools
 from ..base.interrupts import stop_requested
+from ..base.tolerances import AT_REST
 from ..certificate.balance import (
     describe_growing,
     growing_part,
@@ -17,11 +18,11 @@ from ..certificate.balance import (
     unheld,
 )
 from ..certificate.cables import weak_cable
-from ..certificate.certificate import TOLERANCE
 from ..certificate.neck import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result, Status
+from ..solvers.starts import low_start
 from ..surface import Surface
 from .homotopy import (
     Homotopy,
@@ -33,7 +34,6 @@ from .homotopy import (
     raise_loads,
     relax_tensions,
 )
-from .starts import low_start
 
 FAILED = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 
@@ -68,35 +68,33 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result | tuple[lis
     """The result of the first homotopy that leads to rest, or what was proved and tried."""
     minimum = solves.options.get("target", "minimum") == "minimum"
     pinchable = standing_part(start).walls.pinchable
-    tried = [Attempt("given start", _name(first))]
-    found = unbalanced(start, pinchable), unheld(start), weak_cable(start)
-    proofs: list[Proof] = [proof for proof in found if proof is not None]
+    load = overload(start) if first.status in (Status.DIVERGED, Status.DEGENERATE) else None
+    proofs = [proof for proof in (unbalanced(start, pinchable), unheld(start), weak_cable(start)) if proof]
     growing = growing_part(start) if minimum and not proofs else None
+    tried, given = [Attempt("given start", _name(first))], _name(first).replace("_", " ")
+    ways: Iterable[HomotopyOutcome | Homotopy] = ()
     if growing is not None:
         result = solves.solve(start, target="stationary")
         if result.converged:
             return replace(result, status=Status.SADDLE, note=describe_growing(growing))
         tried.append(Attempt("stationary point", _name(result)))
     elif not proofs:
-        for way in _further_ways(start, pinchable):
-            if way is None:
-                continue
-            outcome = attempt(way, solves) if isinstance(way, Homotopy) else way
-            if outcome.surface is not None:
-                result = solves.solve(outcome.surface)
-                if result.converged:
-                    reason = _name(first).replace("_", " ")
-                    note = f"found {outcome.note}, as the given start led to none ({reason})"
-                    return replace(result, note="; ".join(filter(None, (note, result.note))))
-            tried.append(outcome.attempt or Attempt(outcome.way, _name(result)))
-            if tried[-1].folds:
-                break
-    load = overload(start) if first.status in (Status.DIVERGED, Status.DEGENERATE) else None
+        ways = _further_ways(start, pinchable)
+    for way in ways:
+        outcome = attempt(way, solves) if isinstance(way, Homotopy) else way
+        if outcome.surface is not None:
+            result = solves.solve(outcome.surface)
+            if result.converged:
+                note = f"found {outcome.note}, as the given start led to none ({given})"
+                return replace(result, note="; ".join(filter(None, (note, result.note))))
+        tried.append(outcome.attempt or Attempt(outcome.way, _name(result)))
+        if tried[-1].folds:
+            break
     return ([] if load is None else [load]) + proofs, tried
 
 
-def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome | Homotopy | None]:
-    """The low start, and the homotopies in the order of their cost; None for one that does not apply."""
+def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome | Homotopy]:
+    """The low start, and the homotopies that apply in the order of their cost."""
     low = low_start(start)
     if low is None:
         return
@@ -109,8 +107,8 @@ def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome 
     if loaded:
         yield raise_loads(low)
     if pressed and not hardly_balanced(start, pinchable):
-        yield relax_tensions(low)
-    yield continue_in_distance(start)
+        yield from filter(None, [relax_tensions(low)])
+    yield from filter(None, [continue_in_distance(start, low)])
 
 
 def _name(result: Result) -> str:
@@ -121,7 +119,7 @@ def _name(result: Result) -> str:
 def _failed(first: Result, proofs: list[Proof], tried: list[Attempt], evaluations: int) -> Result:
     """The first result, with the proofs or what was tried."""
     neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
-    if first.rows[-1]["residual"] <= TOLERANCE:  # a coarse mesh may rest where no smooth surface does
+    if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
         proofs = []
     status, folds = first.status, [attempt for attempt in tried if attempt.folds]
     if proofs:

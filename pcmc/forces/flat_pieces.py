@@ -22,12 +22,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner
+from ..base.tolerances import PARALLEL, SAME_PLACE
 from ..surface import Plane, Surface
 from ..surface.checks import lying
 from ..surface.supports import common_point
 from .elements import Elements
-
-MEETS = 1e-9  # sine of an angle up to which two planes count as parallel
 
 
 class FlatPieces(NamedTuple):
@@ -102,7 +101,7 @@ def flat_pieces(surface: Surface) -> FlatPieces:
     masks = [(surface.plane, ground(surface)), *surface.on_planes]
     topo, origin = surface.topology, surface.origin
     distance = np.array([-float(plane.height(origin)) for plane, _ in masks])
-    rounding = 1e-12 * (surface.size + float(np.abs(origin).max()))
+    rounding = SAME_PLACE * (surface.size + float(np.abs(origin).max()))
     taken = np.zeros(len(topo.edges), dtype=bool)
     for k in np.flatnonzero(np.abs(distance) <= rounding):
         taken = taken | masks[k][1][topo.edges].all(axis=1)
@@ -140,10 +139,10 @@ def _ends(
     normal, done = np.zeros((len(places), 3)), count == 0.0
     for plane, mask in others:
         here = ~done & mask[vertex]
-        if here.any() and abs(plane.height(origin + apex[0])) <= 1e-12 * surface.size:
+        if here.any() and abs(plane.height(origin + apex[0])) <= SAME_PLACE * surface.size:
             done |= here  # the piece's last side lies in that plane, too
         normals = np.array([own[0].normal, plane.normal])
-        if not here.any() or np.linalg.norm(np.cross(*normals)) <= MEETS:
+        if not here.any() or np.linalg.norm(np.cross(*normals)) <= PARALLEL:
             continue
         away = -np.array([own[0].height(origin), plane.height(origin)])
         corner_point = np.linalg.lstsq(normals, away, rcond=None)[0]

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
+from ..base.tolerances import NO_DIRECTION, ON
 from ..surface import Surface
 from ..surface.geometry import (
     accumulate,
@@ -50,8 +51,6 @@ from ..surface.topology import (
 )
 from .cables import laws_on, squared_cable_forces
 from .triangles import Mesh, effective_tensions, energy_mesh
-
-PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +180,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     freedom = np.where(classes.idle, np.int8(0), freedom)
     for circle, along in surface.on_circle:
         # a curve along the circle on both sides: the polygon's chord is not quite along the tangent
-        near = surface.fixed & (circle.distance(surface.vertices) <= 1e-9 * surface.size)
+        near = surface.fixed & (circle.distance(surface.vertices) <= ON * surface.size)
         freedom[classes.curve[along[classes.curve] & near[classes.beside].all(axis=1)]] = 0
     chord = np.zeros_like(X)
     chord[classes.curve] = curve_chords(surface, classes, X)
@@ -220,15 +219,15 @@ def _fill(
         if freedom[v] == 2 and size > 0:  # within the plane across a
             rest = cross(a, along) if size == 2 else sub(first, scaled(dot(first, a), a))
             length = norm(rest)
-            if size == 3 or (size == 2 and length <= PARALLEL):
+            if size == 3 or (size == 2 and length <= NO_DIRECTION):
                 pair = perpendicular_pair(a)
                 first, second, third, size = pair[0], pair[1], none, 2
             else:
-                size = 1 if length > PARALLEL else 0
+                size = 1 if length > NO_DIRECTION else 0
                 first, second = divided(rest, length) if size else none, none
         elif freedom[v] == 1:  # along a
             across = (dot(first, a), dot(second, a), dot(third, a))
-            first, second, third, size = a, none, none, 1 if norm(across) > PARALLEL else 0
+            first, second, third, size = a, none, none, 1 if norm(across) > NO_DIRECTION else 0
         dimension[v] = size
         for d in range(3):
             if size > 0:

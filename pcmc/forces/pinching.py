@@ -3,8 +3,9 @@
 A wall of tension α_w and height z over a length s costs α_w |z| s: not differentiable at z = 0. The
 junction rests on Π where the pull of the sheets on it, up or down, is at most α_w per length. Where it is
 more, the junction stands off Π, to the side it is pulled to, and the forces balance there. While it rests,
-the wall below has no area: its vertices coincide with the junction vertex above them (their *owner*), and
-its triangles are left out. So positions alone show which walls are pinched: a surface needs no extra state.
+the wall below has no area: its vertices are at places on the junction, and its triangles are left out. The
+``StandingPart`` remains, from which the whole surface follows; solvers and branches carry it along. In a file
+positions alone show which walls are pinched.
 
 A wall whose bottom is held on Π can pinch where each top vertex has a bottom vertex below it. The junction
 then rests on that curve, not on Π: a resting vertex is fixed on its bottom vertex, as long as the pull of the
@@ -14,11 +15,13 @@ before a solver has asked for it (``find_walls``): a solver asks where a junctio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
@@ -82,25 +85,21 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     roof_vertex[surface.faces[roof]] = True
     height = surface.plane.height(X)
     low, foot = lying(height, X), np.full(n, -1, dtype=np.int64)
-    sliding = list[tuple[int, Ints, Ints, Ints | None]]()
+    every = list[tuple[int, Ints, Ints, Ints | None]]()
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
         edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
         if surface.on_ground[edges].any() and len(top):
-            sliding.append((index, edges, top, None))
-    rows, wall_below = [], [np.empty(0, dtype=np.int64)]
-    tops: list[Ints] = [np.empty((0, 2), dtype=np.int64)]
-    for index, edges, top, feet in (*sliding, *held_walls(surface, roof_edge, roof_vertex, low, held)):
-        before = np.concatenate(tops)
-        if feet is not None:
-            if np.isin(top, before[(foot[before] < 0).all(axis=1)]).any():
-                continue
+            every.append((index, edges, top, None))
+    none = np.empty((0, 2), dtype=np.int64)
+    sliding = np.concatenate([none, *(top for _, _, top, _ in every)])
+    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
+        if not np.isin(top, sliding).any():
             foot = np.where(feet >= 0, feet, foot)
-        inner = np.unique(edges)
-        rows.append(wall_rows(surface, inner[~roof_vertex[inner]], top, edges, feet))
-        tops.append(top)
-        wall_below.append(np.full(len(top), index))
-    top_edges, below = np.concatenate(tops), np.concatenate(wall_below)
+            every.append((index, edges, top, feet))
+    rows = join_rows([wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every])
+    top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
+    below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])
     on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
     on_top[top_edges], pinchable[below] = True, True
     # on Π the side is that of the push of the sheets' pressure along its normal
@@ -109,7 +108,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
     push = vertex_sums((force * (area_vectors(X[F]) @ np.array(surface.plane.normal)))[:, None], F, n)[:, 0]
     return Walls(
-        rows=join_rows(rows),
+        rows=rows,
         top_edges=top_edges,
         wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,
@@ -137,71 +136,12 @@ def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpac
     return X + change
 
 
-def slide_over_feet(walls: Walls, X: Floats, standing: Bools, space: MotionSpace) -> Floats:
-    """X (n,3) with ``standing`` vertices slid along the junction to above their vertices of a held bottom."""
-    held = standing & walls.held
-    if not held.any():
-        return X
-    gap = X - X[walls.foot]
-    change = np.where(held[:, None], walls.across_bottom(gap, X) - gap, 0.0)
-    return X + change - space.project(change)
-
-
 def resting_vertices(surface: Surface, walls: Walls) -> Bools:
     """(n,) junction vertices that rest on Π, by their positions."""
     X, held = surface.vertices, walls.held
     gap = surface.plane.height(X)
     gap[held] = np.linalg.norm(X[held] - X[walls.foot[held]], axis=1)
     return walls.top_free & lying(gap, X)
-
-
-def put_down(surface: Surface, walls: Walls, X: Floats, down: Bools) -> Floats:
-    """X (n,3) with the vertices ``down`` on Π, or on their vertices of a held bottom."""
-    X, held = X.copy(), down & walls.held
-    X[down] -= surface.plane.height(X[down])[:, None] * np.array(surface.plane.normal)
-    X[held] = X[walls.foot[held]]
-    return X
-
-
-def coming_down(
-    surface: Surface, walls: Walls, standing: Bools, before: Floats, X: Floats, low: Floats | float
-) -> Bools:
-    """(n,) the ``standing`` junction vertices that a move from ``before`` to X (n,3) brings down.
-
-    They reach Π or the curve of a held bottom, pass it, or come nearer to it than ``low``.
-    """
-    above, last = (walls.side * surface.plane.height(Y) for Y in (X, before))
-    down = standing & ((above <= 0.0) | ((above < last) & (above <= low)))
-    held = walls.held
-    if not held.any():
-        return down
-    gap, gap_before = (walls.across_bottom(Y - Y[walls.foot], Y) for Y in (X, before))
-    near, near_before = np.linalg.norm(gap, axis=1), np.linalg.norm(gap_before, axis=1)
-    passes = np.einsum("ij,ij->i", gap, gap_before) <= 0.0
-    return np.where(held, standing & (passes | ((near < near_before) & (near <= low))), down)
-
-
-def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surface:
-    """The surface without the wall below the resting vertices, which slide on Π or are held on a bottom.
-
-    It has the same vertex array; vertices of the removed wall belong to no face.
-    """
-    if not resting.any():
-        return surface
-    X = put_down(surface, walls, surface.vertices, resting)
-    owner = _owners(surface.n, walls, resting)
-    F, left = _standing_faces(surface, walls, resting, owner)
-    X, F, patch = X[owner], np.ascontiguousarray(F[left]), np.ascontiguousarray(surface.patch_of_face[left])
-    F.setflags(write=False)
-    patch.setflags(write=False)
-    topo, held = topology(F, patch, surface.n), resting & walls.held
-    given = surface.given_supports
-    rests = given._replace(fixed=given.fixed | held, on_plane=surface.on_ground | (resting & ~held))
-    supports = rests.resolved(surface.plane, surface.on_planes)
-    cables = tuple(filter(None, (cable.carried(owner) for cable in surface.cables)))
-    return surface._with(
-        vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, curves=(), **supports
-    )
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:
@@ -219,28 +159,148 @@ def beside_resting(walls: Walls, resting: Bools) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class StandingPart:
-    """A surface without its pinched walls: the part that carries forces. See ``standing_part``."""
+    """The part of a surface that carries forces: without the walls that are pinched where junctions rest.
 
-    surface: Surface  # the standing part, with the vertex array of the whole surface
-    walls: Walls  # of the whole surface
-    resting: Bools  # its junction vertices at rest on Π
+    It has the vertex array of the whole surface. Vertex v of the whole is at (1 - λ) X_i + λ X_j, with X the
+    positions in the standing part: i = j = v outside the pinched walls, and inside them the resting junction
+    vertices that v lies between.
+    """
+
+    whole: Surface  # with all its walls
+    walls: Walls  # of the whole surface, those that can pinch
+    resting: Bools  # (n,) its junction vertices at rest on Π
+    surface: Surface  # the standing part; resting vertices slide on Π or are held on a bottom
     classes: VertexClasses  # what the vertices lie on; resting ones lie on the junction
 
     @classmethod
-    def of(cls, surface: Surface, walls: Walls, resting: Bools) -> StandingPart:
+    def of(cls, whole: Surface, walls: Walls, resting: Bools) -> StandingPart:
         """The part that stands where the given vertices rest."""
-        part = remove_pinched_walls(surface, walls, resting)
-        classes = vertex_classes(part, resting_links(walls, resting), beside_resting(walls, resting))
-        return cls(part, walls, resting, classes)
+        surface = _without_pinched_walls(whole, walls, resting)
+        links, beside = resting_links(walls, resting), beside_resting(walls, resting)
+        return cls(whole, walls, resting, surface, vertex_classes(surface, links, beside))
+
+    def keep(self) -> StandingPart:
+        """The same, which ``standing_part`` of the whole surface gives from now on."""
+        vars(self.whole)[standing_part.__name__] = self  # as ``kept_with_owner`` does
+        return self
+
+    def with_values(self, change: Callable[[Surface], Surface]) -> StandingPart:
+        """The same with other tensions or pressures, as a function of the surface gives them."""
+        surface = change(self.surface)
+        whole = surface if self.whole is self.surface else change(self.whole)
+        return replace(self, whole=whole, surface=surface)
 
     @property
     def quality_faces(self) -> Ints:
         """(k,3) the faces whose quality counts: those outside walls that can pinch."""
         return self.surface.faces[~self.walls.pinchable[self.surface.patch_of_face]]
 
+    @property
+    def faces_of_whole(self) -> Ints:
+        """(k,) the faces of the whole surface that are those of the standing part, in the same order."""
+        if not self.resting.any():
+            return np.arange(self.whole.m)
+        owner = _owners(self.whole.n, self.walls, self.resting)
+        return np.flatnonzero(_standing_faces(self.whole, self.walls, self.resting, owner)[1])
 
+    @cached_property
+    def places(self) -> tuple[Ints, Floats]:
+        """i, j (2,n) and λ (n,); a foot that still carries a triangle slides on Π and stays where it is."""
+        n, walls, resting = self.whole.n, self.walls, self.resting
+        rows, owner = walls.rows, _owners(n, walls, resting)
+        stands = np.zeros(n, dtype=bool)
+        stands[self.surface.faces] = True
+        gone = (resting | walls.corner)[rows.top_ends].all(axis=1)
+        gone &= ~(stands | self.whole.pinned)[rows.vertices]
+        vertices, ends, share = rows.vertices[gone], np.tile(np.arange(n), (2, 1)), np.zeros(n)
+        ends[:, vertices], share[vertices] = rows.top_ends[gone].T, rows.fraction[gone]
+        return ends[:, owner], share[owner]
+
+    def whole_positions(self, X: Floats) -> Floats:
+        """(n,3) where the vertices of the whole surface are, with those of the standing part at X (n,3)."""
+        if not self.resting.any():
+            return X
+        (start, end), share = self.places
+        X = (1.0 - share[:, None]) * X[start] + share[:, None] * X[end]
+        # beside another wall each keeps its plane
+        return self.whole.onto_supports(X) if self.whole.on_planes else X
+
+    def whole_at(self, X: Floats) -> Surface:
+        """The whole surface, with the vertices of the standing part at X (n,3)."""
+        return self.whole.moved(self.whole_positions(X))
+
+    def follow(self, X: Floats, space: MotionSpace | None = None) -> Floats:
+        """X (n,3) with the rows of walls placed below their top edges; see ``place_wall_rows``."""
+        return place_wall_rows(self.surface, self.walls, X, space)
+
+    @property
+    def standing(self) -> Bools:
+        """(n,) the junction vertices that can come to rest."""
+        return self.walls.top_free & ~self.resting
+
+    def coming_down(self, X: Floats, before: Floats, low: Floats | float = 0.0) -> Bools:
+        """(n,) the standing junction vertices that a move from ``before`` to X (n,3) brings down.
+
+        They reach Π or the curve of a held bottom, pass it, or come nearer to it than ``low``.
+        """
+        walls, standing, held = self.walls, self.standing, self.walls.held
+        above, last = (walls.side * self.surface.plane.height(Y) for Y in (X, before))
+        down = standing & ((above <= 0.0) | ((above < last) & (above <= low)))
+        if not held.any():
+            return down
+        gap, gap_before = (walls.across_bottom(Y - Y[walls.foot], Y) for Y in (X, before))
+        near, near_before = np.linalg.norm(gap, axis=1), np.linalg.norm(gap_before, axis=1)
+        passes = np.einsum("ij,ij->i", gap, gap_before) <= 0.0
+        return np.where(held, standing & (passes | ((near < near_before) & (near <= low))), down)
+
+    def landed(self, X: Floats, down: Bools, space: MotionSpace | None = None) -> Floats:
+        """X (n,3) with the vertices ``down`` on Π or on their bottom, and the rows of walls below.
+
+        With a motion space given, the other vertices over a held bottom slide along the junction to above
+        their vertices of that.
+        """
+        walls = self.walls
+        X = _put_down(self.surface, walls, X, down)
+        sliding = self.standing & ~down & walls.held
+        if space is not None and sliding.any():
+            gap = X - X[walls.foot]
+            change = np.where(sliding[:, None], walls.across_bottom(gap, X) - gap, 0.0)
+            X += change - space.project(change)
+        return self.follow(X, space)
+
+
+def _put_down(surface: Surface, walls: Walls, X: Floats, down: Bools) -> Floats:
+    """X (n,3) with the vertices ``down`` on Π, or on their vertices of a held bottom."""
+    X, held = X.copy(), down & walls.held
+    X[down] -= surface.plane.height(X[down])[:, None] * np.array(surface.plane.normal)
+    X[held] = X[walls.foot[held]]
+    return X
+
+
+def _without_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surface:
+    """``StandingPart.surface``; vertices of the walls left out belong to no face."""
+    if not resting.any():
+        return surface
+    X, held = _put_down(surface, walls, surface.vertices, resting), resting & walls.held
+    owner = _owners(surface.n, walls, resting)
+    F, left = _standing_faces(surface, walls, resting, owner)
+    F, patch = read_only(np.ascontiguousarray(F[left])), read_only(surface.patch_of_face[left])
+    given = surface.given_supports
+    rests = given._replace(fixed=given.fixed | held, on_plane=surface.on_ground | (resting & ~held))
+    return surface._with(
+        vertices=X[owner],
+        faces=F,
+        patch_of_face=patch,
+        topology=topology(F, patch, surface.n),
+        cables=tuple(filter(None, (cable.carried(owner) for cable in surface.cables))),
+        curves=(),
+        **rests.resolved(surface.plane, surface.on_planes),
+    )
+
+
+@kept_with_owner
 def standing_part(surface: Surface) -> StandingPart:
-    """The part of a surface that stands, by its positions. Computed once per surface.
+    """The part of a surface that stands, as a solver has left it or else by its positions.
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -248,12 +308,8 @@ def standing_part(surface: Surface) -> StandingPart:
     >>> standing_part(square).surface is square
     True
     """
-    part: StandingPart | None = vars(surface).get("standing_part")
-    if part is None:
-        walls = find_walls(surface)
-        part = StandingPart.of(surface, walls, resting_vertices(surface, walls))
-        vars(surface)["standing_part"] = part  # where a cached property would put it
-    return part
+    walls = find_walls(surface)
+    return StandingPart.of(surface, walls, resting_vertices(surface, walls))
 
 
 def top_spacing(surface: Surface, walls: Walls) -> Floats:
@@ -266,50 +322,19 @@ def top_spacing(surface: Surface, walls: Walls) -> Floats:
 
 
 def lift(
-    surface: Surface,
-    walls: Walls,
-    vertices: Bools,
-    fraction: float | Floats,
-    directions: Floats | None = None,
+    surface: Surface, walls: Walls, vertices: Bools, fraction: float | Floats, ways: Floats | None = None
 ) -> Surface:
-    """The whole surface with resting ``vertices`` raised off Π by a fraction of their spacing.
+    """The whole surface with resting ``vertices`` raised by a fraction of their spacing, and their wall rows.
 
-    The fraction may be one for each vertex (n,), and so may the unit directions (n,3), which else lead off
-    Π. The wall rows below are placed anew.
+    ``ways`` are unit directions (n,3), by default off Π.
     """
-    if directions is None:
-        directions = walls.side[:, None] * np.array(surface.plane.normal)
+    ways = walls.side[:, None] * np.array(surface.plane.normal) if ways is None else ways
     spacing = top_spacing(surface, walls)
     rise = fraction * np.where(vertices & np.isfinite(spacing), spacing, 0.0)
-    X = surface.vertices + rise[:, None] * directions
-    rows = walls.rows
-    below = rows.vertices[vertices[rows.top_ends].any(axis=1)]
+    X = surface.vertices + rise[:, None] * ways
+    below = walls.rows.vertices[vertices[walls.rows.top_ends].any(axis=1)]
     X[below] = place_wall_rows(surface, walls, X)[below]
     return surface.moved(X)
-
-
-def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Floats) -> Floats:
-    """X (n,3) with the vertices of pinched walls moved to their places on the resting junction.
-
-    A foot that still carries a triangle slides on Π and stays where it is.
-    """
-    owner, stands = _owners(surface.n, walls, resting), np.zeros(surface.n, dtype=bool)
-    F, left = _standing_faces(surface, walls, resting, owner)
-    stands[F[left]] = True
-    rows = walls.rows
-    gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~(stands | surface.pinned)[rows.vertices]
-    X, places = X.copy(), rows.top_places(X)
-    X[rows.vertices[gone]] = places[gone]
-    X = X[owner]
-    return surface.onto_supports(X) if surface.on_planes else X  # beside another wall each keeps its plane
-
-
-def standing_faces(part: StandingPart, whole: Surface) -> Ints:
-    """(k,) the faces of the whole surface that are those of its standing part, in the same order."""
-    if not part.resting.any():
-        return np.arange(whole.m)
-    owner = _owners(whole.n, part.walls, part.resting)
-    return np.flatnonzero(_standing_faces(whole, part.walls, part.resting, owner)[1])
 
 
 def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints) -> tuple[Ints, Bools]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.tolerances import EXCESS
 from ..surface import Surface
 from .functional import energy_and_gradient
 from .pinching import Walls
-
-SLACK = 1e-9  # of the capacity: an excess below is rounding
 
 
 def pull_and_capacity(
@@ -37,22 +36,21 @@ def pull_and_capacity(
     return pull, np.where(resting, capacity, 0.0)
 
 
-def excess_pull(surface: Surface, walls: Walls, resting: Bools) -> Floats:
+def excess_pull(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
     """(n,) the pull on each resting vertex of a standing part beyond what its wall can take, force.
 
     Zero at equilibrium: a junction that is pulled harder stands off Π. Signed as the pull is.
     """
-    pull, capacity = pull_and_capacity(surface, walls, resting)
-    beyond = np.where(np.abs(pull) > capacity * (1.0 + SLACK), np.abs(pull) - capacity, 0.0)
+    pull, capacity = pull_and_capacity(surface, walls, resting, force)
+    beyond = np.where(np.abs(pull) > capacity * (1.0 + EXCESS), np.abs(pull) - capacity, 0.0)
     return np.copysign(beyond, pull)
 
 
-def pull_directions(surface: Surface, walls: Walls, resting: Bools) -> Floats:
+def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
     """(n,3) the unit direction to lift each vertex of a standing part: off Π, or as a held one is pulled."""
     direction = walls.side[:, None] * np.array(surface.plane.normal)
     held = resting & walls.held
     if held.any():
-        force = -energy_and_gradient(surface, supports=False)[1]
         across = walls.across_bottom(force, surface.vertices)
         length = np.linalg.norm(across, axis=1)
         pulled = held & (length > 0.0)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import ONLY_SLIDES
 from ..surface import Circle, Surface
 from .motion_space import MotionSpace, perpendicular
-
-SEEN = 0.05  # part of a rigid motion in the motion space below which it only slides the surface
 
 
 def rigid_motions(surface: Surface) -> Floats:
@@ -52,7 +51,7 @@ def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
     lengths = [float(np.linalg.norm(f)) or 1.0 for f in fields]  # 0 where all lies on the axis of rotation
     parts = np.stack([space.to_coordinates(f) / k for f, k in zip(fields, lengths, strict=True)], axis=1)
     u, s, _ = np.linalg.svd(parts, full_matrices=False)
-    return u[:, s > SEEN]
+    return u[:, s > ONLY_SLIDES]
 
 
 def _row(arm: Floats, axis: Floats) -> Floats:

@@ -19,15 +19,12 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
+from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
 from ..surface.parts import Room
 from ..surface.supports import apply_supports
 from ..surface.topology import components
 from .functional import patch_volumes, weighted
-
-ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
-UNCHANGED = 1e-13  # of the size, squared: a gradient of a volume that is rounding
-ON_PLANE = 1e-9  # of the size: a vertex as high as this over Π is on it
 
 
 def room_volumes(surface: Surface) -> Floats:
@@ -106,7 +103,7 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     [1.5]
     """
     pressures = surface.pressures + change @ surface.room_signs
-    pressures[surface.auxiliary & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
+    pressures[surface.auxiliary & (np.abs(pressures) <= SAME_PRESSURE * np.abs(pressures).max())] = 0.0
     names = [patch.name for patch in surface.patches]
     walls = surface.walls & surface.room_signs.any(axis=0)
     new = dict(zip(names, pressures.tolist(), strict=True))
@@ -139,7 +136,7 @@ def check_rooms(surface: Surface) -> None:
     closing_volumes(surface)
     by_motion = np.abs(room_volume_gradients(surface)).max(axis=(1, 2))
     for room, change in zip(surface.rooms, by_motion, strict=True):
-        if change <= UNCHANGED * surface.size**2:
+        if change <= NO_CHANGE * surface.size**2:
             message = f"room {room.name!r}: no motion changes its volume, as supports hold all its vertices"
             raise SurfaceError(f"{message}; free some, or remove the room", what="rooms", where=room.name)
     for room, row, volume in zip(surface.rooms, surface.room_signs, room_volumes(surface), strict=True):
@@ -181,7 +178,7 @@ def _left_over(surface: Surface, signs: Floats) -> Floats:
 def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     """The volumes of the fans over the connected pieces of a room's fixed boundary off Π."""
     left = _left_over(surface, signs)
-    grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size)
+    grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON * surface.size)
     edges = surface.topology.edges
     lying = np.asarray(grounded[edges].all(axis=1))
     open_edges = np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying))
@@ -236,7 +233,7 @@ def _closed_by_support(surface: Surface, edges: Ints, lying: Bools) -> Bools:
         closed |= mask[edges].all(axis=1)
     for line, along in surface.on_line:
         if isinstance(line, Line):
-            on_it = along | (fixed & (line.distance(surface.vertices) <= ON_PLANE * surface.size))
+            on_it = along | (fixed & (line.distance(surface.vertices) <= ON * surface.size))
             closed |= on_it[edges].all(axis=1)
     return np.asarray(closed)
 

@@ -1,7 +1,4 @@
-"""The rows of a wall: where its vertices lie below its top edge, so that they follow when it moves.
-
-And walls whose bottom is held on Π: which can pinch, and the vertices that their junctions come down on.
-"""
+"""Rows of a wall: where its vertices lie below its top edge; and which walls with held bottoms can pinch."""
 
 from __future__ import annotations
 
@@ -14,11 +11,11 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.checks import lying
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
-FLAT = 1e-9  # of the size: with its top edge at most this high, a wall's heights show no rows
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
 
 
@@ -72,15 +69,17 @@ class WallRows:
 
 
 def wall_rows(
-    surface: Surface, vertices: Ints, top_edges: Ints, wall_edges: Ints, foot: Ints | None = None
+    surface: Surface, roof_vertex: Bools, top_edges: Ints, wall_edges: Ints, foot: Ints | None
 ) -> WallRows:
-    """The rows of one wall: its ``vertices`` below the nearest of its ``top_edges`` (k,2), seen along n.
+    """The rows of one wall: its vertices below the nearest of its ``top_edges`` (k,2), seen along n.
 
     ``foot`` (n,) gives the held bottom vertex below each top vertex, if the bottom is held.
 
     Where the top edge lies on the bottom its height shows nothing. There ρ is that of the vertex's row: steps
     along ``wall_edges`` from the foot, over those from foot to top.
     """
+    vertices = np.unique(wall_edges)
+    vertices = vertices[~roof_vertex[vertices]]
     X, height = surface.vertices, surface.plane.height(surface.vertices)
     flat = X - height[:, None] * np.array(surface.plane.normal)
     ends, fraction = _nearest(flat, vertices, top_edges)
@@ -97,7 +96,7 @@ def wall_rows(
         top = np.linalg.norm(drop, axis=1)
         share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
         whole = top**2
-    stands = np.abs(top) > FLAT * surface.size
+    stands = np.abs(top) > ON * surface.size
     relative = np.divide(share, whole, out=zero, where=stands)
     relative = np.clip(relative, 0, 1)
     if not stands.all():
@@ -163,7 +162,7 @@ def held_walls(
 ) -> list[tuple[int, Ints, Ints, Ints]]:
     """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
 
-    All that have one top edge to either side of each junction vertex; none unless a junction rests on one.
+    These have one top edge to either side of each junction vertex; none unless a junction rests on one.
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
@@ -193,8 +192,7 @@ def held_walls(
 def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
-    Both edges (k,2) start from the corners where the wall ends, which are their own feet. The vertices so
-    many steps from each corner along the top and along the bottom make a pair.
+    As many steps along the top and along the bottom from each corner, where the wall ends, make a pair.
     """
     tops, bottoms = np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)

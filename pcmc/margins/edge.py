@@ -17,12 +17,12 @@ from ..accuracy.mesh_check import with_bar
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PcmcError, SurfaceError
+from ..base.tolerances import EVENT_ACCURACY
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..certificate.balance import pressures_left_over
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
-from ..continuation.segment import EVENT_ACCURACY
 from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result
 from ..surface import Surface

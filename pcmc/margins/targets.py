@@ -16,8 +16,8 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.errors import OptionError
+from ..base.tolerances import AT_REST
 from ..certificate import certify
-from ..certificate.certificate import TOLERANCE
 from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
 from ..surface import Surface
@@ -30,7 +30,7 @@ from .varied import Varied
 def _known(surface: Surface, what: str) -> Margin | None:
     """Of the last surfaces, as value and slopes are asked for one after the other; None if not at rest."""
     certificate = certify(surface)
-    at_rest = certificate.residual <= TOLERANCE
+    at_rest = certificate.residual <= AT_REST
     return margin(surface, what, meshes=1, certificate=certificate) if at_rest else None
 
 

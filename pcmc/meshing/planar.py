@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
+from ..base.tolerances import ON
 from ..surface.geometry import angles, cross_2d, segment_lengths
 from ..surface.topology import SIDES, components, edge_places
 from .angles import improve_angles
@@ -20,7 +21,6 @@ CROWDED = 0.6  # of the edge length: free points nearer to another point are rem
 GOOD_ANGLE = 30.0  # degrees; sharper triangles get more points
 ROUNDS = 12  # of relaxation
 OUTSIDE = -1
-SLACK = 1e-9  # of the size of a mesh: a point so far beside a triangle is at it
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def locate(mesh: PlanarMesh, points: Floats) -> Ints:
     slack = 1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0)
     order = np.argsort(points[:, 0])
     x = corner[..., 0]  # only the triangles above and below a point are tried
-    low, high = x.min(axis=1) - SLACK * np.ptp(x), x.max(axis=1) + SLACK * np.ptp(x)
+    low, high = x.min(axis=1) - ON * np.ptp(x), x.max(axis=1) + ON * np.ptp(x)
     first = np.searchsorted(points[order, 0], low)
     count = np.searchsorted(points[order, 0], high, side="right") - first
     tried = np.repeat(np.arange(len(corner)), count)

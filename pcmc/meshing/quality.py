@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..forces.motion_space import motion_space
-from ..forces.pinching import StandingPart, place_wall_rows
+from ..forces.pinching import StandingPart
 from ..surface import Surface
 from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
 from ..surface.supports import apply_supports, onto_circles
@@ -117,7 +117,7 @@ def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> t
         move[part.walls.held] = 0.0  # these stay over their bottom vertices
         space = motion_space(surface, classes, X)
         moved = onto_circles(surface, X + move - space.project(move))
-        X = place_wall_rows(surface, part.walls, moved, space)
+        X = part.follow(moved, space)
         quality = worst_quality(X, faces)
         if quality > worst:
             best, worst = X, quality

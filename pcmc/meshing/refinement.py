@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
+from ..base.tolerances import ON
 from ..forces.pinching import midpoints
 from ..surface import Surface, expect_surface
 
@@ -108,7 +109,7 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     both_fixed = drawn | (fixed[start] & fixed[end] & (boundary | inner | inside))
     both_fixed |= _last_edges(surface, both_fixed & inside, fixed)
     height = surface.plane.height(surface.vertices)
-    resting = sliding | (fixed & (np.abs(height) <= 1e-9 * surface.size))
+    resting = sliding | (fixed & (np.abs(height) <= ON * surface.size))
     slides = topo.boundary_edge & resting[start] & resting[end] & (sliding[start] | sliding[end])
     return both_fixed, slides
 
@@ -139,7 +140,7 @@ def edge_columns(surface: Surface) -> Bools:
     """
     columns, edges = [*held_midpoints(surface), *edges_on_planes(surface)], surface.topology.edges
     for guide, along in surface.given_supports.on_line:
-        on = surface.fixed & (guide.distance(surface.vertices) <= 1e-9 * surface.size)
+        on = surface.fixed & (guide.distance(surface.vertices) <= ON * surface.size)
         columns.append(columns[0] & on[edges].all(axis=1) & along[edges].any(axis=1))
     return np.stack(columns, axis=1)
 

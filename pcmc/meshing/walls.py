@@ -10,6 +10,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
+from ..base.tolerances import ON
 from ..surface import HeldCurve, Patch, Plane, Surface
 from ..surface.curves import polyline
 from ..surface.geometry import bounding_size
@@ -159,7 +160,7 @@ class _Builder:
         self, vertices: Floats, plane: Plane, edge_length: float, fixed: Bools, floor: Floats | None
     ) -> None:
         self.local = plane.to_local(vertices)
-        self.tolerance = 1e-9 * bounding_size(vertices)
+        self.tolerance = ON * bounding_size(vertices)
         self.edge_length, self.fixed = edge_length, fixed
         self.floor = np.zeros(len(vertices)) if floor is None else floor
         self.points = list(self.local)

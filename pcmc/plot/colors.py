@@ -101,14 +101,14 @@ def legend_entries(pictures: Iterable[Picture]) -> tuple[dict[str, Any], dict[st
             ("fixed", surface.pinned, FIXED_DOT),
             ("sliding", surface.held & ~surface.pinned, SLIDING_DOT),
         ):
-            if dotted and held[shown].any() and _visible(image, rgb(dot)):
+            if dotted and held[shown].any() and _visible(image, rgb(dot), step=1):
                 dots[name] = dot
     return colors, dots
 
 
-def _visible(image: Image, color: Floats) -> bool:
-    """Whether a square of four pixels has the colour, in any shade: thinner lines are mixed colours."""
-    image = image[::2, ::2].astype(np.float32)
+def _visible(image: Image, color: Floats, step: int = 2) -> bool:
+    """Whether a square of 2 ``step`` pixels has the colour, in any shade: thinner lines are mixed colours."""
+    image = image[::step, ::step].astype(np.float32)
     size, reference = np.linalg.norm(image, axis=2), float(np.linalg.norm(color))
     direction = image / np.maximum(size, 1.0)[..., None]
     alike = np.linalg.norm(direction - color / reference, axis=2) < ALIKE

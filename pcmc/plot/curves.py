@@ -256,9 +256,14 @@ def new_axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, 
     figure = new(width, height, pad=8.0)
     axes = style(figure.subplots())
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
+    label_axes(axes, x, y)
+    return figure, axes
+
+
+def label_axes(axes: Any, x: str, y: str) -> None:
+    """What the axes show."""
     axes.set_xlabel(x, fontsize=TEXT, color=INK, labelpad=2.5)
     axes.set_ylabel(y, fontsize=TEXT, color=INK, labelpad=2.5)
-    return figure, axes
 
 
 def add_legend(axes: Any, count: int) -> None:

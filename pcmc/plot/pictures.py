@@ -20,7 +20,7 @@ from ..certificate.forces import Forces
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import add_legend, color_scale
-from .figure import INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
+from .figure import DPI, INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
 from .raster import paint
 from .scene import Camera, Rendering, mean_edge, scene, view_of
 
@@ -33,6 +33,7 @@ MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
 EDGES_FROM = 9.0  # pixels: a mesh edge shorter than this is not drawn
 DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
 CELL_WIDTH = 700  # pixels of a picture in a notebook
+ABOVE = 7.0  # pixels above a title and below a picture
 TALLEST = 1.1  # height of a picture at most, as a part of its width
 ARROW, AT_POINTS = "#B2182B", "#2166AC"
 
@@ -143,6 +144,8 @@ def compose(
     colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
     heights = [frame.size[1] for frame in frames[::columns]]
     figure = new(width, sum(heights) + 100.0, pad=0.0)
+    if any(drawing.title for drawing in drawings):
+        figure.get_layout_engine().set(h_pad=ABOVE / DPI)
     axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):
         place.set_axis_off()

@@ -57,12 +57,11 @@ def solve(
     """
     expect_surface(surface)
     solver = find_method(method)
-    if surface.on_line and method != "newton":
-        message = f"method {method!r} cannot slide vertices along lines; use method='newton'"
+    cannot = "slide vertices along lines" if surface.on_line else ""
+    cannot = cannot or next((f"keep the volume of room {room.name!r}" for room in surface.rooms), "")
+    if cannot and method != "newton":
+        message = f"method {method!r} cannot {cannot}; use method='newton'"
         raise OptionError(message, what="method", found=method, expected="newton")
-    if surface.rooms and method != "newton":
-        message = f"method {method!r} cannot keep the volume of room {surface.rooms[0].name!r}"
-        raise OptionError(f"{message}; use method='newton'", what="method", found=method, expected="newton")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")
     if surface.size == 0.0:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..certificate.verdict import COLLAPSED, NOISE
+from ..base.tolerances import COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
@@ -22,13 +22,10 @@ from .steps import Stepper
 TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
-ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
-POOR = 0.15  # triangle quality that explains why no step helps
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
 SLOW_DESCENT_STEPS = (3, 30)  # that hardly lower E: when a saddle that slips is accepted, when any
 NEAR_SADDLE = 1e-3  # residual near a saddle
 MIN_ENERGY_DROP = 1e-6  # of Σ α A: by less E is hardly lowered in these steps
-SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
 
 
 @dataclass(frozen=True)
@@ -65,18 +62,19 @@ class NewtonOptions:
         validate.number("inflation", self.inflation, above=1.0)
 
 
+@dataclass
 class Log:
     """What all attempts of a solve share: the callback, and the counts of their work."""
 
-    def __init__(self, callback: Callback | None) -> None:
-        self.callback = callback
-        self.evaluations = self.factorisations = 0
+    callback: Callback | None
+    evaluations: int = 0
+    factorisations: int = 0
 
 
 class NewtonRun:
     """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
-    ``rows`` are the history up to here, with those of the runs ``before``; ``status`` is why the run ended.
+    ``rows`` are its history, after those of the runs ``before``; ``status`` is why it ended.
     """
 
     def __init__(
@@ -166,7 +164,7 @@ class NewtonRun:
             self.log.callback(Progress(len(self.rows) - 1, state.result_surface, row))
 
     def _step(self) -> None:
-        """One step: along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
+        """Along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
         stepper = self.stepper
         if stepper.saddle_near() and stepper.leave_saddle():
             self.smooth_steps = 0
@@ -186,7 +184,7 @@ class NewtonRun:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
         residual = self.state.at.residual
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        rounded = max(ROUNDED, NOISE * self.state.rounding)
+        rounded = max(ROUNDED_REST, NOISE * self.state.rounding)
         return residual <= self.options.tolerance or (residual <= rounded and no_progress)
 
     def _leave_rest(self) -> bool:
@@ -206,10 +204,7 @@ class NewtonRun:
         return False
 
     def _descends_slowly(self) -> bool:
-        """Whether the way down from a saddle hardly lowers E: often it only spoils triangles.
-
-        True once for each number of steps in ``SLOW_DESCENT_STEPS``.
-        """
+        """Whether ``patience`` steps down from a saddle hardly lowered E: often they only spoil triangles."""
         state = self.state
         down = self.stepper.kind in DOWN and state.at.residual <= NEAR_SADDLE
         if self.patience == np.inf or not down:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
+from ..base.tolerances import FORCE_ROUNDING
 from ..forces import triangles
 from ..forces.functional import add_forces, elements, total
 from ..forces.motion_space import tension_forces
@@ -16,8 +17,6 @@ from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, bounding_size, dot, point, scaled, vector
 from .result import Status
-
-ROUNDING = 1e-14  # of the triangles' forces: what is left of them to rounding where they cancel
 
 
 class Point(NamedTuple):
@@ -38,7 +37,7 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
     """‖∇E‖² up to which a run from a surface has converged, force²; 0 for none.
 
     The tolerance, times F² where the norm F of the single triangles' forces at the start is below 1, or a
-    small surface would be at rest in any shape; at least (ROUNDING · F)², which rounding leaves.
+    small surface would be at rest in any shape; at least (FORCE_ROUNDING · F)², which rounding leaves.
 
     >>> from pcmc import Patch, Surface
     >>> corners, faces = [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]]
@@ -49,14 +48,11 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
     if not tolerance:
         return 0.0
     forces = tension_forces(surface)
-    return max(tolerance * min(1.0, forces) ** 2, (ROUNDING * forces) ** 2)
+    return max(tolerance * min(1.0, forces) ** 2, (FORCE_ROUNDING * forces) ** 2)
 
 
 class Evaluator:
     """E and ∇E of ``surface`` with its vertices at other positions; ``count`` is the number of calls.
-
-    A run has converged at ``tolerance`` (see ``converged_below``), and diverged where the bounding box is
-    more than ``inflation`` times that of the surface.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]

@@ -141,10 +141,9 @@ class Objective:
 def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callback | None = None) -> Result:
     """Minimise E over the free coordinates with NLopt's LD_LBFGS (Nocedal 1980; Luksan's code).
 
-    The same energy and supports as in the paper's flow. The ``history`` (``evaluation``, ``energy``,
-    ``gradient_squared``) has a row for each evaluation, trials of the line search included: NLopt shows no
-    more. The result is the surface of least energy seen, measured once more where the last trial was not
-    the best. Status STALLED when NLopt's line search finds no step, an error with an empty message there.
+    The ``history`` (``evaluation``, ``energy``, ``gradient_squared``) has a row for each evaluation, trials
+    of the line search included: NLopt shows no more. The result is the surface of least energy seen, measured
+    once more where the last trial was not the best. Status STALLED when NLopt's line search finds no step.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]

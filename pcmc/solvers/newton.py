@@ -3,10 +3,9 @@
 Each iteration tries a Newton step on r = Bᵀ∇E, whose frames B turn with the surface. GMRES inverts its
 derivative (``linearise``), preconditioned by a factorisation of Bᵀ(∂²E)B, used as long as it contracts.
 Where a minimum is sought and the matrix is indefinite, it is shifted; near a saddle the solver follows the
-lowest mode. Where a step overshoots or spoils triangles, smooth descent steps come first. Between steps
-vertices are redistributed while triangles are poor, and junctions that come down to Π are set to rest there.
-Where triangles collapse, the solver starts once more: towards any stationary point, which it returns if it is
-a minimum or none was asked for; or, if that is what has failed, with smooth steps first.
+lowest mode. Where a step overshoots or spoils triangles, smooth descent steps come first. Where triangles
+collapse, the solver starts once more: towards any stationary point, which it returns if it is a minimum or
+none was asked for; or, if that is what has failed, with smooth steps first.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import SurfaceError
+from ..base.tolerances import POOR
 from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..forces.functional import energy
 from ..forces.pinching import find_walls
@@ -26,7 +26,7 @@ from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import descent_mode
 from ..surface import Surface
-from .attempt import DESCENTS, POOR, SLOW_DESCENT_STEPS, Log, NewtonOptions, NewtonRun
+from .attempt import DESCENTS, SLOW_DESCENT_STEPS, Log, NewtonOptions, NewtonRun
 from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]
@@ -80,7 +80,7 @@ def _solve_level(
 
 def _attempts(first: NewtonRun) -> NewtonRun:
     """Run it; where that fails, once more from the same start in another way."""
-    start, options = first.state.full, first.options
+    start, options = first.state.at.part.whole, first.options
     first.run()
     for more in (*SLOW_DESCENT_STEPS[1:], inf):
         if first.status is not Status.SADDLE:
@@ -116,8 +116,7 @@ def _to_any(first: NewtonRun, surface: Surface, held: bool, smooth_steps: int = 
 def _rests(end: NewtonRun, must_slip: bool) -> bool:
     """Whether an attempt to find any stationary point ends what was asked for: a minimum, or the saddle.
 
-    The saddle ends it, with status SADDLE, if an end of a junction slips in its lowest mode, as the way
-    down then leads to collapsed triangles, or if that does not matter. Its note names it.
+    The saddle does, with status SADDLE, if an end of a junction slips in its lowest mode or need not.
     """
     if end.status is not Status.CONVERGED or end.state.quality < POOR:
         return False

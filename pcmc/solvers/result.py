@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ..base.interrupts import stop_requested
+from ..base.tolerances import AT_REST
 from ..surface import Plane, Surface
 
 if TYPE_CHECKING:
@@ -111,7 +112,6 @@ class Result:
         """
         # imported here, as they take long to import; so does pandas below
         from ..certificate import Evidence, certify
-        from ..certificate.certificate import TOLERANCE
 
         first = Status[self.tried[0].end.upper()] if self.tried else self.status  # before the search
         evidence = {
@@ -119,7 +119,7 @@ class Result:
             Status.VANISHED: Evidence.VANISHED,
             Status.DEGENERATE: Evidence.COLLAPSED,
         }.get(first)
-        tolerance = TOLERANCE if tolerance is None else tolerance
+        tolerance = AT_REST if tolerance is None else tolerance
         return certify(
             self.surface,
             modes=modes,
@@ -171,8 +171,6 @@ passes through to the caller of ``solve``, and so does StopIteration out of ``ne
 
 def until_stopped(run: Callable[[], Status]) -> Status:
     """The status that ``run`` returns; STOPPED where StopIteration or Ctrl-C ends it.
-
-    All solvers run within this call: a request to stop becomes a status here and nowhere else.
 
     >>> until_stopped(lambda: Status.CONVERGED).name
     'CONVERGED'

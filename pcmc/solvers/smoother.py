@@ -2,9 +2,8 @@
 
     L_α d = - B Bᵀ ∇E
 
-d is the gradient of E in the H¹ metric (Pinkall and Polthier 1993 minimise area this way). A step of length
-1 along d lowers the residual by about the same factor on every mesh, and moves neighbours together: the
-sheets around a junction follow it.
+(Pinkall and Polthier 1993 minimise area this way). A step of length 1 along d lowers the residual by about
+the same factor on every mesh, and moves neighbours together: the sheets around a junction follow it.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array, triu
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import PARALLEL
 from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.second_variation import assemble
@@ -24,17 +24,14 @@ from ..surface.supports import apply_supports
 from ..surface.topology import SHEET
 
 FLOOR = 1e-2  # of the largest tension it is connected with: the least tension of any patch in L_α
-ACROSS = 1e-9  # sine or cosine of an angle up to which directions count as parallel or at right angles
 SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports, too
 
 
 class Smoother:
     """L_α at one shape, factorised.
 
-    Fixed vertices hold all coordinates, sliding ones only that normal to their plane; so the coordinates
-    along Π have one factorisation, the normal one another: ``factorisations`` counts those of each
-    ``refresh``. Planes at right angles have coordinates of their own; on an oblique one the part along it is
-    taken.
+    Fixed vertices hold all coordinates, sliding ones only that normal to their plane: ``factorisations``
+    counts the different ones. On planes oblique to the coordinates the part along them is taken.
     """
 
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
@@ -74,7 +71,7 @@ def _axes(surface: Surface) -> Floats:
     normal = np.array(surface.plane.normal)
     for plane, _ in surface.on_planes:
         first = np.array(plane.normal)
-        if abs(first @ normal) <= ACROSS:
+        if abs(first @ normal) <= PARALLEL:
             first -= (first @ normal) * normal
             first /= np.linalg.norm(first)
             return np.stack([first, np.cross(normal, first), normal])
@@ -93,7 +90,7 @@ def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list
     for axis in axes:
         stopped = held.copy()
         for plane, mask in planes:
-            if np.linalg.norm(np.cross(axis, plane.normal)) <= ACROSS:
+            if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL:
                 stopped |= mask
         masks.append(used & ~stopped)
     number = [next(k for k in range(3) if np.array_equal(masks[k], mask)) for mask in masks]
@@ -126,12 +123,11 @@ def _laplacian(
 
 
 class HarmonicExtension:
-    """Lets the inside of the sheets follow the motion of their curves.
+    """Lets the inside of the sheets follow the motion of their curves, or of ``prescribed`` (n,) vertices.
 
-    The motion of curves and points is extended harmonically into the sheets: L w = 0 inside, w given on
-    the curves, L with equal tensions. With the inside i and the curves c,  L_ii w_i = -L_ic w_c. Each sheet
-    vertex takes the part of w along its sheet, which does not change the shape, as far as its support lets
-    it. ``prescribed`` (n,) are the vertices where w is given, in place of the curves and the fixed ones.
+    The motion is extended harmonically into the sheets, L with equal tensions: with the inside i and the
+    curves c,  L_ii w_i = -L_ic w_c. Each sheet vertex takes the part of w along its sheet, which does not
+    change the shape, as far as its support lets it.
     """
 
     def __init__(

@@ -7,20 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.tolerances import ROOM_VOLUME
 from ..forces.functional import energy_at
 from ..forces.loose_parts import rounding_left
 from ..forces.pinching import (
     StandingPart,
     Walls,
-    coming_down,
     find_walls,
     lift,
-    place_pinched_walls,
-    place_wall_rows,
-    put_down,
-    remove_pinched_walls,
     resting_vertices,
-    slide_over_feet,
     standing_part,
     top_spacing,
 )
@@ -39,22 +34,21 @@ DAMPING = 0.25  # factor on both, each time that the vertex is lifted again
 RETRY = 2 / 3  # of the quality aimed at: below this redistribution is tried again after it has failed
 REDISTRIBUTIONS = 60  # the most of them
 VOLUME_STEPS = 4  # the most corrections of the volumes after a move
-VOLUME_LEFT = 1e-10  # of a volume: corrected up to here
 RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 
 
 class SolverState:
     """One mesh with the positions reached, and how it may move.
 
-    ``full`` is the whole surface when its walls were last pinched or lifted, ``at`` its standing part at the
-    positions reached, ``size`` that of the start. ``version`` changes whenever the faces or the number of
-    unknowns do. ``evaluations`` counts passes over the triangles: E, ∇E or its derivative along a motion.
+    ``at`` is the standing part at the positions reached, ``size`` that of the start. ``version`` changes
+    whenever the faces or the number of unknowns do. ``evaluations`` counts passes over the triangles: for E,
+    ∇E or its derivative along a motion.
     """
 
     def __init__(
         self, surface: Surface, min_quality: float, held: bool = False, backend: str | None = None
     ) -> None:
-        self.full, self.min_quality, self.size, self.backend = surface, min_quality, surface.size, backend
+        self.min_quality, self.size, self.backend = min_quality, surface.size, backend
         self.pressures = np.zeros(len(surface.rooms))  # (r,) δ, their changes since the start
         part = standing_part(surface)
         if held:
@@ -69,28 +63,27 @@ class SolverState:
         self._take(part)
 
     def _take(self, part: StandingPart) -> None:
-        """Go on with this standing part of ``full``."""
+        """Go on with another standing part, where it is."""
         self.at = Equilibrium(part, part.surface.vertices, self.backend)
         self.quality_faces = part.quality_faces
         self.rounding = rounding_left(part.surface, part.classes, self.at.X)  # of the residual, about
+        self._at_rest: StandingPart | None = None  # of the surface reached, once nothing changes any more
         self.version += 1
         self.evaluations += 1
 
     def go_to(self, X: Floats) -> None:
         """Be at the positions X (n,3)."""
-        before, self.at = self.at, self.at.at(X)
+        before, self.at, self._at_rest = self.at, self.at.at(X), None
         self.evaluations += 1
         if not np.array_equal(before.space.dimension, self.at.space.dimension):
             self.version += 1
 
     @property
     def walls(self) -> Walls:
-        """The walls that can pinch."""
         return self.at.part.walls
 
     @property
     def resting(self) -> Bools:
-        """(n,) the junction vertices that rest on Π."""
         return self.at.part.resting
 
     @property
@@ -113,8 +106,8 @@ class SolverState:
         """Change the rooms' pressures by δ (r,)."""
         if len(change):
             self.pressures = self.pressures + change
-            self.full = with_room_pressures(self.full, change)
-            self.at = self.at.at(self.at.X, with_room_pressures(self.at.surface, change))
+            part = self.at.part.with_values(lambda surface: with_room_pressures(surface, change))
+            self.at = self.at.at(self.at.X, part)
 
     def keep_volumes(self, X: Floats) -> Floats:
         """X (n,3) moved evenly along the normals until each room has the volume that it has now."""
@@ -124,7 +117,7 @@ class SolverState:
         area = vertex_area_vectors(X, self.at.classes.faces)[1]
         for _ in range(VOLUME_STEPS):
             left = wanted - volumes_at(surface, X)
-            if (np.abs(left) <= VOLUME_LEFT * np.abs(self.at.wanted_volumes)).all():
+            if (np.abs(left) <= ROOM_VOLUME * np.abs(self.at.wanted_volumes)).all():
                 break
             G = volume_gradients_at(surface, X)
             even = G / np.where(area > 0.0, area, 1.0)[:, None]
@@ -139,40 +132,28 @@ class SolverState:
 
     def result_surface(self, X: Floats | None = None) -> Surface:
         """The whole surface at X, with pinched walls placed on their resting junctions."""
-        X = self.at.X if X is None else X
-        if self.resting.any():
-            X = place_pinched_walls(self.full, self.walls, self.resting, X)
-        return self.full.moved(X)
+        if X is None and self._at_rest is not None:
+            return self._at_rest.keep().whole
+        return self.at.part.whole_at(self.at.X if X is None else X)
 
     def move(self, X: Floats, down: Bools) -> None:
         """Go to X; the junction vertices ``down`` rest from now on."""
         if down.any():
-            self.full = self.result_surface(X)
-            self._take(StandingPart.of(self.full, self.walls, self.resting | down))
+            self._take(StandingPart.of(self.result_surface(X), self.walls, self.resting | down))
         else:
             self.go_to(X)
 
     def displaced(self, d: Floats) -> tuple[Floats, Bools]:
-        """X + d, and the junction vertices that this brings down to Π, where they are placed.
-
-        The rows of a wall follow its junction.
-        """
-        surface, walls, space = self.at.surface, self.walls, self.at.space
-        X = onto_circles(surface, self.at.X + d)
-        standing = walls.top_free & ~self.resting
-        if not standing.any():
-            return X, standing
-        low = LOW * self._damping * self.spacing
-        down = coming_down(surface, walls, standing, self.at.X, X, low)
-        X = put_down(surface, walls, X, down)
-        X = slide_over_feet(walls, X, standing & ~down, space)
-        return place_wall_rows(surface, walls, X, space), down
+        """X + d with walls following, and the junction vertices that it brings down to Π, placed there."""
+        part = self.at.part
+        X = onto_circles(part.surface, self.at.X + d)
+        if not part.standing.any():
+            return X, part.standing
+        down = part.coming_down(X, self.at.X, LOW * self._damping * self.spacing)
+        return part.landed(X, down, self.at.space), down
 
     def spoils_triangles(self, X: Floats) -> bool:
-        """Whether the move to X turns a triangle over, makes the worst one much worse or leads too far out.
-
-        Triangles of walls that can pinch do not count: their height may vanish.
-        """
+        """Whether the move to X turns a triangle over, makes the worst much worse or leads too far out."""
         if not reachable(X):
             return True
         turned, before, after = compare(self.at.X, X, self.quality_faces)
@@ -197,14 +178,15 @@ class SolverState:
 
         A wall's foot that has come straight below a resting vertex coincides with it from then on.
         """
-        full = self.result_surface()
-        walls = replace(find_walls(full, self.held), side=self.walls.side)
-        standing = remove_pinched_walls(full, walls, self.resting).faces
-        if np.array_equal(standing, self.at.surface.faces) or self._releases_left <= 0:
+        whole = self.result_surface()
+        walls = replace(find_walls(whole, self.held), side=self.walls.side)
+        part = StandingPart.of(whole, walls, self.resting)
+        if np.array_equal(part.surface.faces, self.at.surface.faces) or self._releases_left <= 0:
+            if not self.held or (self.resting & walls.held).any():  # else no surface alone shows these walls
+                self._at_rest = part
             return False
         self._releases_left -= 1
-        self.full = full
-        self._take(StandingPart.of(full, walls, self.resting))
+        self._take(part)
         return True
 
     def lift_overpulled(self) -> bool:
@@ -215,8 +197,8 @@ class SolverState:
             return False
         self._releases_left -= 1
         walls = replace(self.walls, side=np.where(excess < 0.0, -self.walls.side, self.walls.side))
-        directions = pull_directions(self.at.shape, walls, resting)
-        self.full = lift(self.result_surface(), walls, lifted, LIFT * self._damping, directions)
+        directions = pull_directions(self.at.shape, walls, resting, -self.at.gradient_with_reactions)
+        whole = lift(self.result_surface(), walls, lifted, LIFT * self._damping, directions)
         self._damping[lifted] *= DAMPING
-        self._take(StandingPart.of(self.full, walls, resting & ~lifted))
+        self._take(StandingPart.of(whole, walls, resting & ~lifted))
         return True

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import DIFFERENCE_ROUNDING
 from ..meshing.quality import edge_lengths
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium, SecondVariation
@@ -23,7 +24,6 @@ LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
 REFRESH = 6  # descent steps between two factorisations of the Laplacian
 GROWTH = 0.5  # of a room's volume: the most that a step adds to it or takes away
 DRIFT = 0.1  # of an edge: the most that a step moves along a rigid motion that no support resists
-ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
 class Stepper:
@@ -78,7 +78,7 @@ class Stepper:
                     self.second = None
                 self.kind = "newton" if second.stiffness == 0.0 else "shifted"
                 return True
-            if state.at.residual <= ROUNDING:
+            if state.at.residual <= DIFFERENCE_ROUNDING:
                 break
             state.change_pressures(-t * pressures)
             state.go_to(at.X)
@@ -151,7 +151,7 @@ class Stepper:
     def leave_saddle(self, at: Equilibrium | None = None) -> bool:
         """Move along the lowest mode as far as E keeps falling; False if no mode lowers it.
 
-        ``at`` is the present equilibrium, factorised here apart from the other factors unless it is given.
+        ``at`` is the present equilibrium, whose factors may be used up; by default a copy.
         """
         self._drop_outdated()
         state, at = self.state, at or replace(self.state.at)
@@ -212,14 +212,10 @@ class Stepper:
         return np.append(now.from_other(then, out[: now.size]), out[now.size :])
 
     def _direction(self, second: SecondVariation) -> tuple[Floats, Floats, int]:
-        """-B J⁻¹ r with J the derivative of r itself, by GMRES preconditioned with the factor.
+        """-B J⁻¹ r (n,3), the changes (r,) of the rooms' pressures, and the steps that GMRES took.
 
-        With a shift, J is the shifted matrix, and the factor its inverse. Stiffness added to the factor is
-        added to J, too: otherwise motions that cost no energy would use up the accuracy.
-
-        Where rooms prescribe volumes, their pressures are unknowns, too (``Equilibrium.times``).
-
-        Returns the motion (n,3), the changes (r,) of the pressures, and the steps that GMRES took.
+        The factor preconditions J, ``Equilibrium.times``; shifted, it is the inverse. Stiffness added to the
+        factor is added to J, too: otherwise motions that cost no energy would use up the accuracy.
         """
         at, added = self.state.at, second.added_matrix
         size = at.space.size

@@ -7,7 +7,6 @@ preconditions GMRES. Where J is singular, as at a fold, the bordered matrix is n
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -34,15 +33,11 @@ class BorderedFactor:
         self._inner, self._rows, self._behind = inner, rows, inner.solve(columns)
         self.schur = corner - rows @ self._behind  # (k,k)
 
-    @cached_property
-    def _multipliers(self) -> Floats:
-        return np.asarray(np.linalg.pinv(self.schur))
-
     def solve(self, right: Floats) -> Floats:
         """(s, μ) (N+k,) with A s + P μ and Q s + D μ as given in ``right``, or several of them (N+k,j)."""
         size = len(self._behind)
         s = self._inner.solve(right[:size])
-        multipliers = self._multipliers @ (right[size:] - self._rows @ s)
+        multipliers = np.linalg.pinv(self.schur) @ (right[size:] - self._rows @ s)
         return np.concatenate([s - self._behind @ multipliers, multipliers])
 
 

@@ -1,8 +1,7 @@
 """One equilibrium: a surface at positions X, and all that tells whether it is at rest there and stable.
 
 A P-CMC surface at rest solves r = Bᵀ∇E = 0, with B the basis of the motion space at X. Where rooms prescribe
-volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation. Each value is
-computed once, when a solver, a branch, a sensitivity or the certificate first asks for it.
+volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B is the second variation.
 """
 
 from __future__ import annotations
@@ -61,13 +60,9 @@ class Equilibrium:
         part = standing_part(surface)
         return cls(part, part.surface.vertices, backend)
 
-    def at(self, X: Floats, surface: Surface | None = None) -> Equilibrium:
-        """The same part at other positions, or with the tensions and pressures of another surface.
-
-        The pattern and its order of elimination go along where each vertex has as many unknowns.
-        """
-        part = self.part if surface is None else replace(self.part, surface=surface)
-        new, known = replace(self, part=part, X=X), self.__dict__
+    def at(self, X: Floats, part: StandingPart | None = None) -> Equilibrium:
+        """The same part at other positions, or with other values; the pattern goes along where it can."""
+        new, known = replace(self, part=part or self.part, X=X), self.__dict__
         if "rigid_motions" in known:
             new.__dict__["rigid_motions"] = self.rigid_motions
         if "unknowns" in known and np.array_equal(new.space.dimension, self.space.dimension):
@@ -75,7 +70,7 @@ class Equilibrium:
         return new
 
     def same_as(self, other: Equilibrium) -> bool:
-        """Whether both have the same faces, patches, supports, cables, rooms and positions."""
+        """Whether both have the same faces, values, supports and positions."""
         here, there = self.surface, other.surface
         arrays = [(at.X, at.surface.faces, *at.space, *at.surface.cable_edges) for at in (self, other)]
         values = [(surface.patches, surface.rooms, surface.plane) for surface in (here, there)]
@@ -92,7 +87,6 @@ class Equilibrium:
 
     @property
     def classes(self) -> VertexClasses:
-        """What the vertices lie on."""
         return self.part.classes
 
     @cached_property
@@ -103,18 +97,18 @@ class Equilibrium:
     # At rest
 
     @cached_property
-    def _energy_and_gradient(self) -> tuple[float, Floats]:
+    def _measured(self) -> tuple[float, Floats]:
         return energy_and_gradient(self.surface, self.X, supports=False)
 
     @property
     def energy(self) -> float:
         """E, force·length."""
-        return self._energy_and_gradient[0]
+        return self._measured[0]
 
     @property
     def gradient_with_reactions(self) -> Floats:
         """∇E (n,3), supports not applied, force."""
-        return self._energy_and_gradient[1]
+        return self._measured[1]
 
     @cached_property
     def gradient(self) -> Floats:
@@ -146,11 +140,11 @@ class Equilibrium:
         """(n,) the pull on resting vertices beyond what their walls can take, force."""
         if not self.part.resting.any():
             return np.zeros(len(self.X))
-        return excess_pull(self.shape, self.part.walls, self.part.resting)
+        return excess_pull(self.shape, self.part.walls, self.part.resting, -self.gradient_with_reactions)
 
     @cached_property
     def jacobian(self) -> Linearisation:
-        """The derivative of r along motions of the vertices; B turns along with the surface."""
+        """J, the derivative of r along motions of the vertices; B turns along with the surface."""
         return linearise(self.surface, self.classes, self.space, self.X, self.gradient)
 
     # Rooms of prescribed volume
@@ -229,8 +223,8 @@ class Equilibrium:
     def unknowns(self) -> tuple[Pattern, Factoriser]:
         """The pattern of A and its factoriser; they stay while each vertex has as many unknowns.
 
-        Where tensions are of different orders, it factorises in units 1/√α of the tension around each
-        unknown, as powers of two: so a patch that pulls far less than another still counts.
+        Where tensions differ by orders, it factorises in units of powers of two near 1/√α around each
+        unknown: so a patch that pulls far less than another still counts.
         """
         pattern, patch = hessian_pattern(self.classes, self.space), self.classes.patch_of_face
         tension, units = self.surface.tensions[np.unique(patch)], None
@@ -254,7 +248,7 @@ class Equilibrium:
 
     @cached_property
     def rigid_motions(self) -> Floats:
-        """(k,2,3) the rigid motions that no support resists; see the function of this name."""
+        """(k,2,3) the rigid motions that no support resists."""
         return rigid_motions(self.surface)
 
     @cached_property
@@ -266,8 +260,7 @@ class Equilibrium:
     def excluded(self) -> Floats:
         """(N,k) the rigid motions, and the unit gradients of the volumes that rooms prescribe.
 
-        Motions that cross all of them deform the surface and keep the volumes. A volume that no motion
-        changes excludes none.
+        Motions across all of them deform the surface and keep the volumes.
         """
         if not self.surface.rooms:
             return self.rigid
@@ -288,9 +281,8 @@ class Equilibrium:
     ) -> SecondVariation:
         """A + stiffness · BᵀLB - diag(shift), shift (N,), factorised; the factor before is used up.
 
-        Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part that
-        rests on Π. Then, with ``soften``, a little more stiffness is added: such motions do not lower the
-        energy. SingularMatrix if that does not help.
+        Motions that cost no energy make it singular, such as sliding a vertex inside a flat part on Π. Then,
+        with ``soften``, a little more stiffness is added. SingularMatrix if that does not help.
         """
         pattern, solver = self.unknowns
         for added in (0.0, SOFT) if soften else (0.0,):

@@ -88,9 +88,8 @@ def available() -> tuple[str, ...]:
 def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | None = None) -> Factoriser:
     """A factoriser for the pattern, by the fastest backend installed or the one named.
 
-    ``units`` (N,) are positive numbers u: U A U is factorised in place of A, with U = diag(u), so that weak
-    parts are not taken for zero beside strong ones. Neither the solution nor the inertia depends on them.
-    OptionError if there is no such backend, MissingExtra if it is not installed.
+    With ``units`` u (N,), U A U is factorised in place of A, U = diag(u) > 0, so that weak parts are not
+    taken for zero beside strong ones. Neither the solution nor the inertia depends on them.
 
     >>> import numpy as np
     >>> from scipy.sparse import csr_array

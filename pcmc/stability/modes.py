@@ -19,18 +19,13 @@ from scipy.linalg import eigh, null_space
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from ..base.arrays import Floats
+from ..base.tolerances import NEAR_NEUTRAL, SAME_EIGENVALUE
 from ..forces.motion_space import MotionSpace
 from ..surface import Surface
 from .equilibrium import Equilibrium, SecondVariation
 from .factorisation import SingularMatrix
 
-ALIKE = 1e-7  # of the largest eigenvalue that was computed: a difference of equal ones
 DENSE = 40  # unknowns up to which all eigenvalues are computed at once
-# |λ| size²/α up to which a certificate's detail names a fold. A mesh's own branch folds where the derivative
-# of the forces left is singular, which is not quite the second variation: at reported folds of coarse caps,
-# catenoids and pairs of caps |λ| is 0.003 to 0.55. A flat film over a disc has 46.
-NEAR = 1.0
-NEUTRAL = 1e-2  # |λ| size²/α up to which a motion counts as neutral, α the tension of what it moves
 
 
 @dataclass(frozen=True)
@@ -51,7 +46,7 @@ class Spectrum:
 
 def clear_of_zero(at: Equilibrium) -> SecondVariation | None:
     """A - σM with σ = near · max α, factorised, if nothing is negative or near; None otherwise."""
-    above = _factorised(at, _wide(at, NEAR / at.shape.size**2))
+    above = _factorised(at, _wide(at, NEAR_NEUTRAL / at.shape.size**2))
     return above if above is not None and above.negative == 0 else None
 
 
@@ -64,8 +59,7 @@ def count_soft(
 ) -> tuple[Spectrum, SecondVariation | None]:
     """The counts for two bands in units of α, 1/length², and a factor for the modes; None if there is none.
 
-    One factorisation where nothing is near or negative, or none if ``clear_of_zero`` is known; two where
-    nothing is near, else up to seven.
+    One factorisation where nothing is near or negative, two where nothing is near, else up to seven.
     """
     wide = _wide(at, near)
     above = clear or _factorised(at, wide)
@@ -124,11 +118,11 @@ def _dense(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
 def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) -> Floats:
     """The eigenvectors (s,k), those of equal eigenvalues as the projections of fixed displacements.
 
-    Any basis of their space is as good, and rounding alone would choose one: a symmetric saddle would lean
-    to another side on each processor. ``root`` (s,) are the roots of the masses.
+    Rounding alone would choose a basis of their space, another one on each processor. ``root`` (s,) are the
+    roots of the masses.
     """
     vectors = vectors.copy()
-    ends = np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max(initial=0.0)) + 1
+    ends = np.flatnonzero(np.diff(values) > SAME_EIGENVALUE * np.abs(values).max(initial=0.0)) + 1
     for group in np.split(np.arange(len(values)), ends):
         if len(group) > 1:
             wave = np.arange(3 * len(space.dimension)).reshape(-1, 3)
@@ -144,18 +138,16 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
 
     The search takes in all negative ones, so the first is the lowest of all. Modes have unit mass:
     Σ M |v|² = 1. Rigid motions are left out; rooms keep their prescribed volumes. The factor may be that of
-    A - σM for a small σ; the eigenvalues are those of A.
-
-    Raises
-    ------
-    SingularMatrix : the iteration does not converge.
+    A - σM for a small σ; the eigenvalues are those of A. SingularMatrix if the iteration does not converge.
     """
     size, root = len(system.of.mass), np.sqrt(system.of.mass)
     k = max(count + 1, system.negative + 2)
     while True:
         values, vectors = _dense(system, k) if max(2 * k, DENSE) >= size else _nearest(system, k)
         # one more than are wanted, and all negative ones: these may be farther from zero than positive ones
-        whole = len(values) <= count or values[-1] - values[count - 1] > ALIKE * np.abs(values).max()
+        whole = (
+            len(values) <= count or values[-1] - values[count - 1] > SAME_EIGENVALUE * np.abs(values).max()
+        )
         if len(values) < k or (whole and np.count_nonzero(values < 0.0) >= system.negative):
             break
         k *= 2

@@ -16,7 +16,7 @@ from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..forces.cables import directions
-from ..forces.pinching import standing_faces, standing_part
+from ..forces.pinching import standing_part
 from ..forces.triangles import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
@@ -197,7 +197,7 @@ class StructuralModel:
     @cached_array
     def faces(self) -> Ints:
         """(e,) the face of the surface that each element is; the element's number is one more."""
-        return standing_faces(standing_part(self.surface), self.surface)[self.active]
+        return standing_part(self.surface).faces_of_whole[self.active]
 
     @cached_array
     def nodes(self) -> Bools:

@@ -12,16 +12,14 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
+from ..base.tolerances import NO_AREA, RESTING, RESTING_ROUNDED
 from .geometry import bounding_size, cross, dot, norm, point, sub
 from .topology import Topology
 
-ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
 MANY = 16  # faces at one edge
 LARGEST = validate.LARGEST
 SMALLEST = 1e-50  # of a size or tension: the squares of forces and areas stay above zero
 NUMBERS = "iuf"  # kinds of arrays of numbers
-RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lying on Π
-ROUNDED = 8.0 * float(np.finfo(float).eps)  # the same, relative to the coordinates
 
 
 def positions(vertices: Any) -> Floats:
@@ -157,7 +155,7 @@ def _flat(X: Floats, F: Ints) -> Bools:
     for f in range(len(F)):
         a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
         u, v, w = sub(b, a), sub(c, b), sub(a, c)
-        out[f] = norm(cross(u, w)) <= ZERO_AREA * max(dot(u, u), dot(v, v), dot(w, w))
+        out[f] = norm(cross(u, w)) <= NO_AREA * max(dot(u, u), dot(v, v), dot(w, w))
     return out
 
 
@@ -203,7 +201,9 @@ def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bo
 
 def lying(height: Floats, X: Floats) -> Bools:
     """(n,) whether vertices at these heights over Π lie on it, to rounding of their coordinates."""
-    return np.abs(height) <= max(RESTING * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
+    return np.abs(height) <= max(
+        RESTING * bounding_size(X), RESTING_ROUNDED * float(np.abs(X).max(initial=0.0))
+    )
 
 
 def _first_double(key: Ints) -> list[tuple[int, int]]:

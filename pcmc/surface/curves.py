@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
+from ..base.tolerances import ON
 from .guides import Plane
 from .pieces import Alike, Piece
 
@@ -338,7 +339,7 @@ def join(*curves: Curve) -> Curve:
         )
     if len({curve.pieces[0].points.shape[1] for curve in curves}) > 1:
         raise curve_error("join", "some curves are plane and some in space; give all in space")
-    tolerance = 1e-9 * max(curve.length for curve in curves)
+    tolerance = ON * max(curve.length for curve in curves)
     for number in range(1, len(curves)):
         before, after = _end(curves[number - 1], 1), _end(curves[number], 0)
         if np.linalg.norm(after - before) > tolerance:
@@ -350,7 +351,7 @@ def join(*curves: Curve) -> Curve:
 def _closed_if_ends_meet(path: Curve) -> Curve:
     """The path as a closed one if it ends where it starts."""
     gap = float(np.linalg.norm(_end(path, 1) - _end(path, 0)))
-    return replace(path, closed=path.closed or gap <= 1e-9 * path.length)
+    return replace(path, closed=path.closed or gap <= ON * path.length)
 
 
 def _end(path: Curve, end: int) -> Floats:

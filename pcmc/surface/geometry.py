@@ -19,8 +19,7 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
-
-FAR = 30.0  # sizes of the surface: farther away, differences of coordinates and volumes lose three digits
+from ..base.tolerances import FAR
 
 
 @inlined

@@ -12,9 +12,9 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats, Vector, cached_array
 from ..base.errors import SurfaceError
+from ..base.tolerances import PARALLEL
 from ..base.validate import checked_name
 
-ALIKE = 1e-9  # two unit vectors this near are the same
 Placed = TypeVar("Placed", bound="_Placed")
 
 
@@ -60,7 +60,7 @@ class _Placed:
         """Whether the other one is the same set of points, up to the length ``near``."""
         if type(other) is not type(self):
             return False
-        parallel = np.linalg.norm(np.cross(self._axis, other._axis)) <= ALIKE
+        parallel = np.linalg.norm(np.cross(self._axis, other._axis)) <= PARALLEL
         return bool(parallel and self._apart(other) <= near)
 
     def _apart(self, other: Any) -> float:

@@ -16,12 +16,10 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, read_only
 from ..base.errors import CurveWarning, SurfaceError
+from ..base.tolerances import ON, ON_CURVE
 from .curve_data import exact_curve, exact_data
 from .curves import Curve
 from .topology import Topology
-
-NEAR = 1e-8  # of the size: a vertex this near to its curve is on it
-SPAN = 1e-9  # of the size of a curve: points this near to a plane or line span no more than it
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +135,7 @@ def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: fl
         validate.refuse("curves", given, "a sequence of HeldCurve", error=SurfaceError)
     checked, taken = list[HeldCurve](), np.zeros(len(topo.edges), dtype=bool)
     for number, part in enumerate(parts):
-        fault = _fault(part, X, topo, fixed, taken, NEAR * size)
+        fault = _fault(part, X, topo, fixed, taken, ON_CURVE * size)
         if fault:
             raise SurfaceError(f"curves: curve {number} {fault}", what="curves", where=number)
         taken[topo.edge_numbers(part.edges)] = True
@@ -191,11 +189,11 @@ def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCur
     before = np.concatenate([np.empty((0, 3)), *(one.points for one in held)])
     for one in held:
         P, Q = one.points, X[one.vertices]
-        if np.linalg.norm(P - Q, axis=1).max() <= NEAR * size:
+        if np.linalg.norm(P - Q, axis=1).max() <= ON_CURVE * size:
             kept.append(one)
             continue
-        alone = _carried(one.curve, P, Q, NEAR * size)
-        curve = alone or _carried(one.curve, before, X[every], NEAR * size)
+        alone = _carried(one.curve, P, Q, ON_CURVE * size)
+        curve = alone or _carried(one.curve, before, X[every], ON_CURVE * size)
         kept += [replace(one, curve=curve)] if curve else []
     if len(kept) < len(held):
         text = f"{len(held) - len(kept)} of {len(held)} curves that held vertices were drawn on are left out,"
@@ -210,11 +208,11 @@ def _carried(curve: Curve, P: Floats, Q: Floats, near: float) -> Curve | None:
     M is 1 across what P spans, which the curve must not leave.
     """
     middle, there = P.mean(axis=0), Q.mean(axis=0)
-    change = np.linalg.lstsq(P - middle, (Q - there) - (P - middle), rcond=SPAN)[0]
+    change = np.linalg.lstsq(P - middle, (Q - there) - (P - middle), rcond=ON)[0]
     matrix = np.eye(3) + change.T
     shift = there - matrix @ middle
     _, sizes, axes = np.linalg.svd(P - middle, full_matrices=False)
-    within, away = axes[sizes > SPAN * sizes[0]], curve.controls - middle
-    spanned = np.abs(away - away @ within.T @ within).max() <= NEAR * (sizes[0] + np.abs(away).max())
+    within, away = axes[sizes > ON * sizes[0]], curve.controls - middle
+    spanned = np.abs(away - away @ within.T @ within).max() <= ON_CURVE * (sizes[0] + np.abs(away).max())
     reached = np.linalg.norm(P @ matrix.T + shift - Q, axis=1).max() <= near
     return curve.mapped(matrix, shift) if spanned and reached else None

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import Floats, Ints
+from ..base.tolerances import ON
 from .guides import Plane
 
-SAME = 1e-9  # of a curve's size or parameter: differences up to this are none
 SAMPLES, BISECTIONS = 66, 60  # of a coordinate of a Bézier curve, and to find where it turns between two
 
 
@@ -56,14 +56,14 @@ class Piece:
         """
         if self.sweep:
             _, u, v = self.points[:, :2]
-            used = np.hypot(u, v) > SAME * np.abs(self.points[1:]).max()
+            used = np.hypot(u, v) > ON * np.abs(self.points[1:]).max()
             angles = np.arctan2(v, u)[used][:, None] + math.pi * np.arange(-3, 4)
             t = np.unique(angles / self.sweep)
         elif len(self.points) > 2:
             t = np.unique(np.concatenate([self._turns(k) for k in range(2)]))
         else:
             return np.empty(0)
-        return t[(t > SAME) & (t < 1.0 - SAME)]
+        return t[(t > ON) & (t < 1.0 - ON)]
 
     def _turns(self, axis: int) -> Floats:
         """(e,) parameters at which a coordinate of the Bézier curve changes its direction."""
@@ -79,7 +79,7 @@ class Piece:
 
         t = np.linspace(0.0, 1.0, SAMPLES)
         slope = rate(t)
-        moving = np.flatnonzero(np.abs(slope) > SAME * np.ptp(self.points, axis=0).max())
+        moving = np.flatnonzero(np.abs(slope) > ON * np.ptp(self.points, axis=0).max())
         turned = np.flatnonzero(np.diff(np.sign(slope[moving])))
         low, high = t[moving[turned]], t[moving[turned + 1]]
         sign = np.sign(slope[moving[turned]])

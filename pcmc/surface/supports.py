@@ -12,13 +12,12 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
+from ..base.tolerances import ON, PARALLEL, RESTING_ROUNDED, SAME_PLACE
 from . import checks
 from .geometry import accumulate, bounding_size, dot, point, scaled
 from .guides import Circle, Guide, Line, Plane
 from .topology import Topology
 
-FLAT = 1e-9  # sine of an angle up to which two directions count as parallel
-NEAR = 1e-9  # of the size: a vertex this near to a plane, line or circle lies on it
 Support = TypeVar("Support", bound=Plane | Guide)
 
 
@@ -234,7 +233,7 @@ def check_on(guides: Iterable[tuple[Plane | Guide, Bools]], X: Floats, size: flo
 
     The first plane is Π.
     """
-    near = max(NEAR * size, checks.ROUNDED * float(np.abs(X).max(initial=0.0)))
+    near = max(ON * size, RESTING_ROUNDED * float(np.abs(X).max(initial=0.0)))
     for number, (guide, mask) in enumerate(guides):
         away = guide.distance(X)
         bad = np.flatnonzero(mask & (np.abs(away) > near))
@@ -259,7 +258,7 @@ def checked_planes(
     These are fixed vertices of the boundary on the plane and, of a mirror plane, all those of the boundary.
     A mirror plane that the surface crosses, or that one of its triangles lies in, is refused.
     """
-    near, planes = NEAR * bounding_size(X), list[tuple[Plane, Bools]]()
+    near, planes = ON * bounding_size(X), list[tuple[Plane, Bools]]()
     expected = "a mapping from Planes to vertices"
     pairs: tuple[tuple[Plane, Bools], ...] = guide_masks("on_planes", given, len(X), Plane, expected)
     for plane, mask in pairs:
@@ -304,7 +303,7 @@ def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Fl
     mirrors = [(plane, mask) for plane, mask in planes if plane.mirror]
     for inside, rows in _by_planes(mirrors, members(mirrors, len(vectors))):
         _, sizes, directions = np.linalg.svd([plane.normal for plane in inside], full_matrices=False)
-        across = directions[sizes > FLAT]
+        across = directions[sizes > PARALLEL]
         vectors[rows] -= vectors[rows] @ across.T @ across
     return vectors
 
@@ -333,8 +332,8 @@ def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
     for plane in planes:
         normals = np.array([p.normal for p in (*chosen, plane)])
         away = -np.array([float(p.height(point)) for p in (*chosen, plane)])
-        move = np.linalg.lstsq(normals, away, rcond=FLAT)[0]
-        if np.abs(normals @ move - away).max() <= 1e-12 * (1.0 + np.abs(away).max()):
+        move = np.linalg.lstsq(normals, away, rcond=PARALLEL)[0]
+        if np.abs(normals @ move - away).max() <= SAME_PLACE * (1.0 + np.abs(away).max()):
             chosen.append(plane)
             point = point + move
     return point
@@ -354,17 +353,17 @@ def _by_planes(planes: Sequence[tuple[Plane, Bools]], chosen: Bools) -> Iterator
 def _lies_in(guide: Guide, plane: Plane) -> bool:
     """Whether a line or circle through a point of the plane stays in it."""
     if isinstance(guide, Circle):
-        return bool(np.linalg.norm(np.cross(guide.normal, plane.normal)) <= FLAT)
-    return bool(abs(np.dot(guide.direction, plane.normal)) <= FLAT)
+        return bool(np.linalg.norm(np.cross(guide.normal, plane.normal)) <= PARALLEL)
+    return bool(abs(np.dot(guide.direction, plane.normal)) <= PARALLEL)
 
 
 def _common_direction(planes: Sequence[Plane], vertex: int) -> Floats | None:
     """(3,) the direction within all planes; zero for one plane given several times, None for a point."""
     _, sizes, directions = np.linalg.svd([plane.normal for plane in planes])
-    rank = int((sizes > FLAT).sum())
+    rank = int((sizes > PARALLEL).sum())
     gaps = [float(plane.height(_common_point(planes))) for plane in planes]
     scale = 1.0 + float(np.abs([plane.point for plane in planes]).max())
-    if np.abs(gaps).max() > FLAT * scale:
+    if np.abs(gaps).max() > PARALLEL * scale:
         names = ", ".join(map(str, planes))
         message = f"on_planes: vertex {vertex} slides on planes that do not meet: {names}; remove it from one"
         raise SurfaceError(message, what="on_planes", where=vertex, found=names)
@@ -376,5 +375,5 @@ def _common_direction(planes: Sequence[Plane], vertex: int) -> Floats | None:
 def _common_point(planes: Sequence[Plane]) -> tuple[float, float, float]:
     """The point of all planes that is nearest to the origin, in the least squares."""
     offsets = [np.dot(plane.normal, plane.point) for plane in planes]
-    x, y, z = np.linalg.lstsq([plane.normal for plane in planes], offsets, rcond=FLAT)[0].tolist()
+    x, y, z = np.linalg.lstsq([plane.normal for plane in planes], offsets, rcond=PARALLEL)[0].tolist()
     return x, y, z

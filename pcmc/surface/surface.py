@@ -14,9 +14,10 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
+from ..base.tolerances import FAR
 from . import checks, supports
 from .checked import checked_parts
-from .geometry import FAR, bounding_size
+from .geometry import bounding_size
 from .guides import Guide, Plane
 from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs

@@ -12,10 +12,11 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
-from .guides import ALIKE, Guide, Plane
+from ..base.tolerances import ON, PARALLEL
+from .guides import Guide, Plane
 from .held_curve import HeldCurve
 from .parts import Cable, Room
-from .supports import NEAR, refuse_in_mirror
+from .supports import refuse_in_mirror
 from .surface import Surface, expect_surface
 from .topology import components, topology
 
@@ -50,7 +51,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
         validate.refuse("plane", plane, "a Plane", error=SurfaceError)
     plane = replace(plane, mirror=True)
     height = plane.height(surface.vertices)
-    side = np.where(np.abs(height) <= NEAR * surface.size, 0, np.sign(height)).astype(int)
+    side = np.where(np.abs(height) <= ON * surface.size, 0, np.sign(height)).astype(int)
     corners = side[surface.faces]
     names = [patch.name for patch in surface.patches]
     crossing = np.flatnonzero((corners > 0).any(axis=1) & (corners < 0).any(axis=1))
@@ -194,7 +195,7 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
     label, names = _patches(surface, _joined(meets, next_to), F)
     given, kept = surface.given_supports, [plane for plane, _ in mirrors]
     others = [pair for pair in surface.on_planes if all(pair[0] is not plane for plane in kept)]
-    near, none = 1e2 * NEAR * surface.size, np.zeros(len(X), dtype=bool)
+    near, none = 1e2 * ON * surface.size, np.zeros(len(X), dtype=bool)
     flat = [(surface.plane, none.copy())]
     _add_images(flat, [(surface.plane, given.on_plane), *others], images, place, near)
     lines: list[tuple[Guide, Bools]] = []
@@ -246,7 +247,7 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
     Planes whose images never end, or cross the piece, are refused: there the whole would cover itself.
     """
     images, reflections = [Image(np.eye(3), np.zeros(3))], []
-    near = 1e2 * NEAR * surface.size
+    near = 1e2 * ON * surface.size
     for plane in planes:
         normal = np.array(plane.normal)
         R, t = np.eye(3) - 2.0 * np.outer(normal, normal), 2.0 * np.dot(normal, plane.point) * normal
@@ -256,8 +257,8 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
         for reflection, numbers in zip(reflections, next_to, strict=True):
             new = image.after(reflection)
             same = [
-                np.abs(new.R - old.R).max() <= ALIKE
-                and np.abs(new.t - old.t).max() <= 1e3 * NEAR * surface.size
+                np.abs(new.R - old.R).max() <= PARALLEL
+                and np.abs(new.t - old.t).max() <= 1e3 * ON * surface.size
                 for old in images
             ]
             if not any(same):

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.tolerances import SAME_PRESSURE
 
 KINDS = {
     **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
@@ -23,7 +24,6 @@ KINDS = {
 }
 """The kinds of values, as ``Surface.retensioned`` takes them: the parts of the surface, and their field."""
 PARTS = {"patches": "patch", "cables": "cable", "rooms": "room"}
-ALIKE = 1e-12  # of the largest change of a pressure; smaller differences are rounding
 SHARE = 0.3  # of the smaller tension: the wall's tension above the difference of its neighbours'
 
 
@@ -97,7 +97,7 @@ def wall_changes(surface: Any, change: Floats, named: Collection[int] = ()) -> F
     least, most = np.full((2, len(follow)), [[np.inf], [-np.inf]])
     np.minimum.at(least, patch[top], wanted)
     np.maximum.at(most, patch[top], wanted)
-    rounding = ALIKE * np.abs(change).max()
+    rounding = SAME_PRESSURE * np.abs(change).max()
     one = np.isfinite(least) & (most - least <= rounding) & (np.abs(most) > rounding)
     follow[one] = most[one]
     return follow

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Bools
-
-NOTHING = 1e-9  # of the surface's size: shorter lengths are rounding
+from ..base.tolerances import ON
 
 
 def wall_patches(surface: Any) -> Bools:
@@ -50,8 +49,8 @@ def _hanging(surface: Any, carrying: Bools) -> Bools:
     inward = X[surface.faces.ravel()[sides]] - start  # to the corner opposite the edge
     inward -= np.einsum("ij,ij->i", inward, along)[:, None] * along
     depth = np.linalg.norm(inward, axis=1)
-    away = np.where(surface.plane.height(0.5 * (start + end)) < -NOTHING * surface.size, -1.0, 1.0)
-    thick = depth > NOTHING * surface.size  # a wall whose junction rests on Π has no height left
+    away = np.where(surface.plane.height(0.5 * (start + end)) < -ON * surface.size, -1.0, 1.0)
+    thick = depth > ON * surface.size  # a wall whose junction rests on Π has no height left
     slope = inward @ np.array(surface.plane.normal) / np.where(thick, depth, 1.0)
     rise = np.where(thick, away * slope, -1.0)
     order = np.lexsort((rise, edge))  # the sheets of an edge side by side, the lowest first

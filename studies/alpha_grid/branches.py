@@ -15,8 +15,9 @@ from generators import two_caps
 from pcmc import Surface, certify
 from pcmc.base.arrays import Bools, Floats
 from pcmc.base.errors import SurfaceError
+from pcmc.base.tolerances import HOMOTOPY_END, SOUND
 from pcmc.continuation import Branch, Direction, Ending, follow
-from pcmc.existence.homotopy import BACK, LEAST_QUALITY, SOUND, classify_end, until_turned
+from pcmc.existence.homotopy import BACK, classify_end, until_turned
 from pcmc.meshing.refinement import refine
 from pcmc.solvers import solve
 from pcmc.solvers.result import Progress, Result
@@ -78,7 +79,7 @@ def weakening_case(start: list[float], patch: str, edge_length: float) -> dict[s
 
     def watch(progress: Progress) -> None:
         least[0] = min(least[0], progress.row["parameter"])
-        if progress.row["parameter"] > PAST * least[0] or progress.row["quality"] < LEAST_QUALITY:
+        if progress.row["parameter"] > PAST * least[0] or progress.row["quality"] < HOMOTOPY_END:
             raise StopIteration
 
     at_rest = equilibrium(np.array(start), edge_length).surface

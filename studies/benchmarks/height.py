@@ -21,7 +21,8 @@ from ..reference import evolver
 from .timing import Row, median_seconds
 
 ERROR = 1e-6  # of the height
-LEAST = 10.0  # times as fast as linear elements
+LEAST = 10.0  # times as fast, extrapolated, as linear elements without extrapolation
+PLAIN, EXTRAPOLATED = 1.0, 0.5  # times as fast as linear elements, each in the same way
 RINGS, MESHES = 4, 3  # of the coarsest of our meshes; how many
 ORDERS = 2, 3  # of the errors removed: the second is what is seen once the first is gone
 # the program's elements: rings of the coarsest mesh, refinements; the cheapest found that are fine enough
@@ -36,8 +37,8 @@ def to_height(quick: bool) -> list[Row]:
     seconds = median_seconds(lambda: richardson(our_heights(RINGS, MESHES), ORDERS), 1 if quick else 5)
     size = f"{MESHES} meshes up to {_triangles(RINGS, MESHES):,} triangles"
     rows = [_reached("height, extrapolated", seconds, float(richardson(heights, ORDERS)), size)]
-    if not quick:
-        rows.append(_without_extrapolation())
+    alone = None if quick else _without_extrapolation()
+    rows += [alone] if alone else []
     if not evolver.available():
         return [*rows, Row(f"{evolver.PROGRAM} over ours", np.nan, "times", "evolver is not installed")]
     for elements, (rings, refinements) in (QUICK if quick else LADDERS).items():
@@ -46,10 +47,16 @@ def to_height(quick: bool) -> list[Row]:
         rows.append(_reached(f"{evolver.PROGRAM}, {elements}", clock[-1], theirs[-1], size))
         least = LEAST if elements == "linear" and not quick else None
         rows.append(Row(f"its {elements} elements over ours", clock[-1] / seconds, "times", size, least))
+        if alone and elements == "linear":
+            fair = f"{size}, both of one mesh"
+            rows.append(Row("its linear elements over ours", clock[-1] / alone.value, "times", fair, PLAIN))
     theirs, clock = ladder("linear", RINGS, MESHES - 1, steps=2)
     limit = float(richardson(theirs, ORDERS))
     what = f"{evolver.PROGRAM}, linear, extrapolated by us"
-    return [*rows, _reached(what, clock[-1], limit, f"{_triangles(RINGS, MESHES):,} triangles")]
+    size = f"{_triangles(RINGS, MESHES):,} triangles"
+    fair, least = f"{size}, both extrapolated", None if quick else EXTRAPOLATED
+    rows.append(_reached(what, clock[-1], limit, size))
+    return [*rows, Row("its linear elements over ours", clock[-1] / seconds, "times", fair, least)]
 
 
 HEIGHT: list[Callable[[bool], list[Row]]] = [to_height]

@@ -130,18 +130,40 @@ def _at(fitted: tuple[float, str]) -> tuple[float, str, str]:
 
 
 def draw(table: pd.DataFrame, folder: Folder) -> None:
-    """Time and memory against triangles, with their slopes."""
-    from pcmc.plot import convergence
+    """Time and memory against triangles, each on its own axes, with their slopes."""
+    from matplotlib.ticker import FuncFormatter, NullLocator
 
-    size = table.triangles
-    convergence(
-        {
-            "surface and solution, s": (size, table.solve_seconds),
-            "certificate, s": (size, table.certify_seconds),
-            "memory of the solution, GB": (size, table.solve_gigabytes),
-        },
-        folder.figure("scaling"),
-        x="triangles",
-        y="seconds, gigabytes",
-        title="Example 1 from its initial shape to rest",
+    from pcmc.plot.curves import label_axes
+    from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
+
+    picture = new(1300, 560, pad=8.0)
+    panels = (
+        ("seconds", {"surface and solution": "solve_seconds", "certificate": "certify_seconds"}),
+        ("gigabytes", {"memory of the solution": "solve_gigabytes"}),
     )
+    size = table.triangles.to_numpy(dtype=float)
+    for axes, (unit, columns) in zip(picture.subplots(1, 2), panels, strict=True):
+        style(axes)
+        axes.set(xscale="log", yscale="log")
+        for k, (name, column) in enumerate(columns.items()):
+            values = table[column].to_numpy(dtype=float)
+            slope, height = np.polyfit(np.log(size), np.log(values), 1)
+            color = CURVES[k if unit == "seconds" else 2]
+            axes.plot(size, np.exp(height) * size**slope, color=color, linewidth=0.8)
+            axes.plot(size, values, "os"[k], color=color, markersize=3.2, label=f"{name}: slope {slope:.2f}")
+        axes.xaxis.set_ticks(size, [f"{_round(m)}" for m in size])
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        label_axes(axes, "triangles", unit)
+        axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
+    picture.suptitle("Example 1 from its initial shape to rest", fontsize=TEXT, color=INK)
+    finish(picture, folder.figure("scaling"))
+
+
+def _round(triangles: float) -> str:
+    """A number of triangles in thousands or millions.
+
+    >>> _round(64496), _round(4001924)
+    ('64 000', '4.0 million')
+    """
+    return f"{triangles / 1e6:.1f} million" if triangles >= 1e6 else f"{triangles / 1e3:.0f} 000"

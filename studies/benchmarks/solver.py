@@ -115,7 +115,8 @@ def from_start_to_rest(quick: bool) -> list[Row]:
     end = f"residual {left:.1e}" + ("" if left < 1e-8 else ": it has not converged")
     rows.append(Row(f"{evolver.PROGRAM}: {script}", theirs, "s", f"{size}, {end}"))
     least = None if quick else 5.0
-    return [*rows, Row("its script over ours", theirs / seconds, "times", size, least)]
+    same = size if left < 1e-8 else f"{size}; no comparison, it has not converged"
+    return [*rows, Row("its script over ours", theirs / seconds, "times", same, least)]
 
 
 def _their_script(surface: Surface) -> tuple[float, float]:

@@ -27,6 +27,7 @@ from ..study import Study
 from .cases import BOTTOMS, CASES, DRAWN, ROUND, Case
 from .figures import figure
 from .ladder import (
+    JUMP,
     LOST,
     NONE,
     PERSISTS,
@@ -37,6 +38,7 @@ from .ladder import (
     climb,
     ends,
     free_ends,
+    halved,
     label,
     loss,
     opening,
@@ -52,8 +54,8 @@ SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths
 
 
 def data(folder: Folder, short: bool) -> None:
-    """``ladder``: a row per example, support and level; ``ends``, per end; ``shifted``; ``grid``: Fig. 16."""
-    rows, at_ends = [], []
+    """``ladder``, a row per example, support, level; ``jumps``; ``ends``; ``shifted``; ``grid`` (Fig. 16)."""
+    rows, at_ends, jumps = [], [], []
     for case in CASES[1::6] if short else CASES:
         initial = case.build()
         for bottom in SUPPORTS:
@@ -63,11 +65,13 @@ def data(folder: Folder, short: bool) -> None:
             found, reached = climb(initial, levels, REACH * initial.size, bottom, case.project)
             whose = {"case": case.name, "bottom": bottom}
             rows += [whose | row for row in found]
-            at_ends += [whose | row for row in _ends(initial, reached, found, levels, bottom)]
+            at_ends += [whose | row for row in _ends(initial, reached[-1], found, levels, bottom)]
+            jumps += [whose | row for row in halved(found, reached, bottom, case.project)]
             if case.name == DRAWN and bottom == "held":
-                folder.write_mesh(DRAWN, {"at rest": reached})
+                folder.write_mesh(DRAWN, {"at rest": reached[-1]})
     folder.write_table("ladder", pd.DataFrame(rows))
     folder.write_table("ends", pd.DataFrame(at_ends))
+    folder.write_table("jumps", pd.DataFrame(jumps, columns=["case", "bottom", *JUMP]))
     shifted = [row for case in CASES if _is_straight(case.build()) for row in _shifted_ends(case)]
     folder.write_table("shifted", pd.DataFrame(shifted))
     sweep = Sweep(grid_case, {"tensions": _equilibria(folder, short), "bottom": list(BOTTOMS)})
@@ -208,6 +212,8 @@ def table(folder: Folder) -> dict[str, float]:
         f"grid_{row['bottom']}_{_short(row['label'])}": float(row["cases"])
         for row in counts.to_dict("records")
     }
+    for row in folder.read_table("jumps").to_dict("records"):
+        found |= {f"{row['case']}_{row['bottom']}_jump_{key}": float(row[key]) for key in JUMP[:-2]}
     for row in labels.to_dict("records"):
         found[f"{row['case']}_{row['bottom']}_levels"] = float(row["levels"])
         found[f"{row['case']}_{row['bottom']}_limit"] = float(row["limit"])

@@ -13,7 +13,7 @@ from pcmc.base.arrays import Floats
 
 from ..alpha_grid.grid import TENSIONS
 from ..examples.elevations import with_triangles
-from ..figure_panels import category_panels, graded_mesh
+from ..figure_panels import category_panels, eigenvalue_panels, graded_mesh
 from ..folder import Folder
 from .cases import BOTTOMS, CASES, DRAWN
 from .ladder import CATEGORIES, SUPPORTS, ends, law
@@ -27,8 +27,6 @@ NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
 
 def figure(folder: Folder) -> None:
     """The loss of hold with its fits, the crest's rise beside the theory, the grid, a graded mesh."""
-    from pcmc.plot import lines
-
     ladder = folder.read_table("ladder")
     sizes = {case.name: case.build() for case in CASES if (ladder.case == case.name).any()}
     curves = {}
@@ -45,20 +43,14 @@ def figure(folder: Folder) -> None:
                     mine.edge_length / initial.size,
                     mine.eigenvalue * unit,
                 )
-    for name, levels, title in (
-        ("loss", {"saddle below": 0.0}, "Bottoms slide: the hold of the ends fades"),
-        ("held", None, "Bottoms are held: the lowest eigenvalue has a limit"),
-    ):
-        lines(
-            {key: curve for key, curve in curves.items() if ("held" in key) == (name == "held")},
-            folder.figure(name),
-            x="edge length at the end / size",
-            y="lowest eigenvalue, α/size²",
-            xscale="log",
-            markers=True,
-            levels=levels,
-            title=title,
-        )
+    for name, supports in (("loss", ("sliding", "natural")), ("held", ("held",))):
+        shown = {NAMES[support] for support in supports}
+        panels: dict[str, dict[str, Any]] = {}
+        for key, curve in curves.items():
+            title, _, support = key.rpartition(", ")
+            if support in shown:
+                panels.setdefault(title, {})["bottoms held" if support == "held" else support] = curve
+        eigenvalue_panels(panels, folder.figure(name))
     _draw_fits(folder, ladder)
     _draw_grid(folder)
     _draw_mesh(folder)

@@ -33,6 +33,7 @@ from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import SurfaceError
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.quality import edge_lengths
+from pcmc.meshing.refinement import refine
 from pcmc.solvers import solve
 from pcmc.solvers.result import Result
 from pcmc.surface.geometry import angles
@@ -47,8 +48,13 @@ PERSISTS, SADDLE, TURNS, LOST, SINKS, NONE = CATEGORIES = (
     "not found on the first mesh",
 )
 SUNK = 1e-3  # quality of a wall's triangles at which its junction has come down on its bottom
+JUMP = (  # columns of ``halved``
+    "level", "anew", "slid", "energy_before", "energy", "energy_before_halved", "energy_halved", "step",
+    "step_halved", "mesh_error", "status_before_halved", "status_halved",
+)  # fmt: skip
 LEAST_FIT = 4  # levels
 NEAR_REST = 0.2  # of log(1/h): closer to where the junction rests the law has no use
+LEAST_STEP = 1e-6  # of the energy: a smaller step is not looked into
 ITERATIONS = 60  # of the solver on a mesh; from the level before it takes 5
 CONFIDENCE = 0.95
 STRAIGHT = 1e-9  # of the size: how far points may be from a line or circle that they lie on
@@ -122,20 +128,23 @@ SUPPORTS: dict[str, Callable[[Surface], Surface]] = {
 
 def climb(
     surface: Surface, levels: int, radius: float, support: str, project: Projection | None = None
-) -> tuple[list[dict[str, Any]], Surface]:
-    """A row per level as long as there is an equilibrium, and the surface at the last one.
+) -> tuple[list[dict[str, Any]], list[Surface]]:
+    """A row per level as long as there is an equilibrium; the initial surface, and at rest on each level.
 
-    ``radius`` is what the first refinement reaches; ``project`` puts new boundary vertices in place.
+    ``radius`` is what the first refinement reaches; ``project`` puts new boundary vertices in place. ``anew``
+    says that a level is solved from the initial shape, ``slid`` how far the vertices of the initial mesh are
+    from where they were on the level before.
     """
     vertices = ends(surface)
     places = surface.vertices[vertices]
-    shape, rows, reached = surface, [], surface
+    shape, rows, reached = surface, [], [surface]
     for level in range(levels + 1):
-        result = _solved(shape, support)
+        result, is_anew = _solved(shape, support), False
         if not result.converged and level:
             anew = refine_near(surface, places, level, radius, project)
             again = _solved(anew, support)
-            shape, result = (anew, again) if again.converged else (shape, result)
+            is_anew = again.converged
+            shape, result = (anew, again) if is_anew else (shape, result)
         certificate = result.certify(modes=1) if result.converged else result.certificate
         at_end = np.isin(result.surface.topology.edges, vertices).any(axis=1)
         rows.append(
@@ -144,18 +153,77 @@ def climb(
                 "edge_length": float(np.median(edge_lengths(shape)[at_end])),
                 "triangles": shape.m,
                 "status": result.status.name.lower(),
+                "anew": is_anew,
+                "slid": _slid(reached[-1], result.surface, surface.n) if level else math.nan,
                 **_findings(certificate, result.surface),
             }
         )
         if not result.converged:
             break
-        reached = result.surface
+        reached.append(result.surface)
         if level < levels:
             try:
-                shape = refine_near(shape.moved(reached.vertices), places, 1, radius * 0.5**level, project)
+                shape = refine_near(
+                    shape.moved(result.surface.vertices), places, 1, radius * 0.5**level, project
+                )
             except SurfaceError:  # a wall without height cannot be cut
                 shape = refine_near(surface, places, level + 1, radius, project)
     return rows, reached
+
+
+def _slid(before: Surface, now: Surface, vertices: int) -> float:
+    """The largest distance between the places of the first ``vertices`` vertices."""
+    moved = now.vertices[:vertices] - before.vertices[:vertices]
+    return float(np.linalg.norm(moved, axis=1).max())
+
+
+def halved(
+    rows: Sequence[Mapping[str, Any]],
+    reached: Sequence[Surface],
+    support: str,
+    project: Projection | None = None,
+) -> list[dict[str, Any]]:
+    """The largest step of the energy that is larger than the step before, on finer meshes, too.
+
+    A row, or none: the energies on both levels, and on the same meshes with every triangle cut into four. If
+    the step is another shape's, it stays; if only the vertices lie elsewhere, it goes with h², as the error
+    of the energy does, which ``mesh_error`` estimates (Richardson).
+    """
+    energies = [row["energy"] for row in rows if row["status"] == "converged"]
+    steps = np.abs(np.diff(energies))
+    growing = 1 + np.flatnonzero(steps[1:] > steps[:-1])
+    growing = growing[steps[growing] > LEAST_STEP * abs(energies[-1])]
+    if not len(growing):
+        return []
+    level = int(growing[np.argmax(steps[growing])]) + 1
+    fine = [_solved_finer(reached[k + 1], support, project) for k in (level - 1, level)]
+    energy, finer = energies[level - 1 : level + 1], [found for found, _ in fine]
+    return [
+        {
+            "level": level,
+            "anew": rows[level]["anew"],
+            "slid": rows[level]["slid"],
+            "energy_before": energy[0],
+            "energy": energy[1],
+            "energy_before_halved": finer[0],
+            "energy_halved": finer[1],
+            "step": energy[1] - energy[0],
+            "step_halved": finer[1] - finer[0],
+            "mesh_error": (energy[1] - finer[1]) * 4.0 / 3.0,
+            "status_before_halved": fine[0][1],
+            "status_halved": fine[1][1],
+        }
+    ]
+
+
+def _solved_finer(surface: Surface, support: str, project: Projection | None) -> tuple[float, str]:
+    """The energy with every triangle cut into four, and how the solver ended."""
+    try:
+        finer = refine(surface, 1, project)
+    except SurfaceError:  # walls have come down to nothing
+        return math.nan, "cannot be cut"
+    result = _solved(finer, support)
+    return result.energy, result.status.name.lower()
 
 
 def _solved(shape: Surface, support: str) -> Result:

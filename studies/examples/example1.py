@@ -24,6 +24,7 @@ WALLS = (0.0, 1.0, 2.0, 3.0)  # Fig. 7b to 7e
 COARSE, FINE = 4, 8
 STANDS = 0.05  # a wall lower than this, over an initial height of 1, is not seen
 EARLY = 60  # iterations in which momentum makes E oscillate in Fig. 10
+SOON = 30  # iterations after which the lines of Fig. 10 are compared
 LAST = 100  # iterations over which the wall's bouncing is measured
 STANDING = {  # momentum, diagonals of the runs that follow the wall of α 3
     "with momentum": (True, "symmetric"),
@@ -123,6 +124,7 @@ def _standing_numbers(standing: pd.DataFrame) -> dict[str, float]:
         "stands_until": until[symmetric],
         "stands_until_without_momentum": until[still],
         "least_height_3_parallel": least,
+        "iterations_of_least_height": LAST,
     }
 
 
@@ -171,6 +173,9 @@ def _shape_numbers(junction: pd.DataFrame, records: pd.DataFrame) -> dict[str, f
     parallel = [f"wall{wall:g}-n{COARSE}-parallel-printed" for wall in WALLS]
     other = [junction.turn[name] for name in parallel]
     measured["height_3_parallel"] = junction.height[parallel[-1]]
+    measured["elements_fine_over_coarse"] = (
+        records.triangles[_main(2.0, FINE)] / records.triangles[_main(2.0)]
+    )
     measured["least_turn_step_parallel"] = min(b - a for a, b in pairwise(other))
     return measured
 
@@ -185,7 +190,7 @@ def _fig10(histories: pd.DataFrame) -> pd.DataFrame:
         rows.append(
             {
                 "case": name,
-                "energy_30": E[min(30, len(E) - 1)],
+                "energy_30": E[min(SOON, len(E) - 1)],
                 "energy_half": E[half],
                 "energy_end": E[-1],
                 "fall_in_second_half": E[half] - E[-1],
@@ -203,11 +208,17 @@ def _numbers10(fig10: pd.DataFrame) -> dict[str, float]:
     lines = fig10.set_index("case")
     kept = ["energy_30", "energy_end", "fall_in_second_half", "total_rise", "early_rise", "forced_steps"]
     sufficient = lines.loc["fig10-proposed-sufficient"]
-    return {f"fig10_sufficient_{key}": sufficient[key] for key in ("total_rise", "early_rise")} | {
-        f"fig10_{variant.replace('-', '_')}_{key}": lines[key][f"fig10-{variant}-printed"]
-        for variant in VARIANTS
-        for key in kept
-    }
+    iterations = {"iterations_of_energy_30": SOON, "iterations_of_early_rise": EARLY}
+    rises = {f"fig10_sufficient_{key}": sufficient[key] for key in ("total_rise", "early_rise")}
+    return (
+        iterations
+        | rises
+        | {
+            f"fig10_{variant.replace('-', '_')}_{key}": lines[key][f"fig10-{variant}-printed"]
+            for variant in VARIANTS
+            for key in kept
+        }
+    )
 
 
 def _main(wall: float, n: int = COARSE) -> str:

@@ -11,6 +11,7 @@ from generators import four_fans
 from pcmc import Surface
 
 from ..folder import Folder
+from ..paper import printed
 from ..study import Study
 from .example import gradient_history, numbers, shapes
 from .flow import DECIMALS, Case, curvature_table, run_cases
@@ -57,6 +58,9 @@ def table(folder: Folder) -> dict[str, float]:
         "radius": float(np.linalg.norm(start.vertices[:, :2], axis=1).max().round(DECIMALS - 1)),
         "height": float(start.vertices[:, 2].max()),
         "t0": T0,
+        "rings": _rings(start),
+        "rings_coarse": _rings(coarse["initial"]),
+        "iterations_on": records.iterations["on"],
         "axis_offset": _axis_offset(stages["final"]),
         "axis_offset_coarse": _axis_offset(coarse["final"]),
         "ellipse_misfit": _misfit(ridges, "main"),
@@ -83,6 +87,12 @@ def _axis_offset(surface: Surface) -> float:
     return float(np.linalg.norm(axis[:, :2], axis=1).max() / radius)
 
 
+def _rings(surface: Surface) -> int:
+    """Of vertices around the axis: as many as edges of a junction from the axis to the rim."""
+    junction = surface.vertices[surface.topology.on_junction, :2]
+    return len(np.unique(np.linalg.norm(junction, axis=1).round(DECIMALS))) - 1
+
+
 def _ridges(surface: Surface, mesh: str) -> pd.DataFrame:
     """The junction's points: distance from the axis and height, both over their largest."""
     ridge = surface.vertices[surface.topology.on_junction]
@@ -105,7 +115,8 @@ def _misfit(ridges: pd.DataFrame, mesh: str, *, ellipse: bool = True) -> float:
 
 def figure(folder: Folder) -> None:
     """Figs. 17 to 21."""
-    shapes(folder, "main", {"initial": ("fig17", "fig18"), "final": ("fig19", "fig20")}, "fig21")
+    pictures = {"initial": ("fig17", "fig18"), "final": ("fig19", "fig20")}
+    shapes(folder, "main", pictures, "fig21", printed("example3.gradient_squared"))
     gradient_history(folder, {"the paper's flow": "on", "L-BFGS": "lbfgs"}, "methods")
 
 

@@ -11,6 +11,7 @@ from generators import bezier_hall
 from pcmc import Surface, curvature_error
 
 from ..folder import Folder
+from ..paper import printed
 from ..study import Study
 from .example import numbers, shapes
 from .flow import Case, curvature_table, run_cases
@@ -103,7 +104,14 @@ def _near_boundary(stages: Mapping[str, Surface]) -> pd.DataFrame:
 def figure(folder: Folder) -> None:
     """Figs. 22 to 25."""
     pictures = {"initial": ("fig22", None), "best": ("fig23", "fig24")}
-    shapes(folder, "main", pictures, "fig25", walls_view=(-120.0, 28.0))
+    shapes(
+        folder,
+        "main",
+        pictures,
+        "fig25",
+        printed("example4.gradient_squared_1000"),
+        walls_view=(-120.0, 28.0),
+    )
 
 
 STUDY = Study(

@@ -187,7 +187,7 @@ def figure(folder: Folder) -> None:
     from pcmc.plot import convergence, diagram, lines, panel
 
     points, events = folder.read_table("cap_points"), folder.read_table("cap_events")
-    branches = {
+    branches = {"exact": _exact_caps()} | {
         f"edge length {edge:g}": Branch(
             Direction({"cap": 1.0}), mine, events[events.edge_length == edge], {}, Ending.REACHED
         )
@@ -218,6 +218,22 @@ def figure(folder: Folder) -> None:
         folder.figure("walls"), x="tension of the walls", y="lowest eigenvalue × 1000, force/length³",
         title="Example 3: below 0 the cross lets go of the middle",
     )  # fmt: skip
+
+
+def _exact_caps() -> Branch:
+    """Caps of the sphere over the unit disc: α = (1 + h²) / (4 h) at height h, with the fold at h = 1."""
+    heights = np.linspace(0.53, HEIGHT, 200)
+    points = pd.DataFrame(
+        {
+            "arclength": heights,
+            "parameter": (1.0 + heights**2) / (4.0 * heights),
+            "height": heights,
+            "index": np.where(heights < 1.0, 0, 1),
+        }
+    )
+    fold = {"arclength": 1.0, "parameter": 0.5, "height": 1.0, "index_before": 0, "index_after": 1}
+    events = pd.DataFrame([fold | {"kind": "fold"}])
+    return Branch(Direction({"cap": 1.0}), points, events, {}, Ending.REACHED)
 
 
 def _draw_rays(folder: Folder) -> None:

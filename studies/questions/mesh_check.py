@@ -189,32 +189,39 @@ def _coverage(family: object, part: pd.DataFrame) -> dict[str, Any]:
 
 def figure(folder: Folder) -> None:
     """True errors against their bars: on this mesh, and in the limit."""
-    from pcmc.plot.curves import MARKERS
+    from pcmc.plot.curves import MARKERS, label_axes
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
 
     records = folder.read_table("closed_forms")
     records = records[records["quantity"].notna() & np.isfinite(records["error"])]
-    picture = new(1200, 600, pad=8.0)
-    panels = picture.subplots(1, 2)
+    picture = new(1500, 900, pad=8.0)
+    panels = picture.subplots(1, 2, sharey=True)
     kinds = (("value", "error", "the value on this mesh"), ("limit", "limit_error", "the limit"))
+    ends = np.array([1e-7, 1.0])
     for axes, (value, bar, title) in zip(panels, kinds, strict=True):
         style(axes)
         size = records["exact"].abs()
         true, width = (records[value] - records["exact"]).abs() / size, records[bar] / size
         for k, (family, part) in enumerate(records.groupby("family", sort=False)):
-            look = {"color": CURVES[k % len(CURVES)], "markersize": 3.0, "linestyle": "none"}
+            look = {"color": CURVES[k % len(CURVES)], "linestyle": "none", "markeredgewidth": 0.0}
             marker = MARKERS[(k + k // len(CURVES)) % len(MARKERS)]
-            axes.plot(width[part.index], true[part.index], marker=marker, label=family, **look)
-        ends = np.array([1e-7, 1.0])
-        axes.plot(ends, ends, color=INK, linewidth=0.9, label="error = bar" if axes is panels[0] else None)
+            sizes = {"markersize": 2.6, "alpha": 0.55}
+            axes.plot(width[part.index], true[part.index], marker=marker, label=family, **look, **sizes)
+        axes.fill_between(ends, ends, 1.0, color="#B2182B", alpha=0.08, linewidth=0.0)
+        axes.text(3e-7, 0.1, "outside the bar", fontsize=SMALL, color="#B2182B")
         dashed = {"color": INK, "linewidth": 0.9, "linestyle": (0, (5, 3))}
-        axes.plot(ends, ends / WIDE, label="error = bar / 5" if axes is panels[0] else None, **dashed)
+        axes.plot(ends, ends, color=INK, linewidth=0.9, label="error = bar")
+        axes.plot(ends, ends / WIDE, label=f"error = bar / {WIDE:g}", **dashed)
         axes.set(xscale="log", yscale="log", xlim=ends, ylim=(1e-8, 1.0))
         axes.set_title(title, fontsize=TEXT, color=INK)
-        axes.set_xlabel("error bar / exact value", fontsize=TEXT, color=INK)
-        axes.set_ylabel("true error / exact value", fontsize=TEXT, color=INK)
+        label_axes(axes, "error bar / exact value", "true error / exact value")
+        axes.label_outer()
     handles, labels = panels[0].get_legend_handles_labels()
-    picture.legend(handles, labels, loc="outside right upper", fontsize=SMALL, frameon=False, labelcolor=INK)
+    legend = picture.legend(
+        handles, labels, loc="outside lower center", ncols=6, fontsize=SMALL, frameon=False, labelcolor=INK
+    )
+    for handle in legend.legend_handles:
+        handle.set_alpha(1.0)
     finish(picture, folder.figure("coverage"))
 
 

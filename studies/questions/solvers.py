@@ -165,6 +165,7 @@ def table(folder: Folder) -> dict[str, float]:
             "runs": groups.size(),
             "at_rest": groups.at_rest.sum(),
             "stable": groups.verdict.agg(lambda v: (v == "stable").sum()),
+            "saddles": groups.verdict.agg(lambda v: (v == "saddle").sum()),
             "verdicts": groups.verdict.agg(_counts),
             "largest_residual": groups.residual.max(),
             "median_residual": groups.residual.median(),
@@ -176,7 +177,12 @@ def table(folder: Folder) -> dict[str, float]:
         }
     ).reset_index()
     folder.write_table("summary", summary)
-    found = {}
+    found = {
+        "meshes": float(records.groupby("example").triangles.nunique().max()),
+        "examples": float(records.example.nunique()),
+        "wall_of_example1": ALPHA_AUX,
+        "examples_with_saddles": float(records.example[records.verdict == "saddle"].nunique()),
+    }
     for key, label in (
         ("flow", "the paper's flow"),
         ("lbfgs", "L-BFGS"),
@@ -184,7 +190,7 @@ def table(folder: Folder) -> dict[str, float]:
         ("newton_minimum", DEFAULT),
     ):
         (row,) = summary[summary.method == label].to_dict("records")
-        for column in ("runs", "at_rest", "stable", "largest_residual", "worst_quality"):
+        for column in ("runs", "at_rest", "stable", "saddles", "largest_residual", "worst_quality"):
             found[f"{column}_{key}"] = float(row[column])
     return found
 

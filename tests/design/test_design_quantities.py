@@ -12,7 +12,7 @@ import pcmc
 from generators import double_bubble, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Target, sensitivities
 from pcmc.base.errors import SurfaceError
-from pcmc.certificate.certificate import TOLERANCE
+from pcmc.base.tolerances import AT_REST
 from pcmc.design.targets import MEASURES, measure
 
 
@@ -204,5 +204,5 @@ def test_a_junction_pulled_off_by_more_than_its_wall_holds_is_not_at_rest():
     pinched = pcmc.solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
     assert len(pcmc.certify(pinched).pinched) == 5
     assert np.isfinite(sensitivities(pinched, Target("volume"), "left").to_numpy()).all()
-    with refused(SurfaceError, what="surface", expected=TOLERANCE):
+    with refused(SurfaceError, what="surface", expected=AT_REST):
         sensitivities(pinched.retensioned({"wall": 1.0}), Target("volume"), "left")

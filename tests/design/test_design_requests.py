@@ -13,7 +13,7 @@ import pcmc
 from generators import double_bubble, joined_caps, two_squares
 from pcmc import Parameter, Target, meet, sensitivities
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.certificate.certificate import TOLERANCE
+from pcmc.base.tolerances import AT_REST
 from pcmc.design import DesignStatus
 from pcmc.design.targets import as_parameters, measure
 
@@ -90,9 +90,9 @@ def test_what_is_no_surface_or_not_at_rest_has_no_design():
         meet([], APEX, "roof")
     with refused(SurfaceError, what="surface", found="list"):
         sensitivities([], Target("apex"), "roof")
-    with refused(SurfaceError, what="surface", expected=TOLERANCE) as caught:
+    with refused(SurfaceError, what="surface", expected=AT_REST) as caught:
         sensitivities(joined_caps(2.0), Target("apex"), "wall")
-    assert caught.value.found > TOLERANCE
+    assert caught.value.found > AT_REST
 
 
 def test_parameters_and_walls_of_no_tension():

@@ -11,11 +11,11 @@ from pcmc import Circle, Patch, Verdict, certify, solve, write
 from pcmc.certificate.balance import unheld
 from pcmc.certificate.neck import narrowest_neck
 from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
-from pcmc.existence.starts import low_start
 from pcmc.io import native
 from pcmc.plan import Divider, Hole, Plan
 from pcmc.solvers import solve as one_start
 from pcmc.solvers.result import Status
+from pcmc.solvers.starts import low_start
 from pcmc.sweep import solve_case
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")

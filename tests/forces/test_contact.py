@@ -8,12 +8,11 @@ from starts import double_bubble, four_fans, two_caps, two_squares
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pinching import (
+    StandingPart,
     beside_resting,
     find_walls,
     lift,
-    place_pinched_walls,
     place_wall_rows,
-    remove_pinched_walls,
     resting_links,
     resting_vertices,
     top_spacing,
@@ -37,8 +36,8 @@ def pressed(n=6, count=2, **arguments):
     walls = find_walls(surface)
     resting = np.zeros(surface.n, dtype=bool)
     resting[crest_of(surface, walls)[:count]] = True
-    standing = remove_pinched_walls(surface, walls, resting)
-    full = surface.moved(place_pinched_walls(surface, walls, resting, standing.vertices))
+    standing = StandingPart.of(surface, walls, resting).surface
+    full = surface.moved(StandingPart.of(surface, walls, resting).whole_positions(standing.vertices))
     return full, walls, resting, standing
 
 
@@ -156,7 +155,7 @@ def test_what_is_left_when_a_junction_rests(count):
         assert (standing.patch_of_face != 2).all()
     # what is gone has no area, so E is that of the full surface with its wall pressed flat
     assert energy(standing) == pytest.approx(energy(full), rel=1e-13)
-    again = remove_pinched_walls(full, walls, resting)
+    again = StandingPart.of(full, walls, resting).surface
     np.testing.assert_array_equal(again.faces, standing.faces)
     np.testing.assert_allclose(again.vertices, standing.vertices, atol=1e-14)
 
@@ -165,7 +164,7 @@ def test_without_a_resting_vertex_nothing_changes():
     surface = two_squares(4)
     walls = find_walls(surface)
     assert not resting_vertices(surface, walls).any()
-    assert remove_pinched_walls(surface, walls, resting_vertices(surface, walls)) is surface
+    assert StandingPart.of(surface, walls, resting_vertices(surface, walls)).surface is surface
 
 
 def test_pinching_turns_with_the_plane():
@@ -174,7 +173,7 @@ def test_pinching_turns_with_the_plane():
     there = find_walls(turned)
     turned = turned.moved(place(full.vertices))
     np.testing.assert_array_equal(resting_vertices(turned, there), resting)
-    other = remove_pinched_walls(turned, there, resting)
+    other = StandingPart.of(turned, there, resting).surface
     np.testing.assert_array_equal(other.faces, standing.faces)
     np.testing.assert_allclose(other.vertices, place(standing.vertices), atol=1e-12)
     for one, two in zip(
@@ -193,10 +192,10 @@ def test_a_foot_that_still_carries_a_triangle_stays_where_it_slid():
     X[foot] += 0.01 * (X[crest[0]] - X[crest[1]]) * [1.0, 1.0, 0.0]
     surface = surface.moved(X)
     walls = find_walls(surface)
-    standing = remove_pinched_walls(surface, walls, resting)
+    standing = StandingPart.of(surface, walls, resting).surface
     assert len(foot) == 1
     assert np.isin(foot, standing.faces).all()
-    moved = place_pinched_walls(surface, walls, resting, standing.vertices)
+    moved = StandingPart.of(surface, walls, resting).whole_positions(standing.vertices)
     np.testing.assert_array_equal(moved[foot], X[foot])
 
 
@@ -252,7 +251,7 @@ def test_a_vertex_on_no_top_edge_is_not_lifted():
 @pytest.mark.parametrize(("alpha_aux", "lifts"), [(0.5, 3), (50.0, 0)])
 def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, lifts):
     state = SolverState(two_squares(6, alpha_aux=alpha_aux), min_quality=0.45)
-    crest = crest_of(state.full, state.walls)[:3]
+    crest = crest_of(state.at.part.whole, state.walls)[:3]
     drop = np.zeros_like(state.at.X)
     drop[crest, 2] = -state.at.X[crest, 2]
     X, down = state.displaced(drop)
@@ -266,7 +265,7 @@ def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, l
     assert ((height > 0.0) == (lifts > 0)).all()
     if lifts:  # its wall is back, with all its rows
         quality = triangle_quality(state.at.X, state.at.surface.faces)
-        assert len(quality) == state.full.m
+        assert len(quality) == state.at.part.whole.m
         assert quality.min() > 1e-3
 
 
@@ -274,7 +273,7 @@ def complementary(surface):
     """Whether the pull on each resting vertex is one that its wall can take."""
     walls = find_walls(surface)
     resting = resting_vertices(surface, walls)
-    pull, capacity = pull_and_capacity(remove_pinched_walls(surface, walls, resting), walls, resting)
+    pull, capacity = pull_and_capacity(StandingPart.of(surface, walls, resting).surface, walls, resting)
     return resting, pull, capacity
 
 

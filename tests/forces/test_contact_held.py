@@ -9,12 +9,11 @@ from starts import four_fans, stationary, two_squares
 
 import pcmc
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
+from pcmc.forces.functional import energy_and_gradient
 from pcmc.forces.pinching import (
-    coming_down,
+    StandingPart,
     find_walls,
     lift,
-    place_pinched_walls,
-    remove_pinched_walls,
     resting_vertices,
 )
 from pcmc.forces.pull import pull_and_capacity, pull_directions
@@ -37,7 +36,7 @@ def contact(surface):
     """Which vertices rest, their pull, and what their wall can take."""
     walls = find_walls(surface)
     resting = resting_vertices(surface, walls)
-    return resting, *pull_and_capacity(remove_pinched_walls(surface, walls, resting), walls, resting)
+    return resting, *pull_and_capacity(StandingPart.of(surface, walls, resting).surface, walls, resting)
 
 
 def pressed(n=6, count=2, right=2.0):
@@ -47,8 +46,8 @@ def pressed(n=6, count=2, right=2.0):
     free = np.flatnonzero(walls.top_free)
     resting = np.zeros(surface.n, dtype=bool)
     resting[free[np.argsort(surface.vertices[free, 1])][:count]] = True
-    standing = remove_pinched_walls(surface, walls, resting)
-    full = surface.moved(place_pinched_walls(surface, walls, resting, standing.vertices))
+    standing = StandingPart.of(surface, walls, resting).surface
+    full = surface.moved(StandingPart.of(surface, walls, resting).whole_positions(standing.vertices))
     return full, find_walls(full), resting, standing
 
 
@@ -90,7 +89,7 @@ def test_what_is_left_when_a_junction_rests_on_a_held_bottom(count):
     assert standing.fixed[resting].all()
     assert triangle_quality(standing.vertices, standing.faces).min() > 0.1
     assert energy(standing) == pytest.approx(energy(full), rel=1e-13)
-    again = remove_pinched_walls(full, walls, resting)
+    again = StandingPart.of(full, walls, resting).surface
     np.testing.assert_array_equal(again.faces, standing.faces)
     np.testing.assert_array_equal(again.vertices, standing.vertices)
 
@@ -100,7 +99,7 @@ def test_pull_less_capacity_is_what_a_lift_to_any_side_gains(count):
     """(E(lifted by t u) - E) / t tends to capacity - f·u, least along f; u across the bottom."""
     full, walls, resting, standing = pressed(count=count, right=3.0)
     pull, capacity = pull_and_capacity(standing, walls, resting)
-    along_pull = pull_directions(standing, walls, resting)
+    along_pull = directions_of_pull(standing, walls, resting)
     assert np.abs(along_pull[resting, 0]).min() > 0.05  # it pulls sideways, too
     step, spacing = 1e-6, 4 / 6
     for v in np.flatnonzero(resting):
@@ -118,9 +117,15 @@ def test_pull_less_capacity_is_what_a_lift_to_any_side_gains(count):
         assert capacity[v] == pytest.approx(3.0 * spacing, rel=1e-12)
 
 
+def directions_of_pull(standing, walls, resting):
+    """As the sheets pull."""
+    return pull_directions(standing, walls, resting, -energy_and_gradient(standing, supports=False)[1])
+
+
 def test_a_move_past_the_bottom_comes_down_on_it():
     full = example(6, 3.0)
     walls = find_walls(full, held=True)
+    part = StandingPart.of(full, walls, np.zeros(full.n, dtype=bool))
     top = int(np.flatnonzero(walls.held)[2])
     height = full.vertices[top, 2]
     for move, expected in [
@@ -131,7 +136,7 @@ def test_a_move_past_the_bottom_comes_down_on_it():
     ]:
         X = full.vertices.copy()
         X[top] += move
-        down = coming_down(full, walls, walls.top_free, full.vertices, X, 5e-3)
+        down = part.coming_down(X, full.vertices, 5e-3)
         assert down.sum() == down[top] == expected
 
 
@@ -178,7 +183,7 @@ def test_a_sideways_pull_takes_the_junction_off():
     assert low.certificate.verdict is Verdict.STABLE
     resting, walls = contact(low.surface)[0], find_walls(low.surface)
     assert resting.sum() == 7
-    direction = pull_directions(remove_pinched_walls(low.surface, walls, resting), walls, resting)
+    direction = directions_of_pull(StandingPart.of(low.surface, walls, resting).surface, walls, resting)
     assert (direction[resting, 0] > 0.2).all()  # towards the stronger patch
     weak = solve(low.surface.retensioned({"wall": 1.2}))
     assert weak.certificate.verdict is Verdict.STABLE

@@ -10,9 +10,9 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
 from pcmc.forces.pinching import (
+    StandingPart,
     find_walls,
     place_wall_rows,
-    remove_pinched_walls,
     resting_vertices,
     standing_part,
 )
@@ -106,9 +106,9 @@ def test_refined_a_pinched_wall_has_rows_again_where_it_stands(make):
     crest = resting_vertices(coarse, find_walls(coarse))
     assert resting[: coarse.n].tolist() == crest.tolist()
     assert resting.sum() > crest.sum()  # and the middles between
-    standing = remove_pinched_walls(fine, walls, resting)
+    standing = StandingPart.of(fine, walls, resting).surface
     quality = triangle_quality(standing.vertices, standing.faces)
-    before = remove_pinched_walls(coarse, find_walls(coarse), crest)
+    before = StandingPart.of(coarse, find_walls(coarse), crest).surface
     assert quality.min() > 0.4 * triangle_quality(before.vertices, before.faces).min()
     rows = walls.rows
     i, j = rows.top_ends.T
@@ -237,3 +237,16 @@ def test_a_standing_wall_with_a_triangle_of_no_area_is_refused():
     face = int(wall[np.argmax(height[surface.faces[wall]].min(axis=1))])
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface, **collapsed(surface, face))
+
+
+def test_a_result_carries_what_rests_and_its_positions_show_the_same():
+    result = solve(two_squares(8, alpha_aux=3.0))
+    carried = standing_part(result.surface)
+    assert carried.whole is result.surface
+    assert carried.resting.sum() == 7
+    shown = standing_part(result.surface.moved(result.surface.vertices))
+    assert shown is not carried
+    for name in ("resting", "faces_of_whole"):
+        np.testing.assert_array_equal(getattr(shown, name), getattr(carried, name))
+    np.testing.assert_array_equal(shown.surface.vertices, carried.surface.vertices)
+    np.testing.assert_array_equal(carried.whole_positions(carried.surface.vertices), result.surface.vertices)

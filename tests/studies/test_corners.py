@@ -72,7 +72,8 @@ def test_ends_slide_along_a_straight_outline_only():
 
 def test_the_crest_of_example_1_rises_as_on_a_quarter_plane():
     """dz/ds = A + c - c log(1/s) with c = α_w / (π α), within the fit's own interval and 10 %."""
-    found, reached = ladder.climb(two_squares(8, alpha_aux=0.5), 6, 1.3, "held")
+    found, shapes = ladder.climb(two_squares(8, alpha_aux=0.5), 6, 1.3, "held")
+    reached = shapes[-1]
     assert len(found) == 7
     edge = found[-1]["edge_length"]
     fitted = ladder.rise(reached, int(ladder.ends(two_squares(8))[0]), 3.0 * edge, 0.2)

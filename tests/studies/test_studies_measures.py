@@ -47,6 +47,7 @@ def test_a_wall_stands_until_it_first_comes_down_however_it_bounces():
         "stands_until": 1,
         "stands_until_without_momentum": 1,
         "least_height_3_parallel": 0.6,
+        "iterations_of_least_height": example1.LAST,
     }
 
 

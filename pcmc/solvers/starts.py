@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
+from ..base.tolerances import FAILED, ON, PARALLEL
 from ..certificate.forces import load
 from ..forces.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import cross_2d
+from ..surface.topology import components
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
 WIDE = 1.5  # of that extent: a plan that is wider is not kept
-SOUND = 0.05  # quality of the plan's triangles above which the plan is kept
 
 
 def low_start(surface: Surface) -> Surface | None:
     """The same mesh, low over the surface that its boundary spans; None where it spans none.
 
-    The lowest surface has each vertex at the mean height of its neighbours. Over a plan whose triangles
-    are sound the vertices keep their places, and their heights over the lowest surface are scaled down
-    together. Otherwise the mesh is spread anew, each vertex in the middle of its neighbours (Tutte
-    1963), with a low dome on top where there is pressure.
+    The lowest surface has each vertex at the mean height of its neighbours. Over a sound plan the vertices'
+    heights over it are scaled down together. Otherwise the mesh is spread anew, each vertex in the middle of
+    its neighbours (Tutte 1963), with a low dome on top where there is pressure.
 
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 7]]
@@ -46,7 +45,7 @@ def low_start(surface: Surface) -> Surface | None:
     turns = np.sign(cross_2d(corners[:, 1], corners[:, 2]))
     plan = triangle_quality(place * [1.0, 1.0, 0.0], faces)
     extent, span = _diagonal(place[roof]), _diagonal(place[held]) or _diagonal(place[roof])
-    kept = np.abs(turns.sum()) == len(turns) and plan.min() > SOUND and extent < WIDE * span
+    kept = np.abs(turns.sum()) == len(turns) and plan.min() > FAILED and extent < WIDE * span
     low = place.copy()
     if not kept and surface.on_planes:
         return None  # spread anew, its boundary would leave the planes
@@ -57,7 +56,8 @@ def low_start(surface: Surface) -> Surface | None:
     # a dome: 1 above the mean of the neighbours
     above = place[:, 2] - low[:, 2] if kept else _in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
-        above *= np.sign(load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
+        domed = _at(surface, low + above[:, None] * [0.0, 0.0, 1.0])
+        above *= np.sign(load(domed)) or 1.0
     rise, most = RISE * span, float(np.abs(above[roof]).max())
     if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
@@ -68,16 +68,17 @@ def low_start(surface: Surface) -> Surface | None:
     if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
         place = surface.plane.to_local(moved.vertices)
         moved = _at(surface, _in_the_middle(surface.faces, roof | surface.held, place))
-    return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
+    walls_below = find_walls(moved)
+    return moved.moved(place_wall_rows(moved, walls_below, moved.vertices))
 
 
 def _spans_a_surface(surface: Surface) -> bool:
     """Whether its fixed vertices do not lie on one line, and no plane besides Π holds heights."""
     points, normal = surface.vertices[surface.fixed], np.array(surface.plane.normal)
-    if len(points) < 3 or any(abs(normal @ plane.normal) > 1e-9 for plane, _ in surface.on_planes):
+    if len(points) < 3 or any(abs(normal @ plane.normal) > PARALLEL for plane, _ in surface.on_planes):
         return False
     lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(lengths[1] > 1e-9 * lengths[0])
+    return bool(lengths[1] > ON * lengths[0])
 
 
 def _diagonal(place: Floats) -> float:
@@ -97,7 +98,7 @@ def _in_the_middle(faces: Ints, known: Bools, values: Floats, excess: float = 0.
     ends = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     i, j = np.concatenate([ends, ends[:, ::-1]]).T
     A = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
-    part = connected_components(A, directed=False)[1]
+    part = components(ends, n)
     unknown = np.flatnonzero(~known & np.isin(part, part[known]))
     result = np.array(values, dtype=float)
     if len(unknown):

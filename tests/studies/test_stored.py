@@ -1,0 +1,135 @@
+"""Which stored results come from other code, and which numbers a new run does not give again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from studies import code
+from studies.__main__ import main
+from studies.code import code_of, files_of
+from studies.folder import Folder, write_json
+from studies.registry import STUDIES
+from studies.stored import age, check, differences
+
+RESULTS = Path(__file__).parents[2] / "results"
+EQUILIBRIA = STUDIES["equilibria"]
+
+
+@pytest.fixture
+def written(tmp_path, monkeypatch):
+    """A checkout of three packages: ``write`` gives a file its text, ``files`` has the hashes of a study."""
+    monkeypatch.setattr(code, "HOME", tmp_path)
+
+    class Checkout:
+        def write(self, name, text):
+            path = tmp_path / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+
+        def files(self):
+            for cached in (code._tree, code._file_hash, code._file_imports, code._handed_on):
+                cached.cache_clear()
+            return files_of("studies.study_of_x")
+
+    checkout = Checkout()
+    checkout.write("pcmc/__init__.py", "if TYPE_CHECKING:\n    from .forces.area import area as measured\n")
+    checkout.write("pcmc/forces/__init__.py", "")
+    checkout.write("pcmc/forces/area.py", "def area(x):\n    return x * x\n")
+    checkout.write("pcmc/plot.py", "def draw(): ...\n")
+    checkout.write("studies/__init__.py", "")
+    checkout.write(
+        "studies/study_of_x.py",
+        "from pcmc import measured\nfrom pcmc.plot import draw\n\nSIZE = 3\n\n\n"
+        "def data():\n    return _of(SIZE)\n\n\ndef _of(x):\n    return measured(x)\n\n\n"
+        "def figure():\n    draw()\n",
+    )
+    yield checkout
+    for cached in (code._tree, code._file_hash, code._file_imports, code._handed_on):
+        cached.cache_clear()
+
+
+def test_what_data_reaches_counts_and_what_draws_does_not(written):
+    before = written.files()
+    assert list(before) == ["pcmc/forces/area.py", "studies/study_of_x.py"]
+    written.write("pcmc/plot.py", "def draw(): return 1\n")
+    assert written.files() == before
+    text = (code.HOME / "studies/study_of_x.py").read_text(encoding="utf-8")
+    written.write("studies/study_of_x.py", text.replace("draw()", "draw(), draw()"))
+    assert written.files() == before
+    written.write("studies/study_of_x.py", text.replace("SIZE = 3", "SIZE = 4"))
+    assert written.files()["studies/study_of_x.py"] != before["studies/study_of_x.py"]
+
+
+def test_comments_and_docstrings_do_not_change_a_hash_and_a_sign_does(written):
+    before = written.files()
+    words = '"""Of a square."""\n\n\ndef area(x):\n    """Its area."""\n    return x*x  # length squared\n'
+    written.write("pcmc/forces/area.py", words)
+    assert written.files() == before
+    written.write("pcmc/forces/area.py", "def area(x):\n    return -x * x\n")
+    assert written.files() != before
+
+
+def test_every_study_rests_on_the_surface_and_none_on_pictures():
+    for study in STUDIES.values():
+        found = code_of(study.data.__module__)
+        assert {"pcmc/surface", "generators"} & set(found), study.name
+        assert "pcmc/plot" not in found
+        assert any(part.startswith("studies/") for part in found)
+
+
+def test_a_result_is_stale_when_a_part_of_its_code_is_other(tmp_path):
+    assert age(EQUILIBRIA, tmp_path) is None
+    path = tmp_path / "equilibria" / "provenance.json"
+    now = code_of(EQUILIBRIA.data.__module__)
+    write_json(path, {"commit": "", "code": now})
+    assert str(age(EQUILIBRIA, tmp_path)).startswith("up to date")
+    write_json(path, {"commit": "", "code": now | {"pcmc/forces": "0"}})
+    assert str(age(EQUILIBRIA, tmp_path)).startswith("stale: other code in pcmc/forces")
+    write_json(path, {"commit": ""})
+    assert "no hashes" in str(age(EQUILIBRIA, tmp_path))
+
+
+def test_the_command_names_what_to_run_again(tmp_path, capsys):
+    assert main(["stale", "--results", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "no result" in said
+    assert "python -m studies run example1 example2" in said
+
+
+def test_a_new_run_is_compared_number_by_number(tmp_path, capsys, monkeypatch):
+    def table(folder):
+        return {"x": 1.0, "y": 2.0}
+
+    study = replace(EQUILIBRIA, data=lambda folder, short: None, table=table)
+    rows = pd.DataFrame({"key": ["equilibria.x", "equilibria.y"], "value": [1.0, 2.0]})
+    monkeypatch.setitem(STUDIES, "equilibria", study)
+    monkeypatch.setattr("studies.study.provenance", lambda *_: {})
+    Folder(tmp_path / "equilibria").write_table("measured", rows)
+    assert main(["check", "equilibria", "--results", str(tmp_path)]) == 0
+    Folder(tmp_path / "equilibria").write_table("measured", rows.assign(value=[1.0, 2.00001]))
+    assert main(["check", "equilibria", "--results", str(tmp_path)]) == 1
+    assert "equilibria.y: stored 2.00001, now 2" in capsys.readouterr().out
+    assert differences({"a.x": 1.0}, {}, "a") == ["a.x: stored 1, now nan"]
+
+
+def test_continuous_integration_computes_a_stored_result_again():
+    script = (RESULTS.parent / ".ci" / "run").read_text(encoding="utf-8")
+    assert "python -m studies check equilibria" in script
+    assert (RESULTS / "equilibria" / "measured.csv").is_file()
+
+
+def test_every_stored_result_knows_its_commit_and_its_code():
+    for study in STUDIES.values():
+        stored = json.loads((RESULTS / study.name / "provenance.json").read_text(encoding="utf-8"))
+        assert len(stored["commit"]) == 40
+        assert stored["code"], study.name
+
+
+@pytest.mark.nightly
+def test_equilibria_are_as_stored():
+    assert check(EQUILIBRIA, RESULTS) == []
