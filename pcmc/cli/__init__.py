@@ -1,4 +1,4 @@
-"""The ``pcmc`` command: arguments, messages, exit codes. May import every other room.
+"""The ``pcmc`` command: arguments, messages, exit codes.
 
 This file imports nothing heavy, so that ``main`` handles Ctrl-C before numpy and scipy are imported.
 """

@@ -6,7 +6,7 @@ import ast
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
@@ -17,7 +17,6 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
-from ..forces.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY
 from ..project import MOST_CHECKED, Outcome, Project
 from ..project.outcome import OnStep
@@ -105,22 +104,31 @@ class Loads:
     @property
     def change(self) -> Callable[[Surface], Surface] | None:
         """What gives a surface these values; None if there are none."""
-        return self.of if any(vars(self).values()) else None
+        return self.of if any(getattr(self, f.name) for f in fields(Loads)) else None
 
     def of(self, surface: Surface) -> Surface:
         """The surface with these values; wall pressures follow those of their rooms."""
         sheets = [patch.name for patch in surface.patches if not patch.wall]
         loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
-        pressures = by_name(loaded, self.pressure, "--pressure")
-        refuse_varied_pressure(surface, map(surface.patch_index, pressures))
-        return surface.retensioned(
-            by_name(loaded, self.tension, "--tension"),
-            pressures,
-            weights=by_name(sheets, self.weight, "--weight"),
-            snows=by_name(loaded, self.snow, "--snow"),
-            cables=by_name([cable.name for cable in surface.cables], self.cable, "--cable"),
-            volumes=by_name([room.name for room in surface.rooms], self.volume, "--volume"),
-        )
+        names = {"tension": loaded, "pressure": loaded, "weight": sheets, "snow": loaded}
+        names |= {"cable": [cable.name for cable in surface.cables]}
+        names |= {"volume": [room.name for room in surface.rooms]}
+        given = {f"{key}s": by_name(own, getattr(self, key), f"--{key}") for key, own in names.items()}
+        return projects.with_loads(surface, given)
+
+
+@dataclass(frozen=True)
+class Shown(Loads):
+    """What of a file is shown: with other values, designed or not."""
+
+    start: Start = False
+    cache: Cache = True
+
+    def roof(self, project: Project, progress: OnStep, whole: bool) -> Outcome:
+        """The roof of a project; the ``whole`` one if asked for."""
+        how: dict[str, Any] = {"changed": self.change, "start": self.start, "use_cache": self.cache}
+        roof = projects.opened(project, progress, **how)
+        return replace(roof, unfold=whole or roof.unfold)
 
 
 @dataclass(frozen=True)
@@ -133,8 +141,7 @@ class Build:
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
-        roof, file = projects.opened(project, progress, use_cache=self.cache), project.path
-        roof = roof.unfolded() if self.whole else roof
+        roof, file = Shown(cache=self.cache).roof(project, progress, self.whole), project.path
         if roof.certified and not roof.good and not self.allow_uncertified:
             hint = f"pcmc solve {file} shows them, --allow-uncertified accepts the roof"
             text = f"{file}: the roof misses its targets or its accuracy; {hint}"

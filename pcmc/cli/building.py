@@ -1,11 +1,8 @@
-"""The commands panels, draw, report and structure: from the shape to what is built.
-
-Each returns the exit code.
-"""
+"""The commands panels, draw, report and structure. Each returns the exit code."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,12 +12,7 @@ from ..base import validate
 from ..base.errors import FileError, OptionError
 from ..base.units import Units
 from ..certificate.certificate import require_certified
-from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
-from ..panelling import fewer_families
-from ..panelling.schedule import MIRROR_IMAGES
-from ..report.document import check_suffix as check_report
-from ..structure import write_structure
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -67,7 +59,7 @@ def panels_(
     picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
     change: Annotated[float | None, real("LENGTH", CHANGE)] = None,
-    mirror_images: Annotated[str, option("NAME", MIRRORED)] = MIRROR_IMAGES[0],
+    mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
     walls: Annotated[bool, flag("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
@@ -105,8 +97,7 @@ def panels_(
             def callback(made: int, count: int) -> None:
                 progress(f"round {made}: {count} families")
 
-            shape = roof.shown.surface
-            fewer = fewer_families(shape, tolerance, change, callback=callback, **options)
+            fewer = roof.fewer_families(tolerance, change, callback=callback, **options)
             schedule = fewer.after
         works: list[Any] = []
         writing = partial(write, surface=schedule.surface, units=roof.units)
@@ -114,9 +105,7 @@ def panels_(
             is_table = path.suffix.lower() == CSV
             works += projects.schedule_jobs(path, schedule) if is_table else [(path, writing)]
         if picture is not None:
-            from ..plot import families
-
-            works.append((picture, lambda path: families(schedule, path, view=seen)))
+            works.append((picture, partial(projects.paint_families, schedule=schedule, view=seen)))
         written = projects.write_all(works, progress)
     print(schedule)
     if change is not None:
@@ -146,8 +135,7 @@ def draw_(
       pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
-    for path in output:
-        check_drawing(path)
+    projects.Output(drawings=output)  # refuses what is no drawing
     check_outputs(file, others=output)
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
@@ -181,7 +169,7 @@ def report_(
       pcmc report roof.toml -o roof.pdf
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
-    check_report(output)
+    projects.Output(report=output)  # refuses what is no report
     check_outputs(file, others=[output])
     anyway = build.allow_uncertified
     with working() as progress:
@@ -220,18 +208,25 @@ def _ends(text: str) -> Any:
     return (a, b), (c, d)
 
 
+@dataclass(frozen=True)
+class Model:
+    """What the command line says of a structural model, instead of the project."""
+
+    thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None
+    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None
+    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None
+    density: Annotated[float | None, real("VALUE", DENSITY)] = None
+    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None
+    snow: Annotated[float | None, real("VALUE", SNOW)] = None
+    wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
+    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None
+
+
 def structure(
     *,
     file: Input,
     output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
-    thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None,
-    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None,
-    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None,
-    density: Annotated[float | None, real("VALUE", DENSITY)] = None,
-    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None,
-    snow: Annotated[float | None, real("VALUE", SNOW)] = None,
-    wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None,
-    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None,
+    given: Model,
     build: Build,
 ) -> int:
     """Write a structural model for CalculiX: prestressed membranes, supports, loads.
@@ -242,31 +237,24 @@ def structure(
     Example:
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
     """
-    projects.check_model(output)
+    projects.Output(structure=output)  # refuses what is no model
     check_outputs(file, others=[output])
     with working() as progress:
         project = arguments.load(file)
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
-        thick = arguments.by_name(patches, thickness, "--thickness")
+        thick = arguments.by_name(patches, given.thickness, "--thickness")
         even = set(thick) == set(patches) and len(set(thick.values())) == 1  # one number, not one by patch
-        given = {
-            "thickness": thick[patches[0]] if even else thick or None,
-            "young": young,
-            "poisson": poisson,
-            "density": density,
-            "gravity": gravity,
-            "snow": snow,
-            "wind": arguments.by_name(patches, wind, "--wind") if wind else None,
-            "cable_area": cable_area,
-        }
-        values = {} if project.structure is None else asdict(project.structure)
-        wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
+        values: dict[str, Any] = {} if project.structure is None else asdict(project.structure)
+        values |= {name: value for name, value in vars(given).items() if value not in (None, [])}
+        values |= {"thickness": thick[patches[0]] if even else thick} if thick else {}
+        values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
+        wanted = projects.Structure(**values)
         wanted.check(start)
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        projects.write_all([(output, partial(write_structure, model=model))], progress)
+        projects.write_all([projects.model_job(output, model)], progress)
     if model.note:
         print(model.note)
     steps = ", ".join(step.name for step in model.steps)

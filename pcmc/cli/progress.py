@@ -34,10 +34,7 @@ def working() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def sweeping(console: Console | None = None) -> Iterator[Callable[[Any], None] | None]:
-    """A function of a sweep's Progress that draws cases, time left and verdicts; None without a terminal.
-
-    ``console`` is where to draw; by default stderr.
-    """
+    """A function of a sweep's Progress that draws cases, time left and verdicts; None without a terminal."""
     if console is None and not _live():
         yield None
         return

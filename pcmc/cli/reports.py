@@ -5,11 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from ..accuracy import MeshCheck
-from ..certificate.balance import strained_junction
 from ..certificate.tables import lean_texts
-from ..design.outcome import values_text
-from ..forces.pinching import standing_part
 from ..project import MOST_CHECKED, Outcome
 from .progress import working
 
@@ -19,22 +15,18 @@ UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
     """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
-    surface, certificate, design, units = outcome.surface, outcome.certificate, outcome.design, outcome.units
-    message, detail = outcome.solved.message, certificate.detail
-    if outcome.advice:  # it has the remedy for a strained junction that was tried
-        strained = strained_junction(surface, standing_part(surface).walls.pinchable)
-        if strained is not None:
-            message, detail = (text.replace(strained.hint, "") for text in (message, detail))
+    certificate, units = outcome.certificate, outcome.units
+    message, detail = outcome.ending
     if verdict and detail:
         message = message.removesuffix(f"; {detail}")  # it follows the verdict
     before = "solved before (--no-cache solves it again)"
-    print(f"{surface.m} triangles; {before if outcome.cached else message}")
+    print(f"{outcome.surface.m} triangles; {before if outcome.cached else message}")
     if outcome.accurate is not None:
         print(outcome.accurate.text(units))
-    if design is not None:
-        print(f"targets {design.text(units)}")
-        if design.met:  # otherwise the message has the values
-            print(", with ".join(values_text(table, units) for table in (design.targets, design.parameters)))
+    if outcome.design is not None:
+        print(f"targets {outcome.design.text(units)}")
+        if outcome.design.met:  # otherwise the message has the values
+            print(outcome.values_found)
     for note in outcome.notes:
         print(note)
     if verdict:
@@ -58,18 +50,19 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(f"written: {', '.join(map(str, outcome.files))}")
 
 
-def mesh_check(roof: Outcome, wanted: bool | None = None) -> MeshCheck | None:
-    """The check of a roof at rest; None where it is not wanted, and, with a line why, not possible."""
+def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False) -> None:
+    """Check the mesh of a roof at rest, if that is wanted; print why not, or, with ``brief``, the result."""
     if not roof.wants_mesh_check(wanted):
         if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
-        return None
+        return
     sys.stdout.flush()
     with working() as progress:
         check = roof.check_mesh(progress)
     if check is None:  # the surface and its files are good without it
         print(f"no mesh check: {roof.mesh_failure}")
-    return check
+    elif brief:
+        print(f"\n{check.brief(roof.units)}")
 
 
 def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:

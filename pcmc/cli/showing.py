@@ -15,7 +15,7 @@ from ..io import metres_note
 from ..project import Outcome
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import Cache, FileUnits, Input, Loads, Start, ViewName, Whole, count, flag, load, option
+from .arguments import Cache, FileUnits, Input, Shown, Start, ViewName, Whole, count, flag, load, option
 from .progress import working
 from .reports import report
 
@@ -31,9 +31,7 @@ def convert(
     *,
     file: Input,
     output: Annotated[Path, typer.Argument(metavar="OUT", help=OUT)],
-    loads: Loads,
-    start: Start = False,
-    cache: Cache = True,
+    what: Shown,
     units: FileUnits = "",
     colour: Annotated[str, option("NAME", SCALAR, *COLOUR)] = "",
     whole: Whole = False,
@@ -47,7 +45,7 @@ def convert(
       pcmc convert roof.pcmc roof.glb --colour error
     """
     arguments.check_outputs(file, [output])
-    roof = _shown(file, units, whole, changed=loads.change, start=start, use_cache=cache)
+    roof = _good(file, what, whole, units)
     if roof is None:
         return NOT_CERTIFIED
     projects.write_all(projects.surface_files(roof, [output], colour))
@@ -55,15 +53,13 @@ def convert(
     return OK
 
 
-def _shown(file: Path, units: str, whole: bool, **how: Any) -> Outcome | None:
+def _good(file: Path, what: Shown, whole: bool, units: str = "") -> Outcome | None:
     """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
     with working() as progress:
-        roof = projects.opened(load(file, units), progress, **how)
-    roof = roof.unfolded() if whole else roof
-    if roof.result is None:
-        return roof
-    report(roof)
-    if roof.good:
+        roof = what.roof(load(file, units), progress, whole)
+    if roof.result is not None:
+        report(roof)
+    if roof.result is None or roof.good:
         return roof
     print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
     return None
@@ -75,9 +71,7 @@ def plot(
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
     colour: Annotated[str, option("NAME", "patches, curvature, error or reactions.", *COLOUR)] = "patches",
-    loads: Loads,
-    start: Start = False,
-    cache: Cache = True,
+    what: Shown,
     whole: Whole = False,
 ) -> int:
     """Draw a surface or a project's roof, by patch, mean curvature, curvature error, or with its reactions.
@@ -91,7 +85,7 @@ def plot(
     seen = arguments.view_of(view)
     projects.check_picture([seen], colour)
     arguments.check_outputs(file, picture=picture)
-    roof = _shown(file, "", whole, changed=loads.change, start=start, use_cache=cache)
+    roof = _good(file, what, whole)
     if roof is None:
         return NOT_CERTIFIED
     painting = partial(projects.paint, roof.shown.surface, views=[seen], colour=colour, units=roof.units)

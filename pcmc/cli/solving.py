@@ -13,7 +13,6 @@ from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..io import write
-from ..meshing.remeshing import remesh, size_note
 from . import NOT_CERTIFIED, OK, reports
 from .arguments import (
     MANY_FILES,
@@ -23,7 +22,7 @@ from .arguments import (
     Input,
     Loads,
     MeshCheck,
-    Start,
+    Shown,
     Whole,
     check_outputs,
     count,
@@ -114,8 +113,7 @@ def solve_(
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
         print("nothing written (use --allow-uncertified to write it)")
-    if check := reports.mesh_check(outcome):
-        print(f"\n{check.brief(outcome.units)}")
+    reports.mesh_check(outcome, brief=True)
     reports.margins(outcome)
     return OK if outcome.good else NOT_CERTIFIED
 
@@ -123,11 +121,9 @@ def solve_(
 def certify_(
     *,
     file: Input,
-    loads: Loads,
+    what: Shown,
     meshes: Annotated[int | None, count(MESHES)] = None,
     margin: Annotated[list[str] | None, option("WHAT", MARGIN)] = None,
-    start: Start = False,
-    cache: Cache = True,
     whole: Annotated[bool, flag("--whole", WHOLE_INDEX)] = False,
     verify: Verify = False,
 ) -> int:
@@ -144,8 +140,7 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        roof = projects.opened(load(file), progress, changed=loads.change, start=start, use_cache=cache)
-        roof = roof.unfolded() if whole else roof
+        roof = what.roof(load(file), progress, whole)
         progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
@@ -190,11 +185,11 @@ def remesh_(
         else:
             progress("remeshing")
             roof = projects.opened(project, progress, start=True)
-            surface = remesh(roof.surface, **stage.options)
+            surface, note = stage.remeshed(roof.surface)
             writing = partial(write, surface=surface, units=roof.units)
             projects.write_all([(path, writing) for path in output], progress)
     if not solve:
-        if note := size_note(surface, edge_length):
+        if note:
             print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK

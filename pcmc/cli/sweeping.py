@@ -11,8 +11,7 @@ import typer
 from ..base.errors import MissingExtra, OptionError
 from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
-from ..plot.figure import check_suffix
-from ..project import check_outputs, files_of
+from ..project import check_names, check_outputs, files_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import DXF, TOML, count, flag, option, real, values_of
 from .progress import sweeping
@@ -72,8 +71,7 @@ def sweep(
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet" and not find_spec("pyarrow"):
         raise MissingExtra("pyarrow", "files")
-    if plot is not None:
-        check_suffix(plot)
+    check_names((), plot)
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
     options = {"mesh_check": mesh_check, "search": search}

@@ -20,10 +20,7 @@ from .lines import SNAP, Cut, Kind, LineTree, PlanLine, check_holes, check_line,
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Vertices (k,) along a line from one cut or corner to the next; first = last if it is closed.
-
-    ``at`` (k,) are their parameters on the line, where those of a closed one go on beyond its end.
-    """
+    """Vertices (k,) along a line between cuts or corners; ``at`` (k,): parameters, of a ring also beyond."""
 
     line: int
     vertices: Ints
@@ -126,10 +123,8 @@ LineNodes = list[tuple[float, int]]  # parameters and nodes along a line
 def _nodes(
     lines: Sequence[PlanLine], cuts: Sequence[Cut], snap: float
 ) -> tuple[Floats, Ints, list[LineNodes]]:
-    """The vertices where lines meet, one for those nearer to each other than ``snap``.
-
-    Returns their points (k,3) with heights, the vertex of each cut, -1 for one at no line, and the
-    nodes along each line, no vertex twice in a row; a closed line returns to its first.
+    """The vertices where lines meet, one for those nearer than ``snap``: their points (k,3) with heights, the
+    vertex of each cut, -1 for none, and the nodes along each line; a closed one returns to its first.
     """
     line = np.array([i for cut in cuts for i, _ in cut], dtype=np.int64)
     t = np.array([s for cut in cuts for _, s in cut])

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -19,23 +20,26 @@ from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
+from ..surface.geometry import bounding_size
 from ..surface.pieces import Piece, to_space
 from .draft import Draft, drafted
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
-from .lines import SNAP, Kind, PlanLine
-from .parts import PatchSpec, PlanData
+from .lines import EXACT, SNAP, Kind, PlanLine
+from .parts import PatchSpec
 from .walls import Roof, rooms_of, upright_planes, walls_of
+
+if TYPE_CHECKING:
+    from .plan import Plan
 
 RISE = 0.3  # of the radius of the largest circle without supports: a shallow dome
 FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper at its edge
 SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room
 REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
-EXACT = 1e-9  # of the size: a vertex this near to its curve is on it
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
-def build_surface(plan: PlanData) -> Surface:
+def build_surface(plan: Plan) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
     draft = drafted(plan)
     mesh, drawn = draft.mesh, draft.drawn
@@ -137,11 +141,8 @@ def _cables(draft: Draft, held: Bools) -> list[Cable]:
     return cables
 
 
-def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
-    """The plan's patches and the patch (m,) of each triangle of its mesh.
-
-    PlanError where the patches that are given and the parts between the dividers are not one to one.
-    """
+def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
+    """The plan's patches and the patch (m,) of each triangle; PlanError unless each part has one."""
     parts = int(mesh.region.max()) + 1
     area = signed_areas(mesh.points, mesh.triangles)
     weight = np.bincount(mesh.region, area, parts)
@@ -257,10 +258,9 @@ def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
 
 
 def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) -> list[HeldCurve]:
-    """The fixed edges of the outline and of holes, the lines of supports, and straight feet of walls.
+    """The fixed edges of outline and holes, the lines of supports, and straight feet of walls, on X (n,3).
 
-    ``X`` (n,3) are the vertices of the surface; ``feet``, by the first two vertices of the upper edge of a
-    wall, the vertices along its held bottom.
+    ``feet``: by the first two vertices of the upper edge of a wall, the vertices along its held bottom.
     """
     curves = []
     supports = [PlanLine("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
@@ -291,16 +291,14 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
 
 
 def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> HeldCurve | None:
-    """The vertices V (k,) of X (n,3) on a curve in the coordinates of Π, at parameters (k,); None if off it.
-
-    Where lines meet, their common vertex may be a little beside one of them: a straight piece leads there.
-    """
+    """The vertices V (k,) of X (n,3) on a curve at parameters (k,); None if off it. Where lines meet, their
+    common vertex may be a little beside one: a straight piece leads there."""
     plane = draft.plan.plane
     part, t = curve.part(at[0], at[-1], at)
     part = part.mapped(plane.axes.T, np.array(plane.point))
     there = part.at(t)
     away = np.linalg.norm(X[V] - there, axis=1)
-    near = EXACT * float(np.linalg.norm(np.ptp(X, axis=0)))
+    near = EXACT * bounding_size(X)
     if away[1:-1].max(initial=0.0) > near or away.max() > REACH * draft.plan.edge_length:
         return None
     pieces = list(part.pieces)

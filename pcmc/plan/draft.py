@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,13 +14,16 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError, SurfaceError
 from ..meshing.planar import SIDES, PlanarMesh, signed_areas, triangulate
 from ..surface.curves import Curve
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import bounding_size, segment_lengths
 from ..surface.pieces import point_text, to_local, two_digits
 from ..surface.topology import components
 from .arrangement import Arrangement, Chain, arrange, hole_points
 from .edges import Boundary, boundary, check_lines
 from .lines import SNAP, Kind, LineTree, PlanLine
-from .parts import PlanData, check_count
+from .parts import check_count
+
+if TYPE_CHECKING:
+    from .plan import Plan
 
 MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing
 MAX_POINTS = 1_000_000  # of all lines, where they are measured
@@ -33,7 +37,7 @@ MAX_RISE = 10.0  # of the initial surface, over the size of the plan
 class Draft:
     """A plan with its lines and its plane mesh."""
 
-    plan: PlanData
+    plan: Plan
     lines: Sequence[PlanLine]  # the outline, then the holes, the dividers, and the supports off the boundary
     supports_on_edge: Sequence[Curve]
     drawn: Arrangement
@@ -57,11 +61,8 @@ class Draft:
         return 2.0 * np.bincount(mesh.region, signed_areas(mesh.points, mesh.triangles)) / length
 
 
-def drafted(plan: PlanData) -> Draft:
-    """Draw the lines of a plan and mesh what is between them.
-
-    PlanError for lengths that are probably mistakes, and lines that do not fit together.
-    """
+def drafted(plan: Plan) -> Draft:
+    """Draw the lines of a plan and mesh what is between them; PlanError if they do not fit together."""
     lines, on_edge, drawn = _arranged(plan)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
     _check_count(plan, lines[0].xy, len(edges))
@@ -86,12 +87,12 @@ def drafted(plan: PlanData) -> Draft:
     return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, on_edge, drawn))
 
 
-def part_count(plan: PlanData) -> int:
+def part_count(plan: Plan) -> int:
     """The number of parts into which the lines cut the plan, without its mesh; errors as in ``drafted``."""
     return _part_count(plan, _arranged(plan)[2])
 
 
-def _part_count(plan: PlanData, drawn: Arrangement) -> int:
+def _part_count(plan: Plan, drawn: Arrangement) -> int:
     """By Euler's formula e - v + c for e chains between v vertices in c connected pieces, less the holes."""
     ends = np.array([chain.vertices[[0, -1]] for chain in drawn.chains])
     used, renumbered = np.unique(ends, return_inverse=True)
@@ -99,7 +100,7 @@ def _part_count(plan: PlanData, drawn: Arrangement) -> int:
     return len(ends) - len(used) + 1 + int(pieces.max()) - len(plan.holes)
 
 
-def _arranged(plan: PlanData) -> tuple[list[PlanLine], list[Curve], Arrangement]:
+def _arranged(plan: Plan) -> tuple[list[PlanLine], list[Curve], Arrangement]:
     """The lines in the coordinates of Π, the supports on the boundary, and the lines cut where they meet."""
     lines = [PlanLine("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [PlanLine(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
@@ -109,8 +110,7 @@ def _arranged(plan: PlanData) -> tuple[list[PlanLine], list[Curve], Arrangement]
     _check_size(plan, [*lines, *supports])
     tree, on_edge = LineTree([line for line in lines if line.bounds]), []
     for line in supports:
-        samples = line.curve.samples(0.5 * plan.edge_length)[:, :2]
-        if all(tree.at(samples, SNAP * plan.edge_length)):
+        if tree.leaves(line.curve, 0.5 * plan.edge_length, SNAP * plan.edge_length) is None:
             on_edge.append(line.curve)
         else:
             lines.append(line)
@@ -125,7 +125,7 @@ def _arranged(plan: PlanData) -> tuple[list[PlanLine], list[Curve], Arrangement]
     return lines, on_edge, replace(drawn, required=drawn.required[: len(points)])
 
 
-def _check_size(plan: PlanData, lines: Sequence[PlanLine]) -> None:
+def _check_size(plan: Plan, lines: Sequence[PlanLine]) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
     points = sum(
         len(curve.dense) for curve in (*(c.curve for c in plan.cables), *(one.curve for one in lines))
@@ -134,7 +134,7 @@ def _check_size(plan: PlanData, lines: Sequence[PlanLine]) -> None:
         problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
         raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
     _check_count(plan, lines[0].xy, 0)
-    size = float(np.linalg.norm(np.ptp(lines[0].xy, axis=0)))
+    size = bounding_size(lines[0].xy)
     if plan.edge_length > size:
         problem = (
             f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to corner"
@@ -156,7 +156,7 @@ def _check_size(plan: PlanData, lines: Sequence[PlanLine]) -> None:
             raise line.error(f"{problem} out, or use a smaller edge_length", found=extent)
 
 
-def _check_count(plan: PlanData, outline: Floats, edges: int) -> None:
+def _check_count(plan: Plan, outline: Floats, edges: int) -> None:
     """Refuse a mesh of more triangles in an outline (k,2) than are allowed, before it is made."""
     x, y = outline.T
     area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))

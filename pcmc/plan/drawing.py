@@ -19,7 +19,7 @@ from ..base.units import conversion_note, size_note
 from ..surface.curves import Curve, polyline
 from ..surface.pieces import Piece, point_text, two_digits
 from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
-from .lines import Kind, LineTree, PlanLine, check_line
+from .lines import EXACT, Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
 from .strokes import Stroke, Strokes, read_strokes
@@ -27,7 +27,6 @@ from .strokes import Stroke, Strokes, read_strokes
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
 LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
 ALONG = 2e-3  # of that diagonal: lines on an edge are compared with it at points so far apart
-FLAT = 1e-9  # of that diagonal: heights nearer to each other than this are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,19 +59,11 @@ class Drawing:
 
 
 def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawing:
-    """The plan in a .dxf or .3dm drawing.
+    """The plan in a .dxf or .3dm drawing, in ``units``, such as "m", or in its own.
 
-    Parameters
-    ----------
-    units : the unit of length wanted, such as "m"; "" for the drawing's own.
-    gap : gaps between ends up to this length are closed, in the unit wanted; by default a thousandth of the
-        outline's diagonal.
-
-    Raises
-    ------
-    FileError : for a file that cannot be read.
-    PlanError : for a drawing that is no plan; ``what`` is the layer, ``where`` the place.
-    MissingExtra : without the library that reads it.
+    ``gap``: gaps up to this length are closed; by default a thousandth of the outline's diagonal.
+    FileError for a file that cannot be read, PlanError for a drawing that is no plan (``what`` is the layer,
+    ``where`` the place), MissingExtra without the library that reads it.
     """
     content = read_strokes(path, units)
     try:
@@ -99,7 +90,7 @@ class _Reader:
         if gap is not None:
             validate.number("gap", gap, least=LEAST_GAP * self.size, hint="or leave it out")
         self.gap = GAP * self.size if gap is None else gap
-        self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= FLAT * self.size else 0.0
+        self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= EXACT * self.size else 0.0
 
     def layers_of(self, role: str) -> list[tuple[Layer, list[Stroke]]]:
         """The layers of a role with their strokes."""
@@ -278,18 +269,18 @@ class _Reader:
         free = self._add("free", "cable {!r}".format, "free", cables)
         check_count("cables", len(cables))
         tree = LineTree([PlanLine("an edge", Kind.OUTLINE, edge) for edge in edges])
-        along = {
-            name: all(tree.at(curve.samples(ALONG * self.size)[:, :2], self.gap))
+        across = {
+            name: curve
             for name, curve in cables.items()
+            if tree.leaves(curve, ALONG * self.size, self.gap) is not None
         }
         for name in free:
-            if not along[name]:
+            if name in across:
                 where = self.layers[f"cable {name!r}"]
                 text = f"{where} is on no edge of the outline or of a hole; draw it along one, or across the"
                 raise PlanError(f"{text} roof on a layer 'cable NAME'", what=where)
-        across = {name: curve for name, curve in cables.items() if not along[name]}
         self.layers |= {f"divider {name!r}": self.layers[f"cable {name!r}"] for name in across}
-        return across, {name: curve for name, curve in cables.items() if along[name]}
+        return across, {name: curve for name, curve in cables.items() if name not in across}
 
     def _mirrors(self) -> dict[str, Curve]:
         """The straight lines of mirrors, numbered; those that go on in one direction are one."""
@@ -332,7 +323,7 @@ class _Reader:
                 " to rest on some meshes and not on others; draw a mast's top as a ring, and the roof is the"
                 " same on all"
             )
-        if not all(map(math.isnan, tops)) or np.nanmax([0.0, *heights]) > FLAT * self.size:
+        if not all(map(math.isnan, tops)) or np.nanmax([0.0, *heights]) > EXACT * self.size:
             return True
         if not cables and not all(map(math.isnan, heights)):
             self.notes.append(
@@ -362,7 +353,7 @@ class _Reader:
     def _on_plane(self, curve: Curve) -> Curve:
         """The curve as a plane one if all of it is at the level of Π."""
         heights = curve.at(curve.dense)[:, 2]
-        return _projected(curve) if np.abs(heights - self.level).max() <= FLAT * self.size else curve
+        return _projected(curve) if np.abs(heights - self.level).max() <= EXACT * self.size else curve
 
 
 def _points(strokes: Sequence[Stroke]) -> list[Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -15,12 +15,15 @@ from ..base.errors import PlanError
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
+from ..surface.geometry import bounding_size
 from ..surface.pieces import point_text, to_local, to_space
 from .arrangement import Arrangement
-from .lines import SNAP, Kind, LineTree, PlanLine
-from .parts import PlanData, cable_label
+from .lines import EXACT, SNAP, Kind, LineTree, PlanLine
+from .parts import cable_label
 
-ON_MIRROR = 1e-9  # of the plan's size: a boundary this near to a mirror is on it
+if TYPE_CHECKING:
+    from .plan import Plan
+
 NONE = -1  # the cable of an edge without one
 
 
@@ -45,13 +48,9 @@ class Boundary:
         return np.unique(self.ends[self.among(*states)])
 
 
-def boundary(
-    plan: PlanData, lines: Sequence[PlanLine], on_edge: Sequence[Curve], drawn: Arrangement
-) -> Boundary:
-    """The boundary of a plan cut into edges; those along the supports ``on_edge`` are fixed.
-
-    PlanError for a mirror that is no straight edge of the outline, and a cable away from the boundary.
-    """
+def boundary(plan: Plan, lines: Sequence[PlanLine], on_edge: Sequence[Curve], drawn: Arrangement) -> Boundary:
+    """The boundary of a plan cut into edges; those along the supports ``on_edge`` are fixed. PlanError for a
+    mirror that is no straight edge of the outline, and a cable away from the boundary."""
     chains = [chain for chain in drawn.chains if lines[chain.line].bounds]
     chains.sort(key=lambda chain: chain.line)
     ends = np.concatenate([chain.edges for chain in chains])
@@ -92,17 +91,16 @@ def _along(curve: Curve, points: Floats, ends: Ints, snap: float) -> Bools:
     return np.asarray(on[ends].all(axis=1) & (away <= 0.5 * half))  # an arc of 45° rises by 0.2 of it
 
 
-def check_lines(plan: PlanData, lines: Sequence[PlanLine]) -> None:
+def check_lines(plan: Plan, lines: Sequence[PlanLine]) -> None:
     """Refuse a cable that leaves the boundary, and a mirror that the plan crosses."""
     edges = LineTree([line for line in lines if line.bounds])
     for number, part in enumerate(plan.cables, start=1):
-        points = part.curve.local(plan.plane).samples(0.5 * plan.edge_length)[:, :2]
-        for xy, places in zip(points, edges.at(points, SNAP * plan.edge_length), strict=True):
-            if not places:
-                name = cable_label(part, number)
-                problem = f"{name} is at {point_text(xy)} on no edge of the outline or of a hole; draw it"
-                problem += " along one, or give a divider cable = where it crosses the roof"
-                raise PlanError(problem, what=name, where=tuple(xy.tolist()))
+        xy = edges.leaves(part.curve.local(plan.plane), 0.5 * plan.edge_length, SNAP * plan.edge_length)
+        if xy is not None:
+            name = cable_label(part, number)
+            problem = f"{name} is at {point_text(xy)} on no edge of the outline or of a hole; draw it"
+            problem += " along one, or give a divider cable = where it crosses the roof"
+            raise PlanError(problem, what=name, where=tuple(xy.tolist()))
     for number, distance in enumerate(_mirror_distances(plan, lines[0].xy), start=1):
         if distance.min() < 0.0 < distance.max():
             smaller = np.argmin(distance) if distance.max() > -distance.min() else np.argmax(distance)
@@ -111,18 +109,18 @@ def check_lines(plan: PlanData, lines: Sequence[PlanLine]) -> None:
             raise PlanError(problem, what=f"mirror {number}")
 
 
-def _mirror_distances(plan: PlanData, points: Floats) -> list[Floats]:
+def _mirror_distances(plan: Plan, points: Floats) -> list[Floats]:
     """(n,) signed distance of points (n,2) on Π from the line of each mirror, exactly 0 on it."""
     distances = []
     for mirror in plan.mirrors:
         a, b = mirror.local(plan.plane).at([0.0, 1.0])[:, :2]
         along = (b - a) / np.linalg.norm(b - a)
         distance = (points - a) @ [-along[1], along[0]]
-        distances.append(np.where(np.abs(distance) <= ON_MIRROR * _size(points), 0.0, distance))
+        distances.append(np.where(np.abs(distance) <= EXACT * bounding_size(points), 0.0, distance))
     return distances
 
 
-def mirror_planes(plan: PlanData, vertices: Floats) -> list[tuple[Plane, Bools]]:
+def mirror_planes(plan: Plan, vertices: Floats) -> list[tuple[Plane, Bools]]:
     """The plane of each mirror, across Π, and the (n,) mask of the vertices in it."""
     planes = []
     distances = _mirror_distances(plan, plan.plane.to_local(vertices)[:, :2])
@@ -153,7 +151,7 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
     return cables
 
 
-def usual_cable(plan: PlanData) -> float:
+def usual_cable(plan: Plan) -> float:
     """A tension of cables with which the edges of a sail bend moderately; see ``cable_for``."""
     tension = max(patch.tension for patch in plan.patches) if plan.tension is None else plan.tension
     return cable_for(plan.outline.local(plan.plane), tension)
@@ -164,13 +162,12 @@ def cable_for(outline: Curve, tension: float) -> float:
     return float(f"{1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max():.2g}")
 
 
-def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:
+def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:
     """(k,) the heights of the drawn points, with those of the supports; NaN where unknown.
 
-    Between the supports an edge changes its height in proportion to the length from one to the next.
-    """
+    Between supports an edge changes its height in proportion to the length."""
     heights, change = drawn.heights.copy(), np.zeros(len(drawn.heights))
-    size, rim = _size(drawn.points), np.unique(edges.ends)
+    size, rim = bounding_size(drawn.points), np.unique(edges.ends)
     loose = np.setdiff1d(rim, edges.vertices("fixed", "sliding"))
     required = iter(drawn.required.tolist())
     for support in plan.supports:
@@ -187,7 +184,7 @@ def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bo
             continue
         heights[vertices] = np.where(np.isnan(heights[vertices]), given, heights[vertices])
         steps = given - heights[vertices]
-        wrong = np.flatnonzero((np.abs(steps) > ON_MIRROR * size) & ~np.isin(vertices, loose))
+        wrong = np.flatnonzero((np.abs(steps) > EXACT * size) & ~np.isin(vertices, loose))
         if len(wrong):
             xy, height, there = (a[wrong[0]] for a in (drawn.points[vertices], given, heights[vertices]))
             problem = f"the support at {point_text(xy)} is at height {height:g}, but the edge or line there"
@@ -219,7 +216,3 @@ def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequ
                 problem = f"patch {name!r} has the {key} {value:g} and a free edge with a cable, which closes"
                 problem += f" no space for it; give the patch {instead}, or hold that edge"
                 raise PlanError(problem, what=key, where=name, found=value)
-
-
-def _size(points: Floats) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -84,10 +84,8 @@ class Label:
 
 
 def heights_of(strokes: Sequence[Stroke], drawn: str, units: str) -> Floats:
-    """(h,3) points of layers "height"; a text that is a number gives the height where it stands.
-
-    The number has the unit ``drawn`` of the drawing, or that written after it, and becomes one of ``units``.
-    """
+    """(h,3) points of layers "height", in ``units``; a text gives the height where it stands, in
+    the unit ``drawn`` or its own."""
     points = []
     for stroke in strokes:
         if stroke.point is None:

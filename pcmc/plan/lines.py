@@ -17,6 +17,7 @@ from ..surface.curves import Curve
 from ..surface.geometry import cross_2d
 from ..surface.pieces import point_text
 
+EXACT = 1e-9  # of the size: points and heights nearer to each other than this are one
 SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
 SAG = 1e-3  # of a curve's length: no curve is farther from the chords between its dense points
 BLOCK = 64  # chords of a line that are looked up at once
@@ -129,6 +130,11 @@ class LineTree:
         for k in np.flatnonzero(distance <= snap):
             passing[point[k]].append((int(owner[k]), float(t[k])))
         return passing
+
+    def leaves(self, curve: Curve, step: float, snap: float) -> Floats | None:
+        """The first point (2,) of a curve, in steps of a length, that is on no line; None if all are."""
+        points = curve.samples(step)[:, :2]
+        return next((xy for xy, at in zip(points, self.at(points, snap), strict=True) if not at), None)
 
     @cached_property
     def area(self) -> Any:

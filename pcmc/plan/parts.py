@@ -12,11 +12,11 @@ from ..base import validate
 from ..base.errors import OptionError, PcmcError, PlanError, unknown
 from ..base.validate import checked_name
 from ..meshing.walls import EDGES
-from ..surface import Plane
 from ..surface.curve_data import CURVES, curve
 from ..surface.curves import Curve
 
 BOTTOMS = ("sliding", "held", "sloped")
+WALL = 'a number, "balanced" or false'  # what a wall's tension may be
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
 MOST = {"dividers": 1000, "holes": 2000, "cables": 2000, "mirrors": 100, "supports": 10_000, "patches": 2000}
 """How many of its parts a plan may have; its dividers cut it into no more parts than patches."""
@@ -56,10 +56,10 @@ class Divider:
         the parts on both sides to that patch with ``at``.
     """
 
-    curve: Any
-    wall: float | str | None = BALANCED
+    curve: Any = field(metadata={"kind": "a curve"})
+    wall: float | str | None = field(default=BALANCED, metadata={"kind": WALL})
     name: str = ""
-    bottom: str = "held"
+    bottom: str = field(default="held", metadata={"kind": BOTTOMS})
     cable: float | None = None
     upright: bool = False
 
@@ -77,8 +77,8 @@ class Hole:
     cable : tension of that cable, force.
     """
 
-    curve: Any
-    edge: str = "fixed"
+    curve: Any = field(metadata={"kind": "a curve"})
+    edge: str = field(default="fixed", metadata={"kind": EDGES})
     name: str = ""
     cable: float | None = None
 
@@ -96,7 +96,7 @@ class CableLine:
         several of one name are numbered: "east-1", "east-2".
     """
 
-    curve: Any
+    curve: Any = field(metadata={"kind": "a curve"})
     tension: float
     name: str = ""
 
@@ -136,7 +136,7 @@ class PatchSpec:
     name: str
     tension: float
     pressure: float = 1.0
-    at: Any = None
+    at: Any = field(default=None, metadata={"kind": "a point [x, y] or a list of points"})
     weight: float = 0.0
     snow: float | None = None
     volume: float | None = None
@@ -320,27 +320,3 @@ def check_keys(values: Any, kind: Any, what: str, needs: Sequence[str] = (), whe
         key = need.removeprefix("a ")
         if key not in values:
             raise OptionError(f"{what} needs {need}", what=key, where=where)
-
-
-@dataclass(frozen=True, eq=False)
-class PlanData:
-    """The values of a plan; ``Plan`` explains and checks them."""
-
-    outline: Any
-    dividers: Sequence[Any] = ()
-    holes: Sequence[Any] = ()
-    patches: Any = ()
-    edge_length: float = 1.0
-    edge: str = "fixed"
-    supports: Sequence[Any] = ()
-    plane: Plane = field(default_factory=Plane)
-    rise: float | None = None
-    tension: float | None = None
-    pressure: float = 1.0
-    weight: float = 0.0
-    snow: float = 0.0
-    cable: float | None = None
-    cables: Sequence[Any] = ()
-    mirrors: Sequence[Any] = ()
-    rooms: Any = ()
-    points: Any = field(default_factory=dict)

@@ -8,6 +8,7 @@ from itertools import compress
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
@@ -15,10 +16,8 @@ from ..surface.curves import Curve, arc
 from ..surface.pieces import Piece
 from ..surface.topology import components
 from .layers import listed
-from .lines import Kind, LineTree, PlanLine
+from .lines import EXACT, Kind, LineTree, PlanLine
 from .strokes import Stroke
-
-EXACT = 1e-9  # of the tolerance: ends nearer than this meet already
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +75,8 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
     places = np.stack([np.bincount(node, weight * x, count) / total for x in ends.T], axis=1)
     alone = np.bincount(node, minlength=count)[node] == 1
     places[node[alone]] = ends[alone]
-    low, high = np.full((2, count, 3), np.inf) * [[[1.0]], [[-1.0]]]
-    np.minimum.at(low, node, ends)
-    np.maximum.at(high, node, ends)
-    gaps = np.linalg.norm(high - low, axis=1)
+    of_node = pd.DataFrame(ends).groupby(node)
+    gaps = np.linalg.norm(of_node.max() - of_node.min(), axis=1)
     gaps[gaps <= EXACT * tolerance] = 0.0
     moved = []
     for curve, both, old in zip(curves, places[node].reshape(-1, 2, 3), ends.reshape(-1, 2, 3), strict=True):
@@ -117,9 +114,8 @@ def _single(curves: Sequence[Curve], tolerance: float) -> list[bool]:
 def _walk(curves: Sequence[Curve], layer: str, labels: Sequence[str], nodes: Ints) -> list[JoinedPath]:
     """Follow strokes from node to node, first from ends and forks, then around the loops that are left."""
     at_node: dict[int, list[int]] = {}
-    for k, pair in enumerate(nodes.tolist()):
-        for node in pair:
-            at_node.setdefault(node, []).append(k)
+    for place, node in enumerate(nodes.ravel().tolist()):
+        at_node.setdefault(node, []).append(place // 2)
     count = {node: len(there) for node, there in at_node.items()}
     left, paths = set(range(len(curves))), []
     for begin in (*(node for node in at_node if count[node] != 2), *at_node):
@@ -148,9 +144,8 @@ def meet_lines(
 ) -> tuple[dict[str, Curve], list[str]]:
     """The curves with ends moved that just miss each other or a line, and notes; ``what`` names them.
 
-    Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge that is as near.
-    This point, and each other end, is moved onto the nearest line that it just misses. Only the course in
-    plan counts.
+    Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge. This point, and each
+    other end, is moved onto the nearest line that it just misses. Only the course in plan counts.
     """
     names = [name for name, curve in curves.items() if not curve.closed]
     if not names:
@@ -159,9 +154,8 @@ def meet_lines(
     drawn = np.concatenate([_ends(curves[name]) for name in names])[:, :2]
     points = np.concatenate([drawn, corners])
     group = components(cKDTree(points).query_pairs(tolerance, output_type="ndarray"), len(points))
-    members: list[list[int]] = [[] for _ in range(int(group.max()) + 1)]
-    for k, number in enumerate(group.tolist()):
-        members[number].append(k)
+    last = np.cumsum(np.bincount(group))
+    members = [own.tolist() for own in np.split(np.argsort(group, kind="stable"), last[:-1])]
     in_corner = [own[-1] >= len(drawn) for own in members]
     place = np.array(
         [points[m[-1:] if at else m].mean(axis=0) for m, at in zip(members, in_corner, strict=True)]
@@ -185,10 +179,8 @@ def meet_lines(
 def meet_edges(
     supports: Sequence[Floats | Curve], edges: Sequence[Curve], tolerance: float
 ) -> tuple[list[Floats | Curve], list[str]]:
-    """Points (3,), and curves by their ends and joints, moved in plan onto edges that they just miss; notes.
-
-    A point within ``tolerance`` of a corner of an edge goes there, otherwise onto the nearest edge as near.
-    """
+    """Points (3,), and curves by their ends and joints, moved in plan onto corners and edges that they just
+    miss; notes."""
     rims, corners = _rims(edges)
     joints = [
         s.at(np.arange(len(s.pieces) + (not s.closed), dtype=float)) if isinstance(s, Curve) else s[None]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,13 @@ from ..surface.curves import Curve
 from ..surface.pieces import to_local, to_space
 from ..surface.summary import listed
 from . import parts
-from .parts import Divider, PatchSpec, PlanData, check_keys
+from .parts import Divider, PatchSpec, check_keys
+
+CURVES = {"kind": "a list of curves or tables"}  # of keys
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(PlanData):
+class Plan:
     """A roof given by the lines of its plan.
 
     Curves are Curves or their plain data (see ``curve``).
@@ -92,6 +94,25 @@ class Plan(PlanData):
     >>> [cable.name for cable in sail.cables], int(sail.fixed.sum())
     (['cable 1', 'cable 2', 'cable 3', 'cable 4'], 4)
     """
+
+    outline: Any = field(metadata={"kind": "a curve"})
+    dividers: Sequence[Any] = field(default=(), metadata=CURVES)
+    holes: Sequence[Any] = field(default=(), metadata=CURVES)
+    patches: Any = field(default=(), metadata={"kind": "a table"})
+    edge_length: float = 1.0
+    edge: str = field(default="fixed", metadata={"kind": EDGES})
+    supports: Sequence[Any] = field(default=(), metadata={"kind": "a list of points and curves"})
+    plane: Plane = field(default_factory=Plane)
+    rise: float | None = None
+    tension: float | None = None
+    pressure: float = 1.0
+    weight: float = 0.0
+    snow: float = 0.0
+    cable: float | None = None
+    cables: Sequence[Any] = field(default=(), metadata={"kind": "a list of tables"})
+    mirrors: Sequence[Any] = field(default=(), metadata=CURVES)
+    rooms: Any = field(default=(), metadata={"kind": "a table"})
+    points: Any = field(default_factory=dict, metadata={"kind": "a table"})
 
     def __post_init__(self) -> None:
         for key in parts.MOST:

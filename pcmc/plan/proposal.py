@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress, product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -18,8 +18,11 @@ from .drawing import Drawing
 from .edges import cable_for
 from .layers import Label
 from .lines import Kind, PlanLine
-from .parts import CableLine, Divider, Hole, PatchSpec, PlanData, check_count, check_keys
+from .parts import CableLine, Divider, Hole, PatchSpec, check_count, check_keys
 from .walls import most_in_corners
+
+if TYPE_CHECKING:
+    from .plan import Plan
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
@@ -57,7 +60,7 @@ def parts_of(drawing: Drawing) -> list[Part]:
     return sorted(inside, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
 
 
-def plan_area(plan: PlanData) -> Any:
+def plan_area(plan: Plan) -> Any:
     """The plan on Π without its holes, as a polygon; small level holes are filled."""
     holes = [hole.curve.local(plan.plane) for hole in plan.holes]
     return _roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
@@ -112,13 +115,8 @@ def least_tension(area: Any, pressure: float = 1.0) -> float:
 def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The keys of a plan for a drawing: those ``given``, and values for all others.
 
-    ``given`` may have every key of a plan but the outline. Its ``patches`` need no ``at`` where they have the
-    names of the drawing, or those given here. An entry of its ``dividers`` or ``holes`` with the ``name`` of
-    a drawn one and no curve changes that one; others are added.
-
-    Raises
-    ------
-    PlanError, OptionError : for a name that the drawing does not have, or has outside the plan.
+    An entry of ``dividers``, ``holes`` or ``cables`` with the ``name`` of a drawn one and no curve changes
+    that one; others are added. PlanError or OptionError for a name that the drawing does not have.
     """
     values = dict(given or {})
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")

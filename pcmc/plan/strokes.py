@@ -18,8 +18,8 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError, MissingExtra, unknown
 from ..base.files import check_regular, system_error
+from ..base.libraries import read_arrays
 from ..base.units import length_factor, unit_in_file
-from ..io.libraries import read_arrays
 from ..surface.curves import Curve
 from ..surface.pieces import Piece
 
@@ -56,10 +56,7 @@ class Strokes:
 def read_strokes(path: Path, units: str = "") -> Strokes:
     """All strokes of a drawing, in ``units``, such as "m", or in its own unit.
 
-    Raises
-    ------
-    FileError : for a file that is no drawing, damaged or too large, and for coordinates that are no numbers.
-    MissingExtra : without the library that reads it.
+    FileError for a file that is no drawing, damaged or too large; MissingExtra without the library.
     """
     check_regular(path)
     suffix = path.suffix.lower()

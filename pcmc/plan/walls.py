@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
@@ -21,7 +21,10 @@ from ..surface.values import balanced_wall
 from .draft import Draft
 from .edges import NONE
 from .lines import SNAP, PlanLine
-from .parts import BALANCED, PlanData
+from .parts import BALANCED
+
+if TYPE_CHECKING:
+    from .plan import Plan
 
 SHARE = 0.6  # of p R, R of the smallest part beside a wall: more would pull a flat roof down
 WEDGE = 1.5  # edges from a corner, where the width of the sheets there is taken
@@ -51,10 +54,7 @@ class Sides(NamedTuple):
 
 
 def walls_of(draft: Draft, roof: Roof) -> tuple[WallMesh, list[Patch], list[Sides]]:
-    """The walls and their patches: one for each divider and each pair of pressures and rooms along it.
-
-    A wall takes the pressure on the left of its divider less that on the right.
-    """
+    """The walls and their patches: one for each divider and each pair of pressures and rooms along it."""
     plan, X = draft.plan, roof.positions
     floor, level = np.zeros(len(X)), np.zeros(len(X), dtype=bool)
     walled: list[tuple[int, Ints]] = []
@@ -101,10 +101,7 @@ def _beside(draft: Draft, chains: Sequence[Ints]) -> Ints:
 
 
 def _balanced(draft: Draft, roof: Roof, number: int, beside: Sequence[Ints]) -> float:
-    """A tension for the wall of a divider with which all of its junctions balance, if there is one.
-
-    ``beside`` are the triangles at each of its junctions.
-    """
+    """A tension with which all junctions of a divider balance; ``beside`` are the triangles at each."""
     line, _ = draft.divider(number)
     net = np.abs(roof.laws[:, 0] - roof.laws[:, 1])
     pressure = min(float(net[faces].min(initial=np.inf)) for faces in beside)
@@ -155,7 +152,7 @@ def upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[Sides]) -> lis
     return planes
 
 
-def rooms_of(plan: PlanData, walls: Sequence[Patch], sides: Sequence[Sides]) -> list[Room]:
+def rooms_of(plan: Plan, walls: Sequence[Patch], sides: Sequence[Sides]) -> list[Room]:
     """The rooms of prescribed volume: below their patches, between the walls to other rooms."""
     rooms = []
     for number, (name, room) in enumerate(plan.rooms.items()):

@@ -30,8 +30,10 @@ from .planning import drawing_reference, project_text, proposal_text
 from .running import (
     check_outputs,
     designed,
+    model_job,
     opened,
     paint,
+    paint_families,
     run,
     run_project,
     schedule_jobs,
@@ -51,12 +53,13 @@ from .settings import (
 )
 from .solving import solve_project
 from .start import Start, build, start_of, surface_of
-from .varied import check_varied, digest, varied
+from .varied import check_varied, digest, varied, with_loads
 
 __all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing", "Start"]
 __all__ += ["Structure", "build", "cache_folder", "cached_files", "check_model", "check_names"]
 __all__ += ["check_outputs", "check_picture", "check_varied", "clear_cache", "designed", "digest"]
-__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "opened"]
-__all__ += ["paint", "project_of", "project_text", "proposal_text", "read_data", "reference", "run"]
-__all__ += ["run_project", "schedule_jobs", "schedule_paths", "sections", "solve_project", "start_of"]
-__all__ += ["surface_files", "surface_of", "varied", "vertex_fields", "with_rise", "write_all"]
+__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "model_job"]
+__all__ += ["opened", "paint", "paint_families", "project_of", "project_text", "proposal_text", "read_data"]
+__all__ += ["reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
+__all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "vertex_fields"]
+__all__ += ["with_loads", "with_rise", "write_all"]

@@ -8,9 +8,10 @@ The environment variable ``PCMC_CACHE`` names another folder; ``PCMC_CACHE=off``
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -33,7 +34,18 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = ("plan", "mesh", "method", "options", "wanted", "search", "remeshing", "targets", "vary")
+PARTS = [
+    "plan",
+    "mesh",
+    "method",
+    "options",
+    "wanted",
+    "search",
+    "remeshing",
+    "targets",
+    "vary",
+    "target_tolerance",
+]
 NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a result
 
 
@@ -122,10 +134,7 @@ def _path(project: Project) -> Path | None:
         return None
     sha = hashlib.sha256(_program().encode())
     try:
-        for name in PARTS:
-            sha.update(_bytes(getattr(project, name)))
-        sha.update(_bytes(project.target_tolerance))
-        sha.update(_bytes(project.target_tolerance))
+        sha.update(_bytes([getattr(project, name) for name in PARTS]))
         if project.mesh is not None:
             sha.update(read_bytes(project.path.parent / project.mesh.file))
             sha.update(repr(project.units).encode())
@@ -142,29 +151,16 @@ def _program() -> str:
 
 
 def _bytes(value: Any) -> bytes:
-    return b"".join(_pieces(value))
+    """The same for equal values and others for others; TypeError for a value of unknown kind."""
+    return json.dumps(value, default=_plain, sort_keys=True).encode()
 
 
-def _pieces(value: Any) -> Iterator[bytes]:
-    """Bytes, the same for equal values and others for others; TypeError for a value of unknown kind."""
+def _plain(value: Any) -> Any:
+    """Plain data that stand for a value which JSON has no form for."""
     if is_dataclass(value) and not isinstance(value, type):
-        yield f"{type(value).__qualname__}(".encode()
-        for f in fields(value):
-            yield f"{f.name}=".encode()
-            yield from _pieces(getattr(value, f.name))
-    elif isinstance(value, np.ndarray) and value.dtype != object:
-        yield f"{value.dtype.str}{value.shape}".encode()
-        yield value.tobytes()
-    elif isinstance(value, Mapping):
-        yield f"{len(value)}{{".encode()
-        for key in sorted(value):
-            yield from _pieces(key)
-            yield from _pieces(value[key])
-    elif isinstance(value, str | bool | int | float | None):
-        yield f"{value!r};".encode()
-    elif isinstance(value, Sequence):
-        yield f"{len(value)}[".encode()
-        for item in value:
-            yield from _pieces(item)
-    else:
-        raise TypeError(f"no bytes for {type(value).__name__}")
+        return {type(value).__qualname__: {f.name: getattr(value, f.name) for f in fields(value)}}
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        return [value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"no bytes for {type(value).__name__}")

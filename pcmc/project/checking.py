@@ -29,11 +29,7 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
 
 
 def check_keys(text: str, data: Mapping[str, Any]) -> None:
-    """Check every key of a project file: known, of the right kind, none missing.
-
-    ``text`` is the file as it is written, ``data`` as TOML reads it. In a FileError ``what`` is the
-    dotted key, ``where`` its line.
-    """
+    """Check every key: known, of the right kind, none missing. ``text`` is the file as it is written."""
     _check_range(text, data, ())
     root, *below = main_sections()
     _check_table(text, root, (), data)

@@ -39,9 +39,7 @@ def is_drawing(path: Path) -> bool:
 
 
 def files_of(path: PathLike) -> list[Path]:
-    """The files that a project depends on: itself, and the drawing or mesh that it refers to.
-
-    One that cannot be read depends on itself alone, so that a page which follows these files sees it mended.
+    """The files that a project depends on: itself, and its drawing or mesh if it can be read.
 
     >>> files_of("notebooks/roof.toml")
     [PosixPath('notebooks/roof.toml')]
@@ -121,11 +119,9 @@ class Chosen:
 
 
 def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
-    """The data of a project with its drawing's lines in them; the drawing, if there is one; what was chosen.
+    """The data of a project with its drawing's lines and what is proposed; the drawing; what was chosen.
 
-    What neither the project nor the drawing says, such as tensions, is proposed. Points of the layer "height"
-    become targets where the project has none. A project without units takes those of the drawing. Errors as
-    in ``load``.
+    Points of the layer "height" become targets where the project has none. Errors as in ``load``.
     """
     plan = dict(data["plan"])
     name, gap = plan.pop("drawing", None), plan.pop("gap", None)

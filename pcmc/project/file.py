@@ -94,14 +94,13 @@ def load(path: PathLike, *, units: str = "") -> Project:
 
     Raises
     ------
-    FileError : if the file cannot be read or is not TOML; for an unknown key (the message names its line and
-        the nearest known key), a missing key or a bad value. ``what`` is the key.
-    PlanError : for a drawing that is no plan; ``what`` is its layer.
+    FileError : the file is no TOML, or a key is unknown, missing or bad; ``what`` is the key.
+    PlanError : a drawing is no plan; ``what`` is its layer.
 
     Warns
     -----
-    FileWarning : for what was changed and left out of a drawing, for a plan whose size is unlikely in its
-        unit, and for a roof held at single points inside.
+    FileWarning : for what was changed and left out of a drawing, a plan whose size is unlikely in its unit,
+        and a roof held at single points inside.
     """
     path = as_path(path)
     if not is_project(path):
@@ -169,10 +168,8 @@ def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
 def project_of(
     path: Path, data: Mapping[str, Any], text: str = "", redrawn: Callable[[Plan], Plan] | None = None
 ) -> Project:
-    """The project with the given data, which were read from a text. Errors as in ``load``.
-
-    ``redrawn`` is applied to the plan, before heights and named points of it become targets.
-    """
+    """The project with the given data, read from a text; ``redrawn`` changes its plan before heights become
+    targets. Errors as in ``load``."""
     given, mesh, rises, drawing, chosen = data, None, list[Rise](), None, Chosen()
     with in_file(path, FileError):
         if "mesh" in data:
@@ -185,11 +182,13 @@ def project_of(
         data, drawing, chosen = with_drawing(path, data)
     stages = data.get("remesh", [])
     with in_file(path, FileError):
-        solving = _solving(data.get("solve", {}))
-        output = _output(data.get("output", {}))
-        units = Units(data.get("units", ""), data.get("force", ""))
+        values = _solving(data.get("solve", {}))
+        output, units = _output(data.get("output", {})), Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
         output.check(units, structure)
+        values |= {"output": output, "units": units, "structure": structure, "drawing": drawing}
+        stages = stages if isinstance(stages, list) else [stages]
+        values["remeshing"] = [section_of(Remeshing, "remesh", stage) for stage in stages]
         plan, targets, vary = None, list["Target"](), list["Parameter"]()
         if mesh is None:
             plan = plan_from(data["plan"])
@@ -199,27 +198,9 @@ def project_of(
             if plan is not None:
                 _check_sought_once(rises, sought, plan)
             targets, vary = [*own, *targets], [*sought, *vary]
-        return Project(
-            path=path,
-            plan=plan,
-            mesh=mesh,
-            text=text,
-            data=given,
-            units=units,
-            **solving,
-            remeshing=[
-                section_of(Remeshing, "remesh", stage)
-                for stage in (stages if isinstance(stages, list) else [stages])
-            ],
-            targets=targets,
-            vary=vary,
-            target_tolerance=data.get("targets", {}).get("tolerance"),
-            structure=structure,
-            output=output,
-            drawing=drawing,
-            rises=rises,
-            chosen=chosen,
-        )
+            values["target_tolerance"] = data["targets"].get("tolerance")
+        values |= {"targets": targets, "vary": vary, "rises": rises, "chosen": chosen}
+        return Project(path, plan, mesh, text, given, **values)
 
 
 def _solving(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,19 +10,16 @@ from functools import cache
 from inspect import cleandoc
 from typing import Any
 
-from ..accuracy.adaptive import ACCURACY_OF
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
-from ..drawings import FORMATS
-from ..meshing.walls import EDGES
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
-from ..plan.parts import BALANCED, BOTTOMS, RoomData
+from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
 from ..structure.model import Structure
 from ..surface import Plane
 from ..surface.curve_data import CURVES
-from .settings import COLOURS, PATCH_KEYS, WHEN, AccuracyWanted, MeshFile, Output, Remeshing
+from .settings import PATCH_KEYS, AccuracyWanted, MeshFile, Output, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME; see ``pcmc.margin``"
@@ -32,7 +29,6 @@ REQUIRED = MISSING  # the default of a key that must be given
 OR_CURVE = ("plan.dividers", "plan.holes")  # a curve may replace these sections
 
 Schema = dict[str, Any]  # in the terms of JSON Schema
-WALL = 'a number, "balanced" or false'
 TABLE: Schema = {"type": "object"}
 _NUMBER: Schema = {"type": "number"}
 _NAME: Schema = {"type": "string"}
@@ -82,34 +78,10 @@ _TYPES: dict[str, Any] = {
     "array": list,
     "object": Mapping,
 }
-_KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}
-_NAMES_OF_KIND = {
-    "a curve": ("outline", "curve"),
-    "a list of curves or tables": ("dividers", "holes", "mirrors"),
-    "a list of points and curves": ("supports",),
-    "a list of tables": ("cables",),
-    "a table": ("plane", "rooms", "points", "patches", "wind", "accuracy"),
-    WALL: ("wall",),
-    "a point [x, y] or a list of points": ("at",),
-    "a list of names": ("files", "drawings"),
-    "a text": ("picture", "panels", "structure", "report"),
-    "a name or two angles": ("view",),
-    "a list of views": ("views",),
-    "a name or a point [x, y]": ("of",),
-    "a name or a list of names": ("patch",),
-}
-_KIND_OF_NAME = {name: kind for kind, names in _NAMES_OF_KIND.items() for name in names}
-_CHOICES: dict[str, Sequence[str]] = {
-    "edge": EDGES,
-    "bottom": BOTTOMS,
-    "units": LENGTHS,
-    "when": WHEN,
-    "colour": COLOURS,
-    "sheet": tuple(FORMATS),
-    "accuracy_of": ACCURACY_OF,
-    "target": ("minimum", "stationary"),
-    "armijo": ("printed", "sufficient"),
-}
+_KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "Plane": "a table"}
+_KIND_OF_TYPE |= {"str": "a text", "PathLike": "a text", "Mapping": "a table"}
+_CHOICES = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}  # of solvers' options
+_KIND_OF_TYPE |= {"Sequence": "a list of names", "tuple": "a list of names"}
 
 
 def fits(value: Any, schema: Schema) -> bool:
@@ -158,18 +130,16 @@ class Section:
 
 
 def _of_class(cls: Any, **special: str | Sequence[str]) -> tuple[Key, ...]:
-    """A key for each field of a dataclass: its default, and its sentence from the docstring.
-
-    ``special`` are kinds and choices of names that have others elsewhere.
-    """
+    """A key for each field of a dataclass, with its sentence in the docstring; ``special``: kinds and choices
+    of names that have others elsewhere."""
     help_of: dict[str, str] = {}
     for entry in re.finditer(r"^([\w, ]+) : (.*(?:\n    .*)*)", cleandoc(cls.__doc__ or ""), re.M):
         help_of.update(dict.fromkeys(entry[1].split(", "), " ".join(entry[2].split())))
     keys = []
     for f in fields(cls):
-        about = special.get(f.name) or _KIND_OF_NAME.get(f.name) or _CHOICES.get(f.name, ())
-        usual = _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"), "a value")
-        kind, choices = (about, ()) if isinstance(about, str) else (usual, tuple(about))
+        usual = _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None").partition("[")[0], "a value")
+        about = special.get(f.name) or f.metadata.get("kind", usual)
+        kind, choices = (about, ()) if isinstance(about, str) else ("a text", tuple(about))
         default = None if f.default_factory is not MISSING else f.default
         keys.append(Key(f.name, kind, default, help_of.get(f.name, ""), choices))
     return tuple(keys)
@@ -212,11 +182,11 @@ def main_sections() -> tuple[Section, ...]:
         Key("point", "a point [x, y, z]", Plane().point, "a point of Π"),
         Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
     )
-    mesh = [key for key in _of_class(MeshFile, supports="a name or a list") if key.name != "rises"]
+    mesh = [key for key in _of_class(MeshFile) if key.name != "rises"]
     mesh += _rise_keys("found by one tension of all patches under pressure")
     mesh_patch = [replace(key, default=None) for key in specs if key.name in PATCH_KEYS]
     mesh_patch.append(Key("wall", "true or false", None, "whether it is a wall between rooms"))
-    rooms, cables = _of_class(RoomData, patches="a list of names"), _of_class(CableLine)
+    rooms, cables = _of_class(RoomData), _of_class(CableLine)
     help_of = {
         "divider": "A line between patches, with a wall below it. A curve alone is a divider, too.",
         "cable": "A part of the outline or of a hole that is free and carries a cable.",
@@ -253,7 +223,7 @@ def solve_section(method: str) -> Section:
     help = "The solver and its options."
     if method not in METHODS:
         return Section("solve", help, keys)
-    keys += _of_class(find_method(method).options)
+    keys += _of_class(find_method(method).options, **_CHOICES)
     if method == "newton":
         keys += _of_class(AccuracyWanted)
     return Section("solve", help, keys, f'method = "{method}"')
@@ -266,8 +236,8 @@ def target_sections() -> tuple[Section, ...]:
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
     from ..design.targets import MEASURES, SHORT
 
-    wanted = _of_class(Target, quantity=(*MEASURES, *SHORT))
-    changing = _of_class(Parameter, kind=KINDS_OF_PARAMETER)
+    wanted = _of_class(Target, quantity=(*MEASURES, *SHORT), of="a name or a point [x, y]")
+    changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)
     return (
         Section(
             "targets",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
@@ -13,7 +13,9 @@ import numpy as np
 from ..base.arrays import Ints
 from ..base.errors import PcmcError
 from ..base.units import NO_UNITS, Units
+from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
+from ..forces.pinching import standing_part
 from ..solvers.result import Progress, Result
 from ..surface import Surface, mirrored, unfolded
 from .settings import Output
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..margins import Margin
-    from ..panelling import Panels
+    from ..panelling import FewerFamilies, Panels
     from ..report import RoofReport
     from ..structure.model import StructuralModel, Structure
     from .file import Project
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 EXTENSIVE = ("area", "volume")  # targets of a part that are not those of the whole
-KEPT = ("certificate", "whole", "figures", "theorem")  # what the files written do not change
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 Finding = TypeVar("Finding")
 
@@ -86,7 +87,7 @@ class Outcome:
     start: Surface | None = None
     unfold: bool = False
     data: MeshData | None = None
-    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    _known: dict[Any, Any] = field(default_factory=dict, repr=False)  # copies of an outcome share it
 
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""
@@ -114,38 +115,61 @@ class Outcome:
         """The surface reached, or the one that is shown as it is."""
         return cast(Surface, self.start) if self.result is None else self.result.surface
 
-    @cached_property
+    @property
     def certificate(self) -> Certificate:
         """The certificate of ``surface``."""
-        return certify(self.surface) if self.result is None else self.result.certificate
+        if self.result is not None:
+            return self.result.certificate
+        return self._once("certificate", lambda: certify(self.surface))
 
-    @cached_property
+    @property
     def whole(self) -> WholeRoof | None:
         """The whole roof with its certificate, which counts motions that are not symmetric, too; None unless
         ``unfold``."""
-        if not self.unfold:
-            return None
-        whole = mirrored(self.surface)
-        return WholeRoof(whole, certify(whole))
+
+        def unfold() -> WholeRoof:
+            whole = mirrored(self.surface)
+            return WholeRoof(whole, certify(whole))
+
+        return self._once("whole", unfold) if self.unfold else None
 
     @property
     def shown(self) -> WholeRoof:
         """What is written, drawn and listed: the whole roof if it is asked for, with its certificate."""
         return self.whole or WholeRoof(self.surface, self.certificate)
 
-    @cached_property
+    @property
     def figures(self) -> list[Figure]:
         """The key figures of what is shown."""
         from ..certificate.quantities import figures
 
-        return figures(*self.shown)
+        return self._once("figures", lambda: figures(*self.shown))
 
-    @cached_property
+    @property
     def theorem(self) -> Theorem:
         """What ``pcmc.verify`` proves of what is shown."""
         from ..certificate.theorem import verify
 
-        return verify(self.shown.surface)
+        return self._once("theorem", lambda: verify(self.shown.surface))
+
+    @property
+    def ending(self) -> tuple[str, str]:
+        """How the solver ended, and the verdict's detail; without the hint for a strained junction that the
+        advice takes the place of."""
+        message, detail = self.solved.message, self.certificate.detail
+        if self.advice:
+            strained = strained_junction(self.surface, standing_part(self.surface).walls.pinchable)
+            if strained is not None:
+                message, detail = (text.replace(strained.hint, "") for text in (message, detail))
+        return message, detail
+
+    @property
+    def values_found(self) -> str:
+        """The values of the targets, and of the parameters found; empty without targets."""
+        from ..design.outcome import values_text
+
+        tables = () if self.design is None else (self.design.targets, self.design.parameters)
+        return ", with ".join(values_text(table, self.units) for table in tables)
 
     @property
     def certified(self) -> bool:
@@ -168,23 +192,9 @@ class Outcome:
         """What the project writes, and how its documents are made."""
         return Output() if self.project is None else self.project.output
 
-    def written(self, files: Sequence[Path]) -> Outcome:
-        """The same outcome, with these files written; what is known of it stays known."""
-        return self._with(KEPT, files=files)
-
-    def unfolded(self) -> Outcome:
-        """The same outcome, with the whole roof shown."""
-        return self if self.unfold else self._with(KEPT[:1], unfold=True)
-
-    def _with(self, kept: Sequence[str], **changes: Any) -> Outcome:
-        other = replace(self, **changes)
-        other._known.update(self._known)
-        vars(other).update({name: vars(self)[name] for name in kept if name in vars(self)})
-        return other
-
-    def _once(self, key: tuple[Any, ...], compute: Callable[[], Finding]) -> Finding:
+    def _once(self, key: Any, compute: Callable[[], Finding]) -> Finding:
         """A finding about what is shown, computed the first time."""
-        key = (self.unfold, *key)
+        key = (self.unfold, key)
         if key not in self._known:
             self._known[key] = compute()
         return cast(Finding, self._known[key])
@@ -199,6 +209,12 @@ class Outcome:
         options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
         sort = partial(panels, surface, tolerance, **options, certificate=certificate)
         return self._once(("panels", tolerance, mirror_images, walls), sort)
+
+    def fewer_families(self, tolerance: float, change: float, **options: Any) -> FewerFamilies:
+        """What is shown with fewer families of panels; see ``pcmc.fewer_families``."""
+        from ..panelling import fewer_families
+
+        return fewer_families(self.shown.surface, tolerance, change, **options)
 
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
@@ -261,10 +277,7 @@ class Outcome:
         return self.certificate.index is not None and (small if asked is None else asked)
 
     def check_mesh(self, progress: OnStep | None = None) -> MeshCheck | None:
-        """The mesh check of what is shown, made once; None where it fails, and ``mesh_failure`` says why.
-
-        Corners of the plan stay corners.
-        """
+        """The mesh check of what is shown, made once; None where it fails, see ``mesh_failure``."""
         from ..accuracy import check_mesh  # takes long to import
 
         def check() -> MeshCheck | None:
@@ -279,7 +292,7 @@ class Outcome:
                 self._known[self.unfold, "mesh failure"] = str(error)
                 return None
 
-        return self._once(("mesh check",), check)
+        return self._once("mesh check", check)
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
@@ -293,7 +306,7 @@ class Outcome:
     @property
     def margins(self) -> list[Margin]:
         """The margins that were found, in the order in which they were asked for."""
-        return [known for key, known in self._known.items() if key[:2] == (self.unfold, "margin")]
+        return [m for (unfold, key), m in self._known.items() if unfold == self.unfold and key[0] == "margin"]
 
     @property
     def corners(self) -> Ints:

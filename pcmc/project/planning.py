@@ -25,10 +25,7 @@ SHARPER = " # tension of the wall; more gives a sharper valley"
 
 
 def drawing_reference(drawing: Path, project: Path) -> str:
-    """The name by which a project refers to its drawing, which lies in the project's folder or below it.
-
-    FileError for a drawing elsewhere; the message has the line to type.
-    """
+    """The name by which a project refers to its drawing; FileError for one outside the project's folder."""
     try:
         name = Path(os.path.relpath(drawing, project.parent))
     except ValueError:  # another drive
@@ -51,10 +48,8 @@ def project_text(
 ) -> tuple[str, Drawing]:
     """The text of the project for a drawing, .dxf or .3dm, and the drawing.
 
-    The project is in ``units``, by default those of the drawing; gaps between lines up to the length ``gap``
-    are closed. With ``refer`` it refers to the drawing by name, so that it follows it, instead of holding its
-    lines; ``folder`` is that of the project, by default the drawing's. FileError or PlanError for a drawing
-    that cannot be read, is no plan, or is outside that folder; MissingExtra without the library for it.
+    ``units``: by default the drawing's. ``gap``: gaps up to it are closed. ``refer``: by name, instead of
+    its lines; ``folder`` is the project's, by default the drawing's. FileError, PlanError, MissingExtra.
     """
     from ..plan.proposal import proposed
 
@@ -126,23 +121,17 @@ def proposal_text(project: Project) -> str:
     'proposed: tension 3.2, edges of 0.28'
     """
     assert project.plan is not None
-    tensions = sorted({area.tension for area in project.plan.patches})
-    walls = sorted(
-        {divider.wall for divider in project.plan.dividers if isinstance(divider.wall, int | float)}
-    )
-    parts = [f"tension {' or '.join(f'{value:g}' for value in tensions)}"]
-    parts += [f"walls of {' or '.join(f'{value:g}' for value in walls)}"] if walls else []
-    parts.append(f"edges of {project.plan.edge_length:g}")
+    walls = {divider.wall for divider in project.plan.dividers if isinstance(divider.wall, int | float)}
+    values = {"tension": {area.tension for area in project.plan.patches}, "walls of": walls}
+    values["edges of"] = {project.plan.edge_length}
+    parts = [f"{what} {' or '.join(f'{v:g}' for v in sorted(own))}" for what, own in values.items() if own]
     name = project.path.with_suffix(".toml").name
     change = f"to change them: pcmc plan {project.path.name} -o {name}"
     return f"proposed: {', '.join(parts)}; {change}"
 
 
 def _curve(curve: Any, closed: bool = False) -> str:
-    """A curve, or a point that stands for one, in TOML: a line for each of its parts.
-
-    Where every curve is ``closed``, a polyline need not say it.
-    """
+    """A curve, or a point, in TOML, a line for each part; where all are ``closed``, none says it."""
     from ..surface.curve_data import curve_data
 
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]

@@ -22,7 +22,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import write_structure
+from ..structure import StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from . import cache
 from .checking import in_file
@@ -49,8 +49,7 @@ def opened(
     """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
 
     ``units`` is the unit of length that the roof is to be in; with ``start`` a project has its start shape,
-    which is not solved; ``changed`` is applied to the surface of the file, or to the start shape. The others
-    are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
+    not solved. The others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
 
     >>> roof = opened("notebooks/roof.toml", start=True)
     >>> roof.result is None, roof.certificate.certified
@@ -149,12 +148,10 @@ def run_project(
     use_cache: bool = True,
     check_after: bool = True,
 ) -> Outcome:
-    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
+    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface, solved in any case.
 
-    The mesh check comes after the files are written, so that Ctrl-C during it leaves them. Where a report is
-    among them, it comes before, unless ``mesh_check`` is false or the mesh is large. Without ``check_after``
-    the caller makes it. A good roof is kept in the cache, unless it was changed or ``use_cache`` is false; it
-    is solved in any case.
+    The mesh check comes last, so that Ctrl-C during it leaves the files; before a report, which shows it.
+    Without ``check_after`` the caller makes it.
     """
     progress = progress or ignore
     project = project if project.folder is not None else project.in_folder(project.path.parent)
@@ -169,7 +166,7 @@ def run_project(
     if outputs and (outcome.good or anyway):
         jobs = _output_jobs(project, outcome, anyway, progress)
         with output_folder(project.folder or Path()):
-            outcome = outcome.written(write_all(jobs, progress))
+            outcome = replace(outcome, files=write_all(jobs, progress))
     if use_cache and changed is None:
         cache.keep(project, outcome)
     if check_after and project.mesh_check and outcome.wants_mesh_check():
@@ -178,15 +175,11 @@ def run_project(
 
 
 def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnStep) -> FileJobs:
-    """The project's files, each with the function that writes it.
-
-    A document of a roof that is not certified is marked.
-    """
+    """The project's files, each with the function that writes it; documents tell if it is not certified."""
     output, jobs = project.output, surface_files(outcome, project.output.files)
-    kept = [] if output.picture is None else [Path(output.picture)]
-    for picture in kept:
+    if output.picture is not None:
         painting = partial(paint, views=output.all_views, colour=output.colour, units=outcome.units)
-        jobs.append((picture, partial(painting, outcome.shown.surface)))
+        jobs.append((Path(output.picture), partial(painting, outcome.shown.surface)))
     if not output.documents:
         return jobs
     if output.report is not None and outcome.wants_mesh_check():
@@ -201,12 +194,12 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
             documents += schedule_jobs(Path(output.panels), schedule)
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
-            documents.append((Path(output.structure), partial(write_structure, model=model)))
+            documents.append(model_job(Path(output.structure), model))
         if output.report is not None:
-            listed = {path.name: "project" for path in project.inputs[:1]}
-            listed |= {path.name: "drawing or mesh of the roof" for path in project.inputs[1:]}
-            listed |= {Path(file).name: "surface" for file in output.files}
-            listed |= {picture.name: "picture" for picture in kept}
+            listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
+            listed[project.path.name] = "project"
+            listed |= {path.name: "surface" for path, _ in jobs}
+            listed |= {} if output.picture is None else {Path(output.picture).name: "picture"}
             listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
             report = outcome.report(output, files=listed, anyway=anyway)
             documents.append((Path(output.report), report.write))
@@ -224,10 +217,9 @@ def vertex_fields(surface: Surface, certificate: Certificate) -> dict[str, Float
 
 
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
-    """The files of a roof with all that their formats hold, for ``write_all``.
+    """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
 
-    ``colour`` names the scalar that colours vertices. The fields of a surface that was not solved are those
-    of its file, and are missed where a format lacks them; fields and certificate of another nobody asked for.
+    Scalars of a surface that was not solved are those of its file.
     """
     surface, certificate, data = *outcome.shown, outcome.data
     about: dict[str, Any] = {"units": outcome.units, "colour": colour}
@@ -251,10 +243,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
 
 
 def write_all(jobs: FileJobs, progress: OnStep = ignore) -> list[Path]:
-    """Write files, each by its own function of a path; all of them appear together, or none.
-
-    The functions write to temporary files; errors and warnings name the final ones.
-    """
+    """Write files, each by its own function of a path: all appear together, or none."""
     paths = [path for path, _ in jobs]
     check_outputs(paths)
     with atomic_writes(paths) as temporaries:
@@ -281,39 +270,44 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
 
 
+def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:
+    """The file of a structural model, with the function that writes it."""
+    return path, partial(write_structure, model=model)
+
+
+def paint_families(path: Path, schedule: Panels, view: Any) -> None:
+    """Draw panels, coloured by family."""
+    from ..plot import families  # needs the extra plot
+
+    families(schedule, path, view=view)
+
+
 def paint(
     surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
 ) -> None:
-    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows.
-
-    Several views stand side by side; reactions have one.
-    """
+    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
     # needs the extra plot, which a project without a picture does not
     from ..plot import draw, panel, reactions
 
     check_picture(views, colour)
-    look: dict[str, Any] = {"legend": True}
-    scalars = None
     if colour == "reactions":
         reactions(surface, path, view=views[0], units=units)
         return
+    look: dict[str, Any] = {"legend": True}
     if colour == "curvature":
-        scalars, look = mean_curvature(surface), {"label": f"mean curvature, {units.curvature}"}
+        look = {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
     elif colour == "error":
-        scalars, look = curvature_error(surface), {"label": "curvature error"}
+        look = {"scalars": curvature_error(surface), "label": "curvature error"}
     if len(views) == 1:
-        draw(surface, path, view=views[0], scalars=scalars, **look)
+        draw(surface, path, view=views[0], **look)
     else:
-        count = len(views)
-        each = None if scalars is None else [scalars] * count
-        panel([surface] * count, path, views=views, scalars=each, **look)
+        look |= {"scalars": [look["scalars"]] * len(views)} if "scalars" in look else {}
+        panel([surface] * len(views), path, views=views, **look)
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
-    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``.
-
-    The folder ``made`` may be missing. A link to an input, and another way to write its path, is the input.
-    """
+    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``, also
+    by links and other ways to write them. The folder ``made`` may be missing."""
     seen, read = set(), [path for path in inputs if path.exists()]
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))

@@ -14,14 +14,15 @@ from ..advice.rises import Rise
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.files import PathLike, suffix_of
-from ..base.units import Units, expect_length
+from ..base.units import LENGTHS, Units, expect_length
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.sheet import FORMATS
-from ..meshing.remeshing import check_lengths
+from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..plot.figure import SUFFIXES, check_suffix
 from ..plot.scene import VIEWS
 from ..report.document import check_suffix as check_report
 from ..structure.model import Structure
+from ..surface import Surface
 
 PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of a mesh
 BOUNDARY, GROUND = "boundary", "ground"
@@ -61,10 +62,10 @@ class MeshFile:
     """
 
     file: str
-    units: str = ""
+    units: str = field(default="", metadata={"kind": LENGTHS})
     tension: float | None = None
     patches: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    supports: str | Sequence[Any] = ()
+    supports: str | Sequence[Any] = field(default=(), metadata={"kind": "a name or a list"})
     rises: Sequence[Rise] = ()
 
     def __post_init__(self) -> None:
@@ -92,16 +93,20 @@ class Remeshing:
     near_curves: float | None = None
     growth: float = 1.2
     chord: float | None = None
-    when: str = "after"
+    when: str = field(default="after", metadata={"kind": WHEN})
 
     def __post_init__(self) -> None:
         validate.choice("when", self.when, WHEN)
-        check_lengths(**self.options)
+        check_lengths(**self._lengths)
 
     @property
-    def options(self) -> dict[str, Any]:
-        """The arguments of ``pcmc.meshing.remeshing.remesh``."""
+    def _lengths(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "when"}
+
+    def remeshed(self, surface: Surface) -> tuple[Surface, str]:
+        """The surface with these triangles, and a note where they had to be finer; "" for none."""
+        fine = remesh(surface, **self._lengths)
+        return fine, size_note(fine, self.edge_length)
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,7 @@ class AccuracyWanted:
     """
 
     accuracy: Mapping[str, float] = field(default_factory=dict)
-    accuracy_of: str = "mesh"
+    accuracy_of: str = field(default="mesh", metadata={"kind": ACCURACY_OF})
     most_triangles: int = TRIANGLES
 
     def __post_init__(self) -> None:
@@ -151,12 +156,12 @@ class Output:
 
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
-    view: Any = "diagonal"
-    views: Sequence[Any] | None = None
-    colour: str = "patches"
+    view: Any = field(default="diagonal", metadata={"kind": "a name or two angles"})
+    views: Sequence[Any] | None = field(default=None, metadata={"kind": "a list of views"})
+    colour: str = field(default="patches", metadata={"kind": COLOURS})
     whole: bool = False
     drawings: Sequence[PathLike] = ()
-    sheet: str = "A1"
+    sheet: str = field(default="A1", metadata={"kind": tuple(FORMATS)})
     panels: PathLike | None = None
     tolerance: float | None = None
     panel_sheets: bool = False

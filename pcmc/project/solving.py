@@ -15,7 +15,6 @@ from ..certificate.balance import unbalanced
 from ..existence import solve
 from ..forces.pinching import standing_part
 from ..io import metres_note
-from ..meshing.remeshing import remesh, size_note
 from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
@@ -26,7 +25,7 @@ from .settings import AccuracyWanted
 from .start import start_of
 
 if TYPE_CHECKING:
-    from ..design import Design, Target
+    from ..design import Target
 
 Changed = Callable[[Surface], Surface]
 
@@ -47,13 +46,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         notes += metres_note(project.output.files, start.units.length)
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas and volumes are those of the part between the mirror planes")
-    about: dict[str, Any] = {
-        "units": start.units,
-        "unfold": project.output.whole,
-        "project": project,
-        "data": data,
-    }
-    outcome = replace(solved, notes=notes, **about)
+    outcome = replace(solved, notes=notes, units=start.units, unfold=project.output.whole, data=data)
     if outcome.good:
         return outcome
     notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
@@ -70,10 +63,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
 
 
 def _check_wishes(project: Project, surface: Surface) -> None:
-    """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work.
-
-    The advice after it names a remedy that was tried.
-    """
+    """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
     with in_file(project.path):
         if project.output.structure is not None and project.structure is not None:
             project.structure.check(surface)
@@ -94,16 +84,15 @@ def _check_wishes(project: Project, surface: Surface) -> None:
 def solve_project(project: Project, surface: Surface, progress: OnStep = ignore) -> Outcome:
     """Solve a surface with the project's options, remesh it, meet its targets; write nothing.
 
-    A surface that is not certified, or misses a target, is not remeshed. The accuracy comes last; targets
-    are met once more on its mesh.
+    Only a good roof is remeshed. The accuracy comes last; targets are met once more on its mesh.
     """
     notes = list[str]()
     with in_file(project.path):
         for stage in project.remeshing:
             if stage.when == "before":
                 progress("remeshing")
-                surface = remesh(surface, **stage.options)
-                notes.append(size_note(surface, stage.edge_length))
+                surface, note = stage.remeshed(surface)
+                notes.append(note)
         after = [stage for stage in project.remeshing if stage.when == "after"]
         if project.wanted.accuracy and not after and not project.targets:
             outcome = _solve_to_accuracy(project, surface, progress)
@@ -113,9 +102,9 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
         for stage in after:
             if outcome.good:
                 progress("remeshing")
-                before, surface = outcome, remesh(outcome.surface, **stage.options)
+                before, (surface, note) = outcome, stage.remeshed(outcome.surface)
                 outcome = _again(project, surface, progress)
-                notes += [size_note(surface, stage.edge_length), *outcome.notes]
+                notes += [note, *outcome.notes]
                 notes += _met_before(project.targets, before, outcome)
         if project.wanted.accuracy and outcome.good:
             accurate = _solve_to_accuracy(project, outcome.surface, progress)
@@ -153,8 +142,7 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
 def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     """Solve the surface, or meet its targets, and certify it.
 
-    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
-    from a roof that is certified the search starts again, any other says why there is none.
+    If the search finds no start, it starts again from the roof without targets, if that is certified.
     """
     if not project.targets:
         return _solve(project, surface, report)
@@ -171,7 +159,8 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
 
 def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
     solver = solve if project.search else solvers.solve
-    return _certified(solver(surface, project.method, reporter(report), **project.options), report)
+    result = solver(surface, project.method, reporter(report), **project.options)
+    return _certified(result, report, result.status is Status.STOPPED)
 
 
 def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -183,17 +172,16 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     if project.target_tolerance is not None:
         options["tolerance"] = project.target_tolerance
     design = meet(surface, project.targets, project.vary, **options)
-    if design.status is DesignStatus.STOPPED:  # by Ctrl-C, which ends the command
-        raise KeyboardInterrupt
-    return _certified(design.result, report, design)
+    return _certified(design.result, report, design.status is DesignStatus.STOPPED, design=design)
 
 
-def _certified(result: Result, report: OnStep, design: Design | None = None) -> Outcome:
-    if design is None and result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+def _certified(result: Result, report: OnStep, stopped: bool, **found: Any) -> Outcome:
+    """The outcome of a search, unless Ctrl-C ``stopped`` it, which ends the command."""
+    if stopped:
         raise KeyboardInterrupt
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
-    return Outcome(result, design=design)
+    return Outcome(result, **found)
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -208,10 +196,8 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
     corners = Outcome(None, start=surface, project=project).corners
     wanted = vars(project.wanted) | dict(project.options)
     accurate = solve_to_accuracy(surface, corners=corners, callback=callback, **wanted)
-    if accurate.status is AccuracyStatus.STOPPED:  # by Ctrl-C, which ends the command
-        raise KeyboardInterrupt
-    accurate.result.certificate  # noqa: B018 — computed here, while the progress is shown
-    return Outcome(accurate.result, accurate=accurate)
+    stopped = accurate.status is AccuracyStatus.STOPPED
+    return _certified(accurate.result, report, stopped, accurate=accurate)
 
 
 def _newton_alone(project: Project, act: str) -> None:

@@ -72,10 +72,8 @@ def build(path: PathLike) -> Surface:
 
 
 def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surface, MeshData]:
-    """The surface of a project's mesh in the project's units, and all that its file holds.
-
-    A file without a unit is taken to be in ``mesh.units``, or else in the project's.
-    """
+    """The surface of a project's mesh in the project's units, and all that its file holds. A file without
+    a unit is in ``mesh.units``, or the project's."""
     surface, data = read_bare(path.parent / mesh.file, units.length, mesh.units)
     changes: dict[str, Any] = {}
     if mesh.patches or mesh.tension is not None:

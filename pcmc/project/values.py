@@ -30,10 +30,9 @@ Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
 def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
-    """The values of a surface that can be changed, by kind and name.
+    """The values of a surface that can be changed, by kind and name; points are [x, y, z].
 
-    The pressures around a room of prescribed volume are results, and a wall's follows from its rooms', as its
-    snow does. Pressures are those of the air: snow is not taken off. Points are [x, y, z].
+    Not those that follow from others: pressures around rooms of given volume and of walls, snow of walls.
     """
     result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
     free = {p.name for p, r in zip(surface.patches, result.tolist(), strict=True) if not r}
@@ -55,10 +54,7 @@ def single_points(surface: Surface) -> Ints:
 
 
 def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -> dict[Name, float]:
-    """The values of ``asked`` that ``surface`` has not, those in ``left`` apart.
-
-    OptionError for surfaces whose patches, cables or rooms are not the same.
-    """
+    """The values of ``asked`` that ``surface`` has not, but for ``left``; OptionError for other parts."""
     ours, theirs = _by_name(surface), _by_name(asked)
     if ours.keys() != theirs.keys():
         names = sorted({name for _, name in ours.keys() ^ theirs.keys()})
@@ -92,15 +88,13 @@ def with_values(
 ) -> tuple[dict[str, Any], Project, Surface]:
     """The data of a project with the values of the surface ``asked``, the project, and its start shape.
 
-    The data have other numbers where ``asked`` has others, each in the form that the project has it in. The
-    values in ``left`` stay as the project finds them. OptionError for values that a project cannot hold, such
-    as two tensions of one divider.
+    Each number is in the form that the project has it in; the values in ``left`` stay. OptionError for values
+    that a project cannot hold, such as two tensions of one divider.
 
     >>> path = Path("notebooks/roof.toml")
     >>> from .file import read_data
     >>> data = read_data(path)[1]
-    >>> project = project_of(path, data)
-    >>> asked = surface_of(project).retensioned({"corner": 9.0})
+    >>> asked = surface_of(project_of(path, data)).retensioned({"corner": 9.0})
     >>> with_values(path, data, asked)[0]["plan"]["patches"]["corner"]["tension"]
     9.0
     """
@@ -138,9 +132,7 @@ class Source(NamedTuple):
 
 
 def sources_of(plan: Plan) -> dict[Name, Source]:
-    """What gives each wall and cable of a plan its tension.
-
-    The plan is built with another tension in each place, so that no rule of its names is repeated here.
+    """What gives each wall and cable of a plan its tension, found by building the plan with others.
 
     >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], edge_length=1.0, tension=4.0)
     >>> sources_of(hall)

@@ -69,10 +69,7 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
 
 
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
-    """Refuse every name and value that ``varied`` refuses; the file is read once.
-
-    A plan is meshed once for the names of patches, cables and rooms, and not at all without them.
-    """
+    """Refuse every name and value that ``varied`` refuses; the plan is meshed once at most."""
     source = _Source.of(path)
     project = source.project({})
     start = start_of(project) if project.mesh is not None else None
@@ -155,15 +152,19 @@ class _Source(NamedTuple):
             kind, part = known[name]
             given[kind][part] = values[name]
         with in_file(self.path, OptionError):
-            refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
-            return surface.retensioned(**given)
+            return with_loads(surface, given)
+
+
+def with_loads(surface: Surface, given: Mapping[str, Mapping[str, float]]) -> Surface:
+    """The surface with other values by kind and name; OptionError for a pressure that is a result."""
+    refuse_varied_pressure(surface, map(surface.patch_index, given.get("pressures", ())))
+    return surface.retensioned(**given)
 
 
 def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
-    """The numbers of a project: the dotted name of each, and its path in the data.
+    """The numbers of a project: the dotted name of each, and its path in the data; then those it may have.
 
     Entries of a list are named by their key "name" if they have one, otherwise by their number from 1.
-    Numbers that a table of the file may have and has not come last.
 
     >>> list(numbers({"plan": {"edge": "free", "holes": [{"name": "yard", "cable": 2.0}, [3]]}}))[:3]
     ['plan.holes.yard.cable', 'plan.holes.2.1', 'plan.gap']
@@ -245,10 +246,7 @@ def _moved(part: Any, by: Floats, plane: Plane) -> Any:
 
 
 def digest(path: PathLike) -> str:
-    """SHA-256, hexadecimal, of a project file with its drawing, or of the surface that any other file holds.
-
-    A surface may be spread over several files (a ``.gltf`` has buffers), so its data are hashed.
-    """
+    """SHA-256, hexadecimal, of a project with its drawing, or of the surface that any other file holds."""
     if is_project(path):
         sha = hashlib.sha256(read_data(Path(path))[0].encode())
         for drawing in files_of(path)[0 if is_drawing(Path(path)) else 1 :]:

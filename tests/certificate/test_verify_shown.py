@@ -1,6 +1,7 @@
 """Where a theorem is shown: command, project, report, and page."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -42,7 +43,7 @@ def test_a_project_asks_for_it(tmp_path, capsys, monkeypatch):
     assert PROVED in capsys.readouterr().out
     outcome = project.run("hall.toml")
     assert outcome.theorem.proved
-    assert outcome.theorem is outcome.written(()).theorem
+    assert outcome.theorem is replace(outcome, files=()).theorem
 
 
 def test_a_roof_too_heavy_for_its_span_has_short_words(tmp_path, capsys, monkeypatch):
