@@ -14,7 +14,7 @@ from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END, SOUND
 from ..certificate.balance import load_name, load_ratio
-from ..certificate.neck import held_groups
+from ..certificate.diagnosis import held_groups
 from ..certificate.proof import Attempt
 from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..forces.functional import gradient
