@@ -13,7 +13,7 @@ from .. import solvers
 from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END, SOUND
-from ..certificate.neck import held_groups
+from ..certificate.diagnosis import held_groups
 from ..certificate.proof import Attempt
 from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..forces.functional import gradient

@@ -20,7 +20,7 @@ from ..certificate.balance import (
     unheld,
 )
 from ..certificate.cables import weak_cable
-from ..certificate.neck import pinched_neck
+from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result, Status
