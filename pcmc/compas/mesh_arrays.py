@@ -13,8 +13,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra, OptionError, SurfaceError, unknown
-from ..io.mesh_data import FIXED, FREE, SLIDING, coincident
+from ..base.errors import FileError, MissingExtra, SurfaceError
+from ..io.mesh_data import FIXED, FREE, SLIDING, coincident, given_values
 from ..io.polygons import triangulate
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room
 
@@ -54,19 +54,10 @@ def named_meshes(meshes: Any) -> dict[str, Any]:
 
 def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> list[Patch]:
     """A patch per mesh, from its attributes or the values given in their place."""
-    given: dict[str, dict[str, Any]] = {}
-    for key, values in (("tension", tensions), ("pressure", pressures)):
-        if values is None:
-            continue
-        by_name = values if isinstance(values, Mapping) else dict.fromkeys(named, values)
-        for name, value in by_name.items():
-            if name not in named:
-                raise OptionError(unknown("mesh", name, named), what=f"{key}s", where=name, found=name)
-            given.setdefault(name, {})[key] = value
-    patches = []
+    given, patches = given_values("mesh", named, tension=tensions, pressure=pressures), []
+    known = {f.name: f.default for f in fields(Patch) if f.name != "name"}
     for name, mesh in named.items():
-        known = {f.name: f.default for f in fields(Patch) if f.name != "name"}
-        values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given.get(name, {})
+        values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given[name]
         for key in [key for key, default in known.items() if default is MISSING and key not in values]:
             refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
         patches.append(Patch(name, **values))

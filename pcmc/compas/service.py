@@ -20,9 +20,9 @@ def solve(
 ) -> dict[str, Any]:
     """Solve the surface of COMPAS meshes.
 
-    Options are those of ``pcmc.solve``; over RPC plain data, such as ``method="lbfgs"``. The answer has the
-    ``meshes`` of the surface reached, ``converged``, ``status`` (the name of the Status), ``message``,
-    ``energy``, ``iterations``, ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
+    Options are those of ``pcmc.solve``, over RPC plain data. The answer has the ``meshes`` reached,
+    ``converged``, ``status`` (the name of the Status), ``message``, ``energy``, ``iterations``,
+    ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.1]]

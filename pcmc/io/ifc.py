@@ -210,7 +210,7 @@ def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
         value = values.get(key)
         if name == "Verdict" and value is not None:
             found[name] = kind, str(getattr(value, "name", value)).lower()
-        elif value not in (None, "") and (kind != "IfcReal" or np.isfinite(real(value))):
+        elif np.isfinite(real(value)) if kind == "IfcReal" else value not in (None, ""):
             found[name] = kind, TYPES[kind](value)
     return found
 

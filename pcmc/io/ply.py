@@ -142,7 +142,7 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
         text = f"its header must list vertices, then faces; found {', '.join(names) or 'none'}"
         raise FileError(text, where="header")
     for element in elements:
-        columns = [p[0] for p in element.properties] + [f"{p[0]} count" for p in element.properties if p[2:]]
+        columns = [p[0] for p in element.properties]
         if len(set(columns)) < len(columns):
             text = f"two properties of its element {element.name} have the same name"
             raise FileError(text, where="header", found=element.name)

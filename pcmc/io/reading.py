@@ -56,9 +56,8 @@ def read(
     fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` fixes all boundary
         vertices, and is the default for formats without supports.
     plane : Π in place of the file's, or of z = 0.
-    units : the unit of length of the Surface. A file in another unit is converted: coordinates, and the
-        tensions and pressures that it has. The numbers of a file without a unit stay. A Surface itself has no
-        unit: give the same to ``write``.
+    units : the unit of length of the Surface, to which coordinates, tensions and pressures of the file are
+        converted; the numbers of a file without a unit stay. A Surface has no unit: give it to ``write``.
 
     Warns
     -----
@@ -67,8 +66,7 @@ def read(
 
     Raises
     ------
-    FileError : for a file that is missing, cut off or not of its suffix's format. ``what`` is the
-        file, ``where`` the line or element.
+    FileError : for a file that is missing, cut off or not of its format; ``where`` is the line or element.
     SurfaceError : for a mesh that is not a surface.
     MissingExtra, OptionError : for a library that is not installed, and an unknown unit.
     """

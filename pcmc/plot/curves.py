@@ -49,9 +49,7 @@ def lines(
     """
     for scale in (xscale, yscale):
         validate.choice("scale", scale, SCALES)
-    figure, axes = new_axes(width, height, title, x, y)
-    axes.set_xscale(xscale)
-    axes.set_yscale(yscale)
+    figure, axes = new_axes(width, height, title, x, y, xscale, yscale)
     for k, (label, (xs, ys)) in enumerate(curves.items()):
         px, py = _curve(label, xs, ys, xscale, yscale)
         color = CURVES[k % len(CURVES)]
@@ -124,9 +122,7 @@ def convergence(
     height: int = 640,
 ) -> Image:
     """Errors against edge lengths on logarithmic axes, with the least-squares slope of each."""
-    figure, axes = new_axes(width, height, title, x, y)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    figure, axes = new_axes(width, height, title, x, y, "log", "log")
     for k, (name, (xs, ys)) in enumerate(curves.items()):
         color, label = CURVES[k % len(CURVES)], name
         px, py = _curve(name, xs, ys, "log", "log")
@@ -248,9 +244,10 @@ def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Float
     return [(bool(stable[i]), (every[i : k + 1, 1], every[i : k + 1, 2])) for i, k in ends]
 
 
-def new_axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, Any]:
+def new_axes(width: int, height: int, title: str, x: str, y: str, *scales: str) -> tuple[Any, Any]:
     figure = new(width, height, pad=8.0)
     axes = style(figure.subplots())
+    axes.set(**dict(zip(("xscale", "yscale"), scales, strict=False)))
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
     label_axes(axes, x, y)
     return figure, axes

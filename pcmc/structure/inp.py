@@ -58,8 +58,6 @@ def _sections(model: StructuralModel) -> Iterator[str]:
     yield "*NODE, NSET=NALL\n"
     yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)
     yield from _elements(model)
-    if surface.cables:
-        yield from _cable_elements(model)
     yield from _supports(model)
     yield from _prestress(model)
     for k, step in enumerate(model.steps):
@@ -67,7 +65,7 @@ def _sections(model: StructuralModel) -> Iterator[str]:
 
 
 def _elements(model: StructuralModel) -> Iterator[str]:
-    """Elements, node sets and sections by patch, and the material."""
+    """Elements, node sets and sections by patch and by cable, and their materials."""
     surface, (name, section, _) = model.standing, KINDS[model.elements]
     patch_of = surface.patch_of_face[model.active]
     present = np.unique(patch_of) + 1
@@ -81,9 +79,8 @@ def _elements(model: StructuralModel) -> Iterator[str]:
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
     yield _material("MEMBRANE", model.material)
 
-
-def _cable_elements(model: StructuralModel) -> Iterator[str]:
-    """Elements, sections and material of the cables, and the set CABLES of all."""
+    if not surface.cables:
+        return
     for k, (cable, area, numbers, _) in enumerate(model.cable_edges(), 1):
         yield f"*ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}\n"
         yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))

@@ -69,10 +69,9 @@ class StructuralModel:
     elements : "membrane", without bending stiffness, or "shell". CalculiX's shells of three nodes are too
         stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
-    cable_material : of the cables; by default that of the patches.
-    certificate : of the surface, where it is known; by default it is computed.
-    units : of the surface's numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it
-        is not given. Without a unit of length that takes metres.
+    cable_material, certificate : by default those of the patches, and the one of the surface.
+    units : of the numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it is not
+        given. Without a unit of length that takes metres.
 
     Raises
     ------
@@ -189,6 +188,7 @@ class StructuralModel:
 
     @cached_array
     def nodes(self) -> Bools:
+        """(n,) the vertices of elements."""
         used = np.zeros(self.surface.n, dtype=bool)
         used[self.standing.faces[self.active]] = True
         for cable in self.standing.cables:
@@ -257,10 +257,8 @@ class Structure:
 
     Attributes
     ----------
-    young : Young's modulus, force per area.
+    young, poisson, density : as of ``Material``: t/m³ with kN and m. With a density, self-weight is a load.
     thickness : of all patches, length, or a table with one for each patch.
-    poisson : Poisson's ratio.
-    density : mass per volume, as of ``Material``: t/m³ with kN and m. Above 0, self-weight is a load.
     gravity : length/s²; by default 9.81 m/s² in the unit of length.
     snow : load per plan area, besides the snow that the form was found under; 0 for none.
     wind : pressures by patch, above 0 for suction on a roof.
