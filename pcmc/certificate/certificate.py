@@ -28,19 +28,11 @@ from ..stability.factorisation import SingularMatrix
 from ..stability.modes import Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
+from . import tables
 from .balance import load_ratio, pressures_left_over
 from .forces import Forces, along_normal
 from .proof import Attempt, Proof
 from .supports import FORCE, MOMENT, balance_sentence, balance_table, boundary_view, pull_table, support_table
-from .tables import (
-    cable_end_table,
-    cable_table,
-    junction_table,
-    lean_table,
-    lean_texts,
-    patch_table,
-    room_table,
-)
 from .verdict import Evidence, Findings, Verdict, judge
 
 
@@ -108,7 +100,7 @@ class Certificate:
     def patches(self) -> pd.DataFrame:
         """A row per patch: tension, pressure (where there is snow, snow and net pressure), target curvature,
         area, errors by both definitions, quality."""
-        return patch_table(self.acting.surface, self.acting.standing)
+        return tables.patch_table(self.acting.surface, self.acting.standing)
 
     @property
     def curvature_error(self) -> float:
@@ -118,14 +110,11 @@ class Certificate:
     @cached_property
     def junctions(self) -> pd.DataFrame:
         """A row per curve: length, middle, forces left and Σ α n, force/length."""
-        return junction_table(self.acting.standing, self.left)
+        return tables.junction_table(self.acting.standing, self.left)
 
     @property
     def load(self) -> float:
-        """The force of pressure and weight along Π's normal.
-
-        Its sum with ``support`` is what the mesh leaves along the sheets.
-        """
+        """The force of pressure and weight along Π's normal; with ``support`` what the mesh leaves."""
         return along_normal(self.acting.surface, self.acting.loads)
 
     @property
@@ -141,18 +130,18 @@ class Certificate:
     @cached_property
     def cables(self) -> pd.DataFrame:
         """A row per part of a cable; see ``pcmc.certificate.tables.cable_table``."""
-        return cable_table(self.acting.standing, self.left)
+        return tables.cable_table(self.acting.standing, self.left)
 
     @cached_property
     def cable_ends(self) -> pd.DataFrame:
         """A row per end of a cable; see ``pcmc.certificate.tables.cable_end_table``."""
-        return cable_end_table(self.acting.standing, self.acting.cable_ends)
+        return tables.cable_end_table(self.acting.standing, self.acting.cable_ends)
 
     @cached_property
     def rooms(self) -> pd.DataFrame:
         """A row per room of prescribed volume: the volume it has, the one prescribed, the difference over the
         latter, and the room's pressure."""
-        return room_table(self.acting.surface)
+        return tables.room_table(self.acting.surface)
 
     @property
     def symmetric_in(self) -> tuple[str, ...]:
@@ -163,7 +152,7 @@ class Certificate:
     @cached_property
     def leaning(self) -> pd.DataFrame:
         """A row per wall: its largest angle from the vertical of Π, degrees, and the place."""
-        return lean_table(self.acting.standing)
+        return tables.lean_table(self.acting.standing)
 
     @cached_property
     def supports(self) -> pd.DataFrame:
@@ -247,16 +236,16 @@ class Certificate:
             ("curvature error", f"{self.curvature_error:.2e}"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
-            ("walls lean", ", ".join(lean_texts(self.leaning))),
+            ("walls lean", ", ".join(tables.lean_texts(self.leaning))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
             ("load, reactions", ", ".join(f"{x:.6g}{force}" for x in sums) + " along the plane's normal"),
             ("balance", balance_sentence(self.balance, self.symmetric_in)),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         supports = self.supports.drop(columns=[*MOMENT])
-        tables = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
-        shown = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in tables if len(t)]
-        return "\n\n".join([head, *shown])
+        shown = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
+        texts = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in shown if len(t)]
+        return "\n\n".join([head, *texts])
 
 
 def certify(

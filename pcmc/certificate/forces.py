@@ -217,12 +217,12 @@ def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
     n is the outward co-normal; force/length. Along a junction of smooth surfaces at rest (7) without a cable
     it is zero, of triangles only in the limit.
     """
-    side, total = Sides.at(surface, ends), np.zeros((len(ends), 3))
+    side, total = SheetSides.at(surface, ends), np.zeros((len(ends), 3))
     np.add.at(total, side.edge, side.tension / np.where(side.height > 0.0, side.height, 1.0) * side.out)
     return total
 
 
-class Sides(NamedTuple):
+class SheetSides(NamedTuple):
     """The sides of triangles at some edges. Each goes from a to b, and has the corner c opposite."""
 
     edge: Ints  # (s,) which of the edges
@@ -237,7 +237,7 @@ class Sides(NamedTuple):
     tension: Floats  # (s,1) α + w z there
 
     @classmethod
-    def at(cls, surface: Surface, ends: Ints) -> Sides:
+    def at(cls, surface: Surface, ends: Ints) -> SheetSides:
         """Those at edges that are given by their ends (k,2); none where there is no edge."""
         numbers = surface.topology.edge_numbers(ends)
         row = np.full(len(surface.topology.edges), -1)

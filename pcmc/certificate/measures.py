@@ -23,7 +23,7 @@ from ..surface.geometry import area_vectors, cross_2d, segment_lengths
 from ..surface.parts import Cable
 from ..surface.values import part_index
 from .cables import chord
-from .forces import Forces, Sides
+from .forces import Forces, SheetSides
 from .tables import lean_sines
 
 TIE = 1e-6  # of a maximum's size: a change of parameters as small, relative, may bring another one to the top
@@ -172,7 +172,7 @@ def largest_pull(acting: Forces, edges: Bools) -> Measurement:
     up, patches = np.array(surface.plane.normal), len(surface.patches)
 
     def branches(near: Ints) -> Branches:
-        s = Sides.at(surface, acting.surface.topology.edges[numbers[near]])
+        s = SheetSides.at(surface, acting.surface.topology.edges[numbers[near]])
         pull = (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][s.edge]
         normal = s.out / s.height
         turn, tilt = s.tension * _dot(pull, s.tangent) / s.length * normal, np.cross(s.tangent, normal)

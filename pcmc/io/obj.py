@@ -62,7 +62,7 @@ def read(path: Path) -> MeshData:
     if not len(counts):
         raise FileError("the file has no faces", where="faces", found=0)
     support = np.full(len(X), FREE, dtype=np.int8)
-    points = list(POINT.finditer(file.text))
+    points = list(POINT.finditer(file.text)) if HELD.keys() & set(groups.tolist()) else []
     for point, group in zip(points, groups[np.searchsorted(starts, _places(points))], strict=True):
         numbered = np.array(point[1].split(), dtype=np.float64)
         if group in HELD and not (numbered.min() >= 1 and numbered.max() <= len(X)):

@@ -38,8 +38,8 @@ class Plan:
     holes : openings: Holes, or curves (with fixed edges).
     patches : a PatchSpec for each part into which the dividers cut the plan, or a mapping from names to
         their attributes; without patches ``tension`` holds for every part.
-    edge_length : of the triangles, length. Along lines edges are about as long, equal between corners,
-        meetings, and the points at which a curve is farthest along x or y, which are vertices.
+    edge_length : of the triangles, length. Edges on lines are nearly as long. Corners, crossings and the
+        points where a curve is farthest along x or y are vertices; between two of them edges are equal.
     edge : the support of the outline: "fixed"; "sliding" on Π, where the roof is at rest if it meets Π
         at a right angle; "cable": free between ``supports``, with a cable along it; or "free", where the
         tension has nothing to pull against.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ import pytest
 from nightly import night_but
 from pages import parts, run_page
 
+import pcmc
 from pcmc.project import reference
 
 HOME = Path(__file__).resolve().parents[2]
@@ -69,6 +71,14 @@ def test_a_script_draws_its_picture_again(name, tmp_path):
 def test_the_stored_page_of_keys_is_of_today():
     stored = (DOCS / "how-to" / "project-keys.md").read_text(encoding="utf-8")
     assert stored == "# The keys of a project file\n\n" + reference(), "run: sphinx-build docs docs/_build"
+
+
+def test_every_public_name_has_an_example():
+    """In its docstring, or in a page that is run."""
+    code = "".join(text for page in PAGES for _, kind, text in parts(HOME / page) if kind == "python")
+    code += "".join(path.read_text(encoding="utf-8") for path in (DOCS / "pictures").glob("*.py"))
+    without = [n for n in pcmc.__all__ if ">>>" not in (inspect.getdoc(getattr(pcmc, n)) or "")]
+    assert [name for name in without if not re.search(rf"\b{name}\b", code)] == []
 
 
 @pytest.mark.parametrize("page", PAGES)
