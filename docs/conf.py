@@ -1,32 +1,33 @@
 """The documentation's settings, and the pages that are generated at each build.
 
-Generated: the tutorial (copies of the notebooks), the picture of the page on drawings, the keys of a project
-file, and the reference.
+Generated: the tutorial (copies of the notebooks), the keys of a project file, the command line, the gallery
+(from the scripts in ``pictures``), and the reference. Each is written once, in its source.
 """
 
 from __future__ import annotations
 
+import ast
 import base64
 import importlib
 import importlib.metadata
+import inspect
 import json
 import pkgutil
+import re
 import shutil
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import typer
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxTranslator
 
 import pcmc
+from pcmc.cli.app import app as command_line
 from pcmc.project import reference
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from drawing_layers import picture
 
 DOCS = Path(__file__).resolve().parent
 HOME = DOCS.parent
@@ -40,6 +41,25 @@ MODULES = (  # modules with names that users need beside those of their package
     "pcmc.solvers.newton",
     "pcmc.solvers.result",
 )
+GALLERY = (  # scripts in ``pictures`` that the gallery shows, in this order
+    "hall",
+    "courtyard",
+    "from_drawing",
+    "canopy",
+    "dome",
+    "snow",
+    "mirrored",
+    "own_mesh",
+    "remeshing",
+    "error",
+    "mesh_check",
+    "fold",
+    "sweep",
+    "load_case",
+    "drawings",
+    "report",
+)
+BAR = re.compile(r"<mo[^>]*>([|‖])</mo>")  # left and right alike: a browser draws one of them taller
 ENTRIES = ("Parameters", "Attributes", "Returns", "Raises", "Warns")  # sections of docstrings
 
 project = "pcmc"
@@ -55,11 +75,15 @@ html_static_path = ["_static"]
 html_css_files = ["pcmc.css"]
 html_copy_source = False
 html_show_sourcelink = False
-html_sidebars = {"index": []}
-html_theme_options = {"secondary_sidebar_items": ["page-toc"], "footer_end": []}
+html_sidebars = {"index": [], "installation": [], "gallery": [], "glossary": [], "bibliography": []}
+html_theme_options = {
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_end": [],
+    "header_links_before_dropdown": 7,
+}
 
 nb_execution_mode = "off"
-myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence"]
 myst_heading_anchors = 3
 
 autosummary_generate = False
@@ -117,7 +141,7 @@ def copy_notebook(path: Path, folder: Path) -> None:
     """Copy a notebook; attached pictures become files, and links out of the folder lead to the report."""
     text = path.read_text(encoding="utf-8")
     for outside in ("../README.md", "../results/REPORT.md"):
-        text = text.replace(f"]({outside})", "](../report.md)")
+        text = text.replace(f"]({outside})", "](../comparison.md)")
     notebook = json.loads(text)
     for cell in notebook["cells"]:
         for name, data in cell.pop("attachments", {}).items():
@@ -131,10 +155,75 @@ def generate() -> None:
     for path in sorted((HOME / "notebooks").glob("*.ipynb")):
         copy_notebook(path, DOCS / "tutorial")
     shutil.copy(HOME / "notebooks" / "roof.toml", DOCS / "tutorial")
-    picture(DOCS / "how-to" / "drawing-layers.png")
     keys = "# The keys of a project file\n\n" + reference()
     (DOCS / "how-to" / "project-keys.md").write_text(keys, encoding="utf-8")
+    (DOCS / "reference" / "command-line.md").write_text(commands(), encoding="utf-8")
+    (DOCS / "gallery.md").write_text(gallery(), encoding="utf-8")
     write_reference(DOCS / "reference" / "generated")
+
+
+def commands() -> str:
+    """The page of the command line, from the command itself."""
+    group = typer.main.get_command(command_line)
+    lines = ["# The command line", "", *help_of(group), "", "| command | what it does |", "|---|---|"]
+    listed = {name: command for name, command in group.commands.items() if not command.hidden}
+    for name, command in listed.items():
+        lines.append(f"| [`pcmc {name}`](#pcmc-{name}) | {command.short_help} |")
+    for name, command in listed.items():
+        lines += ["", f"## pcmc {name}", "", *help_of(command), ""]
+        for title, kind in (("argument", "argument"), ("option", "option")):
+            rows = [
+                row(p)
+                for p in command.params
+                if p.param_type_name == kind and not getattr(p, "hidden", False)
+            ]
+            lines += [f"| {title} | meaning |", "|---|---|", *rows, ""] if rows else []
+    return "\n".join(lines) + "\n"
+
+
+def help_of(command: Any) -> list[str]:
+    """The help of a command in Markdown; its indented examples become a block."""
+    lines: list[str] = []
+    for part in inspect.cleandoc(command.help or "").replace("\b\n", "").split("\n\n"):
+        title, _, rest = part.partition("\n")
+        examples = [line.strip() for line in rest.splitlines()]
+        if title.strip() in ("Examples:", "Example:") and examples:
+            lines += ["```sh", *examples, "```", ""]
+        else:
+            lines += [" ".join(part.split()), ""]
+    return lines
+
+
+def row(parameter: Any) -> str:
+    """A row of the table of options: names, value, and meaning."""
+    names = [*parameter.opts, *parameter.secondary_opts]
+    if parameter.param_type_name == "argument":
+        names = [parameter.metavar or parameter.name.upper()]
+    value = (
+        "" if parameter.param_type_name == "argument" or parameter.is_flag else f" {parameter.metavar or ''}"
+    )
+    meaning = " ".join(str(parameter.help or "").split()).replace("|", "\\|")
+    return "| " + ", ".join(f"`{name}{value.rstrip()}`" for name in names) + f" | {meaning} |"
+
+
+def gallery() -> str:
+    """The page of thumbnails; behind each stand the picture and the script that draws it."""
+    lines = ["# Gallery", "", "Each picture comes from the script beside it. Copy one and change it.", ""]
+    lines += [":::::{container} thumbnails"]
+    for name in GALLERY:
+        lines += [":::{figure} pictures/" + name + ".png", f':target: "#{label(name)}"', ":::"]
+    lines += [":::::", ""]
+    for name in GALLERY:
+        meaning = ast.get_docstring(ast.parse((DOCS / "pictures" / f"{name}.py").read_text(encoding="utf-8")))
+        lines += [f"## {label(name).replace('-', ' ').capitalize()}", "", str(meaning), ""]
+        lines += [f"```{{image}} pictures/{name}.png", f":alt: {meaning}", "```", ""]
+        lines += [f"```{{literalinclude}} pictures/{name}.py", ":lines: 3-", "```", ""]
+    return "\n".join(lines)
+
+
+def label(name: str) -> str:
+    """The name of a script as the anchor of its section."""
+    return name.replace("_", "-")
 
 
 def split_entries(*arguments: Any) -> None:
@@ -164,7 +253,8 @@ def escape_bars(*arguments: Any) -> None:
 
 def visit_math(self: SphinxTranslator, node: nodes.math) -> None:
     """Write a formula as MathML, which a browser shows without any script or network."""
-    self.body.append(tex2mathml(node.astext(), as_block=isinstance(node, nodes.math_block)))
+    formula = tex2mathml(node.astext(), as_block=isinstance(node, nodes.math_block))
+    self.body.append(BAR.sub(r'<mo stretchy="false" lspace="0" rspace="0">\1</mo>', formula))
     raise nodes.SkipNode
 
 

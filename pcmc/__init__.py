@@ -10,10 +10,10 @@ meshing                    triangulation, walls of a mesh, better and finer tria
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes, Morse index; the verdict on a finished surface, a proof, its figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
-design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
 margins                    how far a roof is from the edge of its stability
+design                     tensions that meet targets
 compas                     meshes of COMPAS, and a server for them
 panelling structure        families of panels; structural models
 drawings plot report       sheets, pictures, and pages for those who build

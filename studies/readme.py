@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-
-import pandas as pd
 
 from pcmc.base.errors import FileError
 
 from .folder import Folder, write_bytes
-from .paper import HOLDS, NEAR
-from .report import HEADS, comparison_cells, headline, of_the_paper, table, write_report
+from .report import headline, write_report
 
-ROWS = 5
+WIDTH = 120  # of a line of the README
 
 
 def write_readme(readme: Path, results: Path) -> None:
@@ -27,19 +25,7 @@ def up_to_date(readme: str, results: Path) -> str:
     """The README's text with its summary made anew."""
     folder = Folder(results)
     comparison, figures = folder.read_table("comparison"), folder.read_table("figures")
-    lines = [
-        *table(HEADS["number"], comparison_cells(summary(comparison), "number")),
-        "",
-        headline(comparison, figures),
-    ]
-    return with_block(readme, "summary", lines)
-
-
-def summary(comparison: pd.DataFrame) -> pd.DataFrame:
-    """Some of the numbers that the paper prints: all that fail first, then in the paper's order."""
-    printed = of_the_paper(comparison, "number")
-    agrees = printed.verdict.isin([HOLDS, NEAR])
-    return printed.loc[agrees.sort_values(kind="stable").index[:ROWS].sort_values()]
+    return with_block(readme, "summary", textwrap.wrap(headline(comparison, figures), WIDTH))
 
 
 def with_block(readme: str, name: str, lines: Sequence[str]) -> str:

@@ -23,7 +23,7 @@ import pandas as pd
 
 from .. import existence
 from ..base import validate
-from ..base.errors import MissingExtra, OptionError, SurfaceError
+from ..base.errors import MissingExtra, OptionError
 from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
 from ..certificate.quantities import dimension_of
@@ -32,7 +32,7 @@ from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Result, Status
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from .estimator import GROWTH, Goal, error_shares, evenness, size_field
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, row_name, vertex_numbers, with_bar
@@ -168,8 +168,7 @@ def solve_to_accuracy(
     wanted = accuracies(accuracy)
     validate.choice("accuracy_of", accuracy_of, ACCURACY_OF)
     validate.integer("most_triangles", most_triangles, least=1)
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     check_places(wanted, surface)
     if importlib.util.find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")

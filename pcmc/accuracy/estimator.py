@@ -18,9 +18,8 @@ k_e is the stiffness of a vertex in the middle of two equilateral triangles. The
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
@@ -31,7 +30,7 @@ from ..certificate.measures import MEASURES, largest_pull
 from ..certificate.tables import names_of
 from ..forces.functional import energy_and_gradient
 from ..meshing.sizes import limit_growth, triangles_for
-from ..stability.equilibrium import Equilibrium, SecondVariation
+from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from ..surface import Surface
@@ -68,10 +67,9 @@ def error_shares(coarse: Surface, fine: Surface, goals: Mapping[Goal, float]) ->
     >>> len(shares) == cap.m, bool(shares.min() > 0.02 * shares.max())
     (True, True)
     """
-    here = _FineMesh.of(coarse, fine)
     total = np.zeros(len(coarse.topology.edges))
-    for goal, accuracy in goals.items():
-        total += here.shares(goal) / accuracy
+    for shares, accuracy in zip(_edge_shares(coarse, fine, goals), goals.values(), strict=True):
+        total += shares / accuracy
     edge_of_face = coarse.topology.edge_of_face
     faces = np.bincount(edge_of_face.ravel(), minlength=len(total))
     return np.asarray((total / np.maximum(faces, 1))[edge_of_face].sum(axis=1))
@@ -109,57 +107,38 @@ def size_field(surface: Surface, shares: Floats, triangles: float, growth: float
     return limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
 
 
-@dataclass(frozen=True, eq=False)
-class _FineMesh:
-    """The fine surface at rest, its second variation, and the interpolation errors of the coarse one."""
+def _edge_shares(coarse: Surface, fine: Surface, goals: Iterable[Goal]) -> Iterator[Floats]:
+    """(e,) the share of each coarse edge in the error of each quantity."""
+    at, system = Equilibrium.of(fine), None
+    with suppress(SingularMatrix):  # without duals all have the shares of the energy
+        system = at.factorised()
+    tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
+    stiffness = np.bincount(coarse.topology.edge_of_face.ravel(), tension, len(coarse.topology.edges))
+    held = np.where(fine.fixed[:, None], _interpolation_error(coarse, at.X), 0.0)
 
-    coarse: Surface
-    at: Equilibrium
-    system: SecondVariation | None  # without it the duals are unknown: all have the shares of the energy
-    stiffness: Floats  # (e,) k of the coarse edges
-    free: Floats  # (n,3) interpolation errors in the motion space
-    held: Floats  # (n,3) and at held vertices
+    def missing(field: Floats) -> Floats:
+        """(e,) the size of the interpolation error of a field of motions, in the motion space."""
+        error = at.space.project(_interpolation_error(coarse, field))
+        return np.asarray(np.linalg.norm(error[coarse.n :], axis=1))
 
-    @classmethod
-    def of(cls, coarse: Surface, fine: Surface) -> _FineMesh:
-        at, system = Equilibrium.of(fine), None
-        with suppress(SingularMatrix):
-            system = at.factorised()
-        tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
-        edge_of_face = coarse.topology.edge_of_face.ravel()
-        k: Floats = np.bincount(edge_of_face, tension, len(coarse.topology.edges)).astype(float)
-        missing = _interpolation_error(coarse, at.X)
-        held = np.where(fine.fixed[:, None], missing, 0.0)
-        return cls(coarse, at, system, k, at.space.project(missing), held)
-
-    def shares(self, goal: Goal) -> Floats:
-        """(e,) the share of each coarse edge in the error of a quantity."""
-        (quantity, of), system, fine = goal, self.system, self.at.shape
-        free, mode = self._sizes(self.free), None
-        if system is not None and quantity == "lowest eigenvalue":
-            try:
-                mode = lowest(system, 1)[1][0]
-            except SingularMatrix:  # no mode is known; the shares of the energy will do
-                quantity = "energy"
-        if system is None or quantity == "energy":
-            at_held = self._at_held(self.at.gradient_with_reactions)
-            return np.asarray(0.5 * self.stiffness * free**2 + at_held)
-        slope = _slope(fine, quantity, of) if mode is None else _along(fine, mode, second=True)
-        dual = self.at.space.to_vectors(system.solve(self.at.space.to_coordinates(slope)))
-        shares = self.stiffness * free * self._missing(dual) + self._at_held(slope - _along(fine, dual))
-        return np.asarray(shares if mode is None else shares + self.stiffness * self._missing(mode) ** 2)
-
-    def _sizes(self, field: Floats) -> Floats:
-        """(e,) of a field (n,3) at the new vertices."""
-        return np.asarray(np.linalg.norm(field[self.coarse.n :], axis=1))
-
-    def _missing(self, field: Floats) -> Floats:
-        """(e,) size of the interpolation error of a field of motions, in the motion space."""
-        return self._sizes(self.at.space.project(_interpolation_error(self.coarse, field)))
-
-    def _at_held(self, force: Floats) -> Floats:
+    def at_held(force: Floats) -> Floats:
         """(e,) the work of a force (n,3) along the errors at held vertices."""
-        return np.asarray(np.abs(np.einsum("nd,nd->n", force, self.held))[self.coarse.n :])
+        return np.asarray(np.abs(np.einsum("nd,nd->n", force, held))[coarse.n :])
+
+    free = missing(at.X)
+    for quantity, of in goals:
+        modes = np.empty((0, 0, 3))
+        if system is not None and quantity == "lowest eigenvalue":
+            with suppress(SingularMatrix):  # no mode is known; the shares of the energy will do
+                modes = lowest(system, 1)[1]
+        unknown = quantity == "lowest eigenvalue" and not len(modes)
+        if system is None or quantity == "energy" or unknown:
+            yield 0.5 * stiffness * free**2 + at_held(at.gradient_with_reactions)
+            continue
+        slope = _along(at.shape, modes[0], second=True) if len(modes) else _slope(at.shape, quantity, of)
+        dual = at.space.to_vectors(system.solve(at.space.to_coordinates(slope)))
+        shares = stiffness * free * missing(dual) + at_held(slope - _along(at.shape, dual))
+        yield shares + sum(stiffness * missing(mode) ** 2 for mode in modes)
 
 
 def _interpolation_error(coarse: Surface, field: Floats) -> Floats:

@@ -13,9 +13,9 @@ from ..base.arrays import Floats
 from ..base.tolerances import FAILED
 from ..certificate import Certificate
 from ..certificate.balance import overload
+from ..certificate.diagnosis import worst_face
 from ..certificate.tables import names_of
 from ..forces.pinching import standing_part
-from ..meshing.quality import triangle_quality
 from ..solvers.result import Result, Status
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
@@ -59,13 +59,11 @@ def lost(start: Surface, result: Result) -> Finding:
     The place is that of the start: where the solver ends, a surface may be far away.
     """
     surface = result.surface
-    quality = triangle_quality(surface.vertices, surface.faces)
-    quality[standing_part(surface).walls.pinchable[surface.patch_of_face]] = np.inf
-    worst = int(quality.argmin())
+    worst, quality = worst_face(surface, standing_part(surface).walls.pinchable)
     if result.status in RUNNING_AWAY:
         what = f"{RUNNING_AWAY[result.status]}, most"
         vertices = np.linalg.norm(surface.vertices - start.vertices, axis=1).argmax(keepdims=True)
-    elif quality[worst] < FAILED:
+    elif quality < FAILED:
         what, vertices = "its triangles collapse", surface.faces[worst]
     else:
         left = np.linalg.norm(Equilibrium.of(surface).unbalanced, axis=1)

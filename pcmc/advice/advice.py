@@ -18,7 +18,6 @@ from ..certificate.certificate import Certificate
 from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
 from ..existence import solve
-from ..forces.pinching import standing_part
 from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
 from ..solvers.result import Result, Status
@@ -139,7 +138,7 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
     if certified and (plan is None or ended.design is None or ended.design.met):
         return []
     if plan is None or start is not given:
-        strained = strained_junction(start, standing_part(start).walls.pinchable)
+        strained = strained_junction(start)
         if strained is None or strained.remedy is None:
             return []
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
@@ -252,7 +251,7 @@ def _step(plan: Plan, result: Result) -> Plan:
         plan = _with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
         surface = plan.surface()
-        strained = strained_junction(surface, standing_part(surface).walls.pinchable)
+        strained = strained_junction(surface)
         if strained is None or strained.remedy is None:
             break
         name, tension, _ = strained.remedy

@@ -44,6 +44,11 @@ def kept_with_owner(compute: Callable[[Any], Result]) -> Callable[[Any], Result]
     return kept
 
 
+def hand_over(owner: Any, other: Any, *names: str) -> None:
+    """Give ``other`` the values of these names that ``owner`` keeps."""
+    vars(other).update({name: vars(owner)[name] for name in names if name in vars(owner)})
+
+
 def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
     """``cached_property`` for an array, which can then no longer be written to."""
 
@@ -52,6 +57,15 @@ def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
         return read_only(method(owner))
 
     return cached_property(computed)
+
+
+def format_rows(template: str, *columns: npt.NDArray[Any]) -> str:
+    """The template filled with each row of the columns; ``%r`` writes a float exactly.
+
+    >>> format_rows("v %r %d\\n", np.array([0.1, 2.0]), np.array([3, 4]))
+    'v 0.1 3\\nv 2.0 4\\n'
+    """
+    return "".join(template % row for row in zip(*(column.tolist() for column in columns), strict=True))
 
 
 def plain(value: Any) -> Any:

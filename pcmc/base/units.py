@@ -37,18 +37,10 @@ FORCES = tuple(NEWTONS)  # of a project
 KILOGRAMS = {"kg": 1.0, "t": 1e3, "slug": NEWTONS["lbf"] / 0.3048}
 LARGEST, SMALLEST = 1000.0, 1.0  # metres: the size of a plan is between, as a rule
 
-DERIVED = {
-    "area": "{length}²",
-    "volume": "{length}³",
-    "curvature": "1/{length}",
-    "tension": "{force}/{length}",  # and reactions per length
-    "pressure": "{force}/{length}²",
-    "eigenvalue": "{force}/{length}³",  # force per displacement and area
-    "energy": "{force}·{length}",
-    "angle": "°",
-    "times": "times",  # of a factor
-}
-"""The unit of each kind of quantity."""
+
+def _derived(template: str) -> property:
+    """A unit of ``Units`` that follows from those of length and force."""
+    return property(lambda u: template.format(length=u.length or "length", force=u.force or "force"))
 
 
 @dataclass(frozen=True)
@@ -78,6 +70,15 @@ class Units:
 
     length: str = ""
     force: str = ""
+    area = _derived("{length}²")
+    volume = _derived("{length}³")
+    curvature = _derived("1/{length}")
+    tension = _derived("{force}/{length}")  # and reactions per length
+    pressure = _derived("{force}/{length}²")
+    eigenvalue = _derived("{force}/{length}³")  # force per displacement and area
+    energy = _derived("{force}·{length}")
+    angle = _derived("°")
+    times = _derived("times")  # of a factor
 
     def __post_init__(self) -> None:
         if self.length:
@@ -91,12 +92,6 @@ class Units:
     def __bool__(self) -> bool:
         """Whether there is a unit of length."""
         return bool(self.length)
-
-    def __getattr__(self, kind: str) -> str:
-        """The unit of a kind of quantity; see ``DERIVED``."""
-        if kind not in DERIVED:
-            raise AttributeError(f"Units have no {kind!r}")
-        return DERIVED[kind].format(length=self.length or "length", force=self.force or "force")
 
     def behind(self, kind: str) -> str:
         """What follows a number: a space and the unit of its kind; nothing if no unit is given.

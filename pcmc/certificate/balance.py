@@ -9,6 +9,7 @@ import numpy as np
 from ..base.arrays import Bools
 from ..base.tolerances import EXCESS, HARDLY, ON, PARALLEL
 from ..forces.cables import cable_pulls
+from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.supports import common_point, uncancelled_pressures
@@ -159,17 +160,17 @@ def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + EXCESS) 
     return None
 
 
-def strained_junction(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
+def strained_junction(surface: Surface) -> UnbalancedJunction | None:
     """A junction as in ``unbalanced`` whose tensions balance only with sheets nearly on each other.
 
     At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow.
     """
-    return unbalanced(surface, pinchable, HARDLY)
+    return unbalanced(surface, standing_part(surface).walls.pinchable, HARDLY)
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     """Names a ``strained_junction``; or empty."""
-    strained = strained_junction(surface, pinchable)
+    strained = unbalanced(surface, pinchable, HARDLY)
     if strained is None:
         return ""
     others = " + ".join(f"{tension:g}" for tension in strained.others)

@@ -13,6 +13,7 @@ left in the limit. Forces at points are those of cables that end, and of points 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -216,33 +217,43 @@ def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
     n is the outward co-normal; force/length. Along a junction of smooth surfaces at rest (7) without a cable
     it is zero, of triangles only in the limit.
     """
-    at, face, corners = sides_at(surface, ends)
-    c, a, b = surface.vertices[corners].transpose(1, 0, 2)
-    along = b - a
-    length = np.linalg.norm(along, axis=1)
-    along /= np.where(length > 0.0, length, 1.0)[:, None]
-    out = a - c
-    out -= np.einsum("ij,ij->i", out, along)[:, None] * along
-    length = np.linalg.norm(out, axis=1)
-    k, height = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
-    pull = (surface.tensions[k] + surface.weights[k] * height) / np.where(length > 0.0, length, 1.0)
-    total = np.zeros((len(ends), 3))
-    np.add.at(total, at, pull[:, None] * out)
+    side, total = Sides.at(surface, ends), np.zeros((len(ends), 3))
+    np.add.at(total, side.edge, side.tension / np.where(side.height > 0.0, side.height, 1.0) * side.out)
     return total
 
 
-def sides_at(surface: Surface, ends: Ints) -> tuple[Ints, Ints, Ints]:
-    """The sides of triangles at edges (k,2): which of these, the triangle, and its corners, (s,) and (s,3).
+class Sides(NamedTuple):
+    """The sides of triangles at some edges. Each goes from a to b, and has the corner c opposite."""
 
-    The corner opposite the side comes first.
-    """
-    numbers = surface.topology.edge_numbers(ends)
-    row = np.full(len(surface.topology.edges), -1)
-    row[numbers[numbers >= 0]] = np.flatnonzero(numbers >= 0)
-    at = row[surface.topology.edge_of_face]
-    face, corner = np.nonzero(at >= 0)
-    corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
-    return at[face, corner], face, corners
+    edge: Ints  # (s,) which of the edges
+    patch: Ints  # (s,)
+    corners: Ints  # (s,3) c, a and b
+    length: Floats  # (s,1)
+    tangent: Floats  # (s,3) from a to b
+    foot: Floats  # (s,1) how far from a to b the foot of c is, length
+    out: Floats  # (s,3) from c to its foot; outward, along the co-normal
+    height: Floats  # (s,1) the length of ``out``
+    z: Floats  # (s,1) height over Π of the middle
+    tension: Floats  # (s,1) α + w z there
+
+    @classmethod
+    def at(cls, surface: Surface, ends: Ints) -> Sides:
+        """Those at edges that are given by their ends (k,2); none where there is no edge."""
+        numbers = surface.topology.edge_numbers(ends)
+        row = np.full(len(surface.topology.edges), -1)
+        row[numbers[numbers >= 0]] = np.flatnonzero(numbers >= 0)
+        edge = row[surface.topology.edge_of_face]
+        face, corner = np.nonzero(edge >= 0)
+        corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
+        c, a, b = surface.vertices[corners].transpose(1, 0, 2)
+        length = np.linalg.norm(b - a, axis=1)[:, None]
+        tangent = (b - a) / np.where(length > 0.0, length, 1.0)
+        foot = np.einsum("ij,ij->i", c - a, tangent)[:, None]
+        out = a - c + foot * tangent
+        height = np.linalg.norm(out, axis=1)[:, None]
+        k, z = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
+        tension = (surface.tensions[k] + surface.weights[k] * z)[:, None]
+        return cls(edge[face, corner], k, corners, length, tangent, foot, out, height, z[:, None], tension)
 
 
 def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:

@@ -20,9 +20,10 @@ from ..forces.parameters import gradient_by
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, segment_lengths
+from ..surface.parts import Cable
 from ..surface.values import part_index
 from .cables import chord
-from .forces import Forces, sides_at
+from .forces import Forces, Sides
 from .tables import lean_sines
 
 TIE = 1e-6  # of a maximum's size: a change of parameters as small, relative, may bring another one to the top
@@ -171,27 +172,17 @@ def largest_pull(acting: Forces, edges: Bools) -> Measurement:
     up, patches = np.array(surface.plane.normal), len(surface.patches)
 
     def branches(near: Ints) -> Branches:
-        ends = acting.surface.topology.edges[numbers[near]]
-        at, face, corners = sides_at(surface, ends)
-        c, a, b = surface.vertices[corners].transpose(1, 0, 2)
-        k, pull = surface.patch_of_face[face], (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][at]
-        length = np.linalg.norm(b - a, axis=1)[:, None]
-        t = (b - a) / length
-        foot = _dot(c - a, t)
-        out = a - c + foot * t
-        h = np.linalg.norm(out, axis=1)[:, None]
-        n, z = out / h, surface.plane.height(0.5 * (a + b))
-        weight = surface.weights[k]
-        tension = (surface.tensions[k] + weight * z)[:, None]
-        turn, tilt = tension * _dot(pull, t) / length * n, np.cross(t, n)
-        tilt = tension * _dot(pull, tilt) / h * tilt
-        rise = 0.5 * weight[:, None] * _dot(pull, n) * up
-        foot = foot / length
+        s = Sides.at(surface, acting.surface.topology.edges[numbers[near]])
+        pull = (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][s.edge]
+        normal = s.out / s.height
+        turn, tilt = s.tension * _dot(pull, s.tangent) / s.length * normal, np.cross(s.tangent, normal)
+        tilt = s.tension * _dot(pull, tilt) / s.height * tilt
+        rise, foot = 0.5 * surface.weights[s.patch, None] * _dot(pull, normal) * up, s.foot / s.length
         slopes = np.stack([-tilt, turn + (1.0 - foot) * tilt + rise, foot * tilt - turn + rise], axis=1)
-        sheet = Branches.of(corners, slopes, surface.n).by_position
-        together = csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(near), len(at)))
-        along = csr_array((_dot(pull, n)[:, 0], (np.arange(len(at)), k)), shape=(len(at), patches))
-        raised = csr_array(along.multiply(z[:, None]))
+        sheet, one = Branches.of(s.corners, slopes, surface.n).by_position, np.arange(len(pull))
+        together = csr_array((np.ones(len(pull)), (s.edge, one)), shape=(len(near), len(pull)))
+        along = csr_array((_dot(pull, normal)[:, 0], (one, s.patch)), shape=(len(pull), patches))
+        raised = csr_array(along.multiply(s.z))
         by = {kind: (together @ m).toarray() for kind, m in (("tensions", along), ("weights", raised))}
         return Branches(csr_array(together @ sheet), by)
 
@@ -256,30 +247,31 @@ def _sag(surface: Surface, of: str) -> Measurement:
 
 def _length(surface: Surface, of: str) -> Measurement:
     """The length L of a cable."""
-    one = np.zeros(len(surface.cables))
-    one[surface.cable_index(of)] = 1.0
-    length = segment_lengths(surface.vertices, surface.cables[surface.cable_index(of)].edges).sum()
+    cable, one = _chosen_cable(surface, of)
+    length = segment_lengths(surface.vertices, cable.edges).sum()
     return Measurement(float(length), gradient_by(surface, {"cables": one}))
 
 
 def _force(surface: Surface, of: str) -> Measurement:
     """τ, the force in a cable: the same all along it."""
-    if surface.cables[surface.cable_index(of)].weight:
+    cable, one = _chosen_cable(surface, of)
+    if cable.weight:
         message = f"force of {of}: with a weight it differs along the cable; it has no single value"
         raise OptionError(message, what="of", found=of)
-    one = np.zeros(len(surface.cables))
-    one[surface.cable_index(of)] = 1.0
-    tension = surface.cables[surface.cable_index(of)].tension
-    return Measurement(tension, np.zeros_like(surface.vertices), {"cables": one})
+    return Measurement(cable.tension, np.zeros_like(surface.vertices), {"cables": one})
+
+
+def _chosen_cable(surface: Surface, of: str) -> tuple[Cable, Floats]:
+    """A cable, and 1 for it, 0 for the others (cables,)."""
+    index = surface.cable_index(of)
+    return surface.cables[index], np.eye(len(surface.cables))[index]
 
 
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:
     """(k,) 1 for the chosen patches, 0 for the others."""
     if of is None:
         return surface.roof.astype(float)
-    one = np.zeros(len(surface.patches))
-    one[surface.patch_index(of)] = 1.0
-    return one
+    return np.eye(len(surface.patches))[surface.patch_index(of)]
 
 
 def _faces_of(surface: Surface, of: str | None) -> Bools:

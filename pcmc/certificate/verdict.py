@@ -17,8 +17,7 @@ from ..stability.modes import Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
-from .diagnosis import describe_saddle, held_wall_down, where_collapsed
-from .neck import Neck, pinched_neck
+from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular

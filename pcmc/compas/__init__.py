@@ -1,8 +1,7 @@
 """Surfaces as COMPAS meshes, for Rhino, Grasshopper and Blender.
 
-Gives ``to_meshes``, ``from_meshes``, functions of meshes and plain data, and the service that offers them to
-``compas.rpc.Proxy`` (``python -m pcmc.compas``). May import ``existence``, ``certificate``, ``io`` and the
-rooms below them.
+Gives ``to_meshes``, ``from_meshes``, functions of meshes and plain data, and their service for
+``compas.rpc.Proxy`` (``python -m pcmc.compas``). May import ``certificate``, ``io`` and those below them.
 """
 
 from .meshes import from_meshes, to_meshes

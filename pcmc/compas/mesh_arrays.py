@@ -13,8 +13,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra, OptionError, SurfaceError, unknown
-from ..io.mesh_data import FIXED, FREE, SLIDING, coincident
+from ..base.errors import FileError, MissingExtra, SurfaceError
+from ..io.mesh_data import FIXED, FREE, SLIDING, coincident, given_values
 from ..io.polygons import triangulate
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room
 
@@ -54,19 +54,10 @@ def named_meshes(meshes: Any) -> dict[str, Any]:
 
 def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> list[Patch]:
     """A patch per mesh, from its attributes or the values given in their place."""
-    given: dict[str, dict[str, Any]] = {}
-    for key, values in (("tension", tensions), ("pressure", pressures)):
-        if values is None:
-            continue
-        by_name = values if isinstance(values, Mapping) else dict.fromkeys(named, values)
-        for name, value in by_name.items():
-            if name not in named:
-                raise OptionError(unknown("mesh", name, named), what=f"{key}s", where=name, found=name)
-            given.setdefault(name, {})[key] = value
-    patches = []
+    given, patches = given_values("mesh", named, tension=tensions, pressure=pressures), []
+    known = {f.name: f.default for f in fields(Patch) if f.name != "name"}
     for name, mesh in named.items():
-        known = {f.name: f.default for f in fields(Patch) if f.name != "name"}
-        values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given.get(name, {})
+        values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given[name]
         for key in [key for key, default in known.items() if default is MISSING and key not in values]:
             refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
         patches.append(Patch(name, **values))
@@ -81,9 +72,7 @@ class WholeMesh(NamedTuple):
     planes: tuple[Plane, ...] = ()  # besides Π, that vertices slide on
     rooms: tuple[Room, ...] = ()
     cables: tuple[str, ...] = ()  # their names in order
-    curves: tuple[
-        HeldCurve, ...
-    ] = ()  # that held vertices were drawn on; their vertices are keys of the meshes
+    curves: tuple[HeldCurve, ...] = ()  # that held vertices were drawn on, by their keys
 
 
 def read_whole(named: Mapping[str, Any]) -> WholeMesh:
@@ -112,13 +101,10 @@ def read_whole(named: Mapping[str, Any]) -> WholeMesh:
             tuple(map(HeldCurve.from_plain, values.get("curves", ()))),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({reason}); without it Π is z = 0")
+        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({_reason(error)}); without it Π is z = 0")
 
 
 class Vertex(NamedTuple):
-    """A vertex of a mesh that a face uses."""
-
     mesh: str
     key: int
     point: list[float]
@@ -168,9 +154,8 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
 
 
 def shared_vertices(vertices: Sequence[Vertex], weld: bool) -> tuple[Ints, Ints]:
-    """Which vertices to keep, and the index among them of every vertex.
-
-    Vertices of one key are one, and must lie at one place; with ``weld``, vertices at one place are one.
+    """Which vertices to keep, and the index among them of every vertex: those of one key are one, and must
+    lie at one place; with ``weld``, those at one place are one.
     """
     X = np.array([vertex.point for vertex in vertices])
     if weld:
@@ -209,9 +194,8 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
 
 
 def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) -> tuple[Cable, ...]:
-    """A cable for each value of the edges' attribute ``cable``; their attribute ``tension`` is its force.
-
-    ``names`` lists cables that come first.
+    """A cable for each value of the edges' attribute ``cable``, those in ``names`` first; their attribute
+    ``tension`` is its force.
     """
     edges: dict[str, set[tuple[int, int]]] = {name: set() for name in names}
     tensions: dict[str, float] = {}
@@ -233,16 +217,18 @@ def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) 
 
 
 def refuse(what: str, name: str, problem: str) -> NoReturn:
-    """Raise the error about a mesh."""
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
 
 
 def damaged_mesh(error: Exception) -> SurfaceError:
     """The error for a mesh that is wrong in a way that none checks."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-    return SurfaceError(f"meshes: one is damaged ({reason}); check it with mesh.is_valid()", what="meshes")
+    text = f"meshes: one is damaged ({_reason(error)}); check it with mesh.is_valid()"
+    return SurfaceError(text, what="meshes")
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:120]
 
 
 def _is_index(value: Any) -> bool:
-    """Whether it is a whole number ≥ 0."""
     return isinstance(value, int | np.integer) and int(value) >= 0

@@ -1,7 +1,5 @@
-"""Surface to COMPAS meshes, one per patch, and back.
-
-The names of attributes are those of COMPAS packages where they have one: ``is_support``, and ``rx``, ``ry``,
-``rz`` for reactions.
+"""Surface to COMPAS meshes, one per patch, and back; names of attributes are those of COMPAS packages where
+they have one: ``is_support``, and ``rx``, ``ry``, ``rz`` for reactions.
 """
 
 from __future__ import annotations
@@ -13,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from .. import mean_curvature
 from ..base import validate
 from ..base.errors import FileWarning, PcmcError, SurfaceError
-from ..certificate.forces import reactions
-from ..forces.curvature import mean_curvature
-from ..forces.pinching import standing_part
+from ..certificate.forces import Forces
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
@@ -35,14 +32,12 @@ def to_meshes(surface: Surface) -> list[Any]:
     """A ``compas.datastructures.Mesh`` per patch. Patches share the keys of their common vertices.
 
     The key of a vertex is its index in the surface, that of a face likewise, so ``from_meshes`` restores the
-    surface to the last bit.
-
-    They have the names of their patches. ``mesh.attributes`` are ``tension`` α (force/length), ``pressure`` p
-    (force/area) with ``weight`` and ``snow``, ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and
-    the lines and circles that vertices slide along. Vertices have ``is_support`` (fixed), ``is_sliding`` (on
-    Π), ``guide`` (the number of the line or circle in ``attributes["pcmc"]["guides"]``, or None),
-    ``mean_curvature`` H (1/length; None on junctions and boundaries), and ``rx``, ``ry``, ``rz``, the force
-    of the support on the surface.
+    surface to the last bit. ``mesh.attributes`` are ``tension`` α (force/length), ``pressure`` p (force/area)
+    with ``weight`` and ``snow``, ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and the lines
+    and circles that vertices slide along. Vertices have ``is_support`` (fixed), ``is_sliding`` (on Π),
+    ``guide`` (the number of the line or circle in ``attributes["pcmc"]["guides"]``, or None),
+    ``mean_curvature`` H (1/length; None on junctions and boundaries), and the force of the support, ``rx``,
+    ``ry``, ``rz``.
 
     Raises
     ------
@@ -55,6 +50,8 @@ def to_meshes(surface: Surface) -> list[Any]:
     >>> mesh, = to_meshes(square)
     >>> mesh.name, mesh.attributes["tension"], mesh.vertex_attribute(3, "is_support")
     ('floor', 2.0, True)
+    >>> from_meshes([mesh]).patches
+    (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
     mesh_class = mesh_arrays.mesh_class()
     expect_surface(surface)
@@ -107,11 +104,10 @@ def from_meshes(
 
     Parameters
     ----------
-    meshes : a Mesh, or a list of them. A mesh's name is the patch's; a mesh must have the attribute
-        ``tension``, and may have ``pressure`` (otherwise 1), ``weight``, ``snow`` and ``wall``. A vertex is
-        fixed if one of ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if
-        ``is_sliding`` is. If no mesh has any of these attributes, the boundary is fixed. Polygons are cut
-        into triangles.
+    meshes : a Mesh, or a list of them. A mesh's name is the patch's; it must have the attribute ``tension``,
+        and may have ``pressure`` (otherwise 1), ``weight``, ``snow`` and ``wall``. A vertex is fixed if one
+        of ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if ``is_sliding`` is. If no
+        mesh has any of these attributes, the boundary is fixed. Polygons are cut into triangles.
     tensions, pressures : by mesh name, or one number for all, in place of the attributes.
     weld : join vertices at one place, for meshes that do not share keys. The keys then have no meaning.
 
@@ -125,12 +121,6 @@ def from_meshes(
     SurfaceError : for anything that is not such a mesh, or if the meshes form no surface; ``where`` is the
         mesh's name, or the number of the vertex or face in the surface.
     MissingExtra : without COMPAS.
-
-    >>> from pcmc import Patch, Surface
-    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
-    ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
-    >>> from_meshes(to_meshes(square)).patches
-    (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
     named = mesh_arrays.named_meshes(meshes)
     validate.flag("weld", weld)
@@ -156,12 +146,11 @@ def _surface(
     X, n = np.array([vertex.point for vertex in vertices])[keep], len(keep)
     places: dict[str, dict[int, int]] = {name: {} for name in named}
     support, guide = np.zeros(n, dtype=np.int8), np.full(n, -1)
-    on_planes = [np.zeros(n, dtype=bool) for _ in whole.planes]
+    on_planes = np.zeros((len(whole.planes), n), dtype=bool)
     for vertex, k in zip(vertices, place.tolist(), strict=True):
         places[vertex.mesh][vertex.key] = k
         support[k], guide[k] = max(support[k], vertex.support), max(guide[k], vertex.guide)
-        for number in vertex.planes:
-            on_planes[number][k] = True
+        on_planes[list(vertex.planes), k] = True
     F, patch, notes = mesh_arrays.read_faces(named, X, places)
     if unused:
         notes = (*notes, f"{unused} vertices that no face uses were left out")
@@ -199,22 +188,19 @@ def _plain(value: Any) -> dict[str, Any]:
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
-    support, standing = support_of(surface, planes=True), standing_part(surface).surface
+    support, acting = support_of(surface, planes=True), Forces.of(surface)
     guide = np.full(surface.n, None)
     for number, (_, along) in enumerate(surface.given_supports.on_line):
         guide[along] = number
-    planes: list[list[int]] = [[] for _ in range(surface.n)]
-    for number, (_, mask) in enumerate(surface.on_planes):
-        for vertex in np.flatnonzero(mask):
-            planes[vertex].append(number)
-    curvature = mean_curvature(standing, "variational").tolist()
+    on_planes = np.array([mask for _, mask in surface.on_planes]).reshape(-1, surface.n)
+    curvature = mean_curvature(acting.standing, "variational").tolist()
     columns: dict[str, list[Any]] = {
         **dict(zip("xyz", surface.vertices.T.tolist(), strict=True)),
         "is_support": (support == FIXED).tolist(),
         SLIDES: (support == SLIDING).tolist(),
         GUIDE: guide.tolist(),
-        PLANES: planes,
+        PLANES: [np.flatnonzero(column).tolist() for column in on_planes.T],
         "mean_curvature": [H if H == H else None for H in curvature],  # JSON has no NaN
-        **dict(zip(("rx", "ry", "rz"), reactions(standing).T.tolist(), strict=True)),
+        **dict(zip(("rx", "ry", "rz"), acting.reactions.T.tolist(), strict=True)),
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

@@ -1,9 +1,7 @@
 """The service that ``compas.rpc.Proxy`` starts: four functions, for its owner alone.
 
-The service of COMPAS itself imports and calls any function for everyone who reaches its port. This one
-listens on the loopback, asks for the secret in its settings, refuses web pages, and reads and writes one
-folder.
-``python -m pcmc.compas --folder FOLDER`` writes the settings, with the arguments for ``Proxy``.
+The service of COMPAS itself calls any function for everyone who reaches its port. This one listens on the
+loopback, asks for the secret in its settings, refuses web pages, and reads and writes one folder.
 """
 
 from __future__ import annotations
@@ -75,7 +73,7 @@ def settings_path() -> Path:
 def set_up(folder: str | os.PathLike[str]) -> Path:
     """Let the service read and write a folder, made if it is missing; return the file of the settings.
 
-    They have a new secret, and the port that they had. A service that runs goes on with the new settings.
+    They have a new secret, and the port that they had. A service that runs goes on with them.
     """
     place = Path(os.path.realpath(Path(folder).expanduser()))
     try:
@@ -181,9 +179,8 @@ class CallHandler(SimpleXMLRPCRequestHandler):
 
 
 class LoopbackServer(ThreadingMixIn, Server):
-    """The server on the loopback; a silent connection does not keep others from being answered.
-
-    It calls the functions of the service by name, one at a time, with arguments as COMPAS encodes them.
+    """The server on the loopback, a thread for each connection. It calls the functions of the service by
+    name, one at a time, with arguments as COMPAS encodes them.
     """
 
     daemon_threads = True
@@ -213,7 +210,6 @@ class LoopbackServer(ThreadingMixIn, Server):
             return json.dumps(answer, cls=DataEncoder)
 
     def _call(self, name: str, text: str = "") -> Any:
-        """Call a function with the arguments in a text."""
         if name not in self._offered:
             raise OptionError(unknown("function", name, self._offered), what="function", found=name)
         given, function = json.loads(text, cls=MeshDecoder), self._offered[name]
@@ -228,7 +224,6 @@ class MeshDecoder(DataDecoder):
     """Decodes meshes. Any other object stays a dict: COMPAS would import the module that it names."""
 
     def object_hook(self, o: dict[str, Any]) -> Any:
-        """The mesh that a dict describes, or the dict."""
         if MESH not in [o.get("dtype"), *(o.get("inheritance") or ())]:
             return o
         try:

@@ -7,9 +7,9 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
-from .. import certificate, existence, io
+import pcmc
+
 from ..base.arrays import plain
-from ..certificate import Certificate
 from .meshes import from_meshes, to_meshes
 
 Values = Mapping[str, float] | float | None
@@ -20,9 +20,9 @@ def solve(
 ) -> dict[str, Any]:
     """Solve the surface of COMPAS meshes.
 
-    Options are those of ``pcmc.solve``; over RPC plain data, such as ``method="lbfgs"``. The answer has the
-    ``meshes`` of the surface reached, ``converged``, ``status`` (the name of the Status), ``message``,
-    ``energy``, ``iterations``, ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
+    Options are those of ``pcmc.solve``, over RPC plain data. The answer has the ``meshes`` reached,
+    ``converged``, ``status`` (the name of the Status), ``message``, ``energy``, ``iterations``,
+    ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.1]]
@@ -35,7 +35,7 @@ def solve(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         start = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
-        result = existence.solve(start, **options)
+        result = pcmc.solve(start, **options)
         return {
             "meshes": to_meshes(result.surface),
             "converged": result.converged,
@@ -60,22 +60,21 @@ def certify(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         surface = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
-        values = _plain_certificate(certificate.certify(surface, **options))
+        values = _plain_certificate(pcmc.certify(surface, **options))
     return {**values, "warnings": [str(one.message) for one in caught]}
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
     """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``."""
-    return to_meshes(io.read(path, **options))
+    return to_meshes(pcmc.read(path, **options))
 
 
 def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:
     """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``."""
-    io.write(path, from_meshes(meshes, weld=weld), **options)
+    pcmc.write(path, from_meshes(meshes, weld=weld), **options)
 
 
-def _plain_certificate(found: Certificate) -> dict[str, Any]:
-    """Its findings as JSON has them."""
+def _plain_certificate(found: pcmc.Certificate) -> dict[str, Any]:
     tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries", "supports")}
     values = {"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}
     return {name: plain(value) for name, value in values.items()}

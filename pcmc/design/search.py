@@ -1,15 +1,15 @@
 """``meet``, the search for targets: least misfit by Gauss-Newton steps with exact sensitivities and bounds.
 
-The misfit is φ = ‖r‖, r the relative distances of the quantities from the values wanted; every point
-tried is a solve that starts from the last solution. Sheets are nearly linear in 1/α, so 1/α is the
-unknown for a patch under pressure.
+The misfit is φ = ‖r‖, r the relative distances of the quantities from the values wanted; every point tried is
+a solve from the last solution. Sheets are nearly linear in 1/α, the unknown for a patch under pressure.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,10 +23,9 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..certificate.balance import coarseness, overload
 from ..certificate.measures import vertices_up
-from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from .outcome import Design, DesignStatus, NoStart
 from .sensitivity import slopes
 from .steps import StepPlan, Trial
@@ -43,7 +42,6 @@ INFLATION = 4.0  # of a solve, which starts near its solution: a surface that gr
 ITERATIONS = 60  # of a solve, for the same reason
 SMALL_CHANGE = 0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
 ROUNDING = 1e-12  # of an unknown's size: a bound that is nearer is reached
-OVERLOADED = "overloaded"  # in place of a solve's status where none was tried
 
 
 def meet(
@@ -93,8 +91,7 @@ def meet(
     >>> design.met, round(design.surface.patches[0].tension, 6)
     (True, 0.555556)
     """
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     aims, parameters = as_targets(targets), as_parameters(vary)
     for target in aims:
         if not target.limits:
@@ -106,46 +103,52 @@ def meet(
         validate.refuse("callback", callback, "a function of a row")
     validate.positive("tolerance", tolerance)
     validate.integer("solves", solves, least=1)
-    return Search(surface, aims, parameters, tolerance, solves, callback, options).run()
+    given = np.array([p.value(surface) for p in parameters])
+    limits = np.array([p.bounds(surface) for p in parameters], dtype=float)
+    reciprocal = np.array([p.tension_under_pressure(surface) for p in parameters])
+    scale = np.array([t.scale(surface) for t in aims])
+    options = {"inflation": INFLATION, "iterations": ITERATIONS, **options}
+    known = given, limits, reciprocal, scale
+    return Search(surface, aims, parameters, *known, tolerance, solves, callback, options).run()
 
 
+@dataclass(frozen=True, eq=False)
 class Search:
-    """The state of a search. The unknowns x are tensions, reciprocal tensions, or pressures."""
+    """A search, and the points that it has tried.
 
-    def __init__(
-        self,
-        surface: Surface,
-        targets: list[Target],
-        parameters: list[Parameter],
-        tolerance: float,
-        max_solves: int,
-        callback: Callable[[pd.Series], object] | None,
-        options: dict[str, Any],
-    ) -> None:
-        self.surface, self.targets, self.parameters = surface, targets, parameters
-        self.tolerance, self.max_solves, self.callback = tolerance, max_solves, callback
-        self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **options}
-        self.given = np.array([p.value(surface) for p in parameters])
-        self.limits = np.array([p.bounds(surface) for p in parameters], dtype=float)
-        self.reciprocal = np.array([p.tension_under_pressure(surface) for p in parameters])
-        self.bounds = np.sort(self.converted(self.limits.T), axis=0)
-        self.metric = _metric(parameters, self.reciprocal)
-        self.scale = np.array([t.scale(surface) for t in targets])
-        self.trust = 1.0  # longest step, as a part of the unknowns' sizes
-        self.solves = 0
-        self.instead: dict[int, Target] = {}  # of targets, by their numbers: see ``aimed``
-        self.best: Trial | None = None
-        self.rows: list[dict[str, Any]] = []
-        self.failed: Result | Overload | None = None  # the last point without an equilibrium
+    The unknowns x (p,) are tensions, reciprocal tensions, or pressures.
+    """
+
+    surface: Surface
+    targets: list[Target]
+    parameters: list[Parameter]
+    given: Floats  # (p,) values of the parameters
+    limits: Floats  # (p,2) their bounds
+    reciprocal: Bools  # (p,) the tensions of patches under pressure, whose reciprocals are the unknowns
+    scale: Floats  # (targets,) what misfits are divided by
+    tolerance: float
+    most_solves: int
+    callback: Callable[[pd.Series], object] | None
+    options: dict[str, Any]
+    tried: list[Trial] = field(default_factory=list)
+
+    @cached_property
+    def bounds(self) -> Floats:
+        """(2,p) the lowest and highest unknowns."""
+        return np.sort(self.converted(self.limits.T), axis=0)
+
+    @property
+    def solves(self) -> int:
+        """How many solves there were, overloaded points left out."""
+        return sum(isinstance(trial.result, Result) for trial in self.tried)
 
     @property
     def failure(self) -> str:
-        """Why the last point that failed has no equilibrium, by its certificate; empty if none failed."""
-        failed = self.failed
-        return failed.certificate.detail if isinstance(failed, Result) else str(failed or "")
+        """Why the last point that failed has no equilibrium; empty if none failed."""
+        return next((trial.reason for trial in reversed(self.tried) if not trial.aims), "")
 
     def converted(self, values: Floats) -> Floats:
-        """Parameters to unknowns, or back: reciprocals of the tensions of patches under pressure."""
+        """Parameters to unknowns, or back."""
         safe = np.where(self.reciprocal, values, 1.0)
         return np.where(self.reciprocal, 1.0 / safe, values)
 
@@ -157,7 +160,7 @@ class Search:
         return values
 
     def sizes(self, here: Trial) -> Floats:
-        """(parameters,) the unit for changes of each unknown."""
+        """(p,) the unit for changes of each unknown."""
         return np.maximum(np.abs(here.x), 0.05 * (self.bounds[1] - self.bounds[0]))
 
     def ahead(self, here: Trial, step: Floats) -> Floats:
@@ -173,8 +176,10 @@ class Search:
             return self.search()
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
-            best = self.best or self.trial(self.first_unknowns, _unsolved(self.surface))
-            met = self.best is not None and self.is_met(best)
+            at_rest = [trial for trial in self.tried if trial.aims]
+            first = [] if at_rest else [self.trial(self.converted(self.given), _unsolved(self.surface))]
+            best = min(at_rest or first, key=lambda trial: trial.phi)
+            met = at_rest and self.is_met(best)
             return self.design(DesignStatus.MET if met else DesignStatus.STOPPED, best)
 
     def search(self) -> Design:
@@ -197,27 +202,22 @@ class Search:
                 return self.design(there, here)
             here, before = there, here
 
-    @property
-    def first_unknowns(self) -> Floats:
-        """The unknowns of the surface given, within their bounds."""
-        return np.clip(self.converted(self.given), *self.bounds)
-
     def first_trial(self) -> Trial:
         """The first solution; tensions are raised until there is one."""
-        x, first, reason = self.first_unknowns, None, ""
-        while self.solves < min(STARTS, self.max_solves):
-            first = self.solve_from(self.surface, x, {})
+        x, reason = np.clip(self.converted(self.given), *self.bounds), ""
+        while self.solves < min(STARTS, self.most_solves):
+            first = self.solve_from(self.surface, x)
+            if first is not None:
+                return first
             reason = reason or self.failure  # that of the tensions given says most
             stiffer = np.clip(np.where(self.reciprocal, x / STIFFEN, x), *self.bounds)
-            if first is not None or np.array_equal(stiffer, x):
+            if np.array_equal(stiffer, x):
                 break
             x = stiffer
-        if first is None:
-            hint = reason or "raise the tensions that do not vary, or the bounds of those that do"
-            raise NoStart(f"meet: no equilibrium was found to start from: {hint}", what="surface")
-        return first
+        hint = reason or "raise the tensions that do not vary, or the bounds of those that do"
+        raise NoStart(f"meet: no equilibrium was found to start from: {hint}", what="surface")
 
-    def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Trial | None:
+    def solve_from(self, start: Surface, x: Floats, **quality: float) -> Trial | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
 
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
@@ -228,20 +228,14 @@ class Search:
         surface = start.retensioned(**values)
         load = overload(surface)
         if load is not None and load.ratio > 1.0 + coarseness(surface):
-            self.failed = load
-            self.record(x, OVERLOADED)
+            self.record(Trial(x, load))
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
-        self.solves += 1
-        trial = self.trial(x, result) if result.converged else None
-        if trial is None:
-            self.failed = result
-        elif self.best is None or trial.phi < self.best.phi:
-            self.best = trial
-        self.record(x, result.status.name.lower(), trial)
+        trial = self.trial(x, result) if result.converged else Trial(x, result)
+        self.record(trial)
         if result.status is Status.STOPPED:
             raise StopIteration
-        return None if trial is None else self.with_jacobian(trial)
+        return self.with_jacobian(trial) if trial.aims else None
 
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""
@@ -262,7 +256,8 @@ class Search:
         if target.quantity == "apex" and wanted - value > self.tolerance * self.scale[number]:
             low, held = vertices_up(surface, target.of), surface.pinned | surface.on_ground
             if held[low[-1]] and not held[low].all():
-                aim = self.instead.setdefault(number, _middle(surface, low, held))
+                before = (trial.aims[number] for trial in self.tried if trial.aims)
+                aim = next((aim for aim in before if aim is not target), None) or _middle(surface, low, held)
                 return aim, measure(surface, aim).value
         return target, value
 
@@ -273,7 +268,7 @@ class Search:
     def with_jacobian(self, at: Trial) -> Trial | None:
         """The trial with its derivatives; None at a fold."""
         try:
-            found = np.array([own for own, *_ in slopes(at.result.surface, at.aims, self.parameters)])
+            found = np.array([own for own, *_ in slopes(at.surface, at.aims, self.parameters)])
         except SurfaceError:
             return None
         by_unknown = found * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
@@ -290,16 +285,12 @@ class Search:
         mu = DAMPING * float(np.linalg.norm(A, 2)) or 1.0
         low, high = (self.bounds - here.x) / size
         high = np.maximum(high, low + 1e-14)
-        least = lsq_linear(
-            np.vstack([A, mu * self.metric]),
-            np.append(-here.r, np.zeros(len(size))),
-            bounds=(low, high),
-            method="bvls",
-            tol=1e-14,
-        )
+        damped = np.vstack([A, mu * _metric(self.parameters, self.reciprocal)])
+        right = np.append(-here.r, np.zeros(len(size)))
+        least = lsq_linear(damped, right, bounds=(low, high), method="bvls", tol=1e-14)
         d = np.clip(least.x, low, high)
         misfit = float(np.linalg.norm(here.r + A @ d))
-        d *= min(1.0, self.trust / (np.abs(d).max() or 1.0))
+        d *= min(1.0, here.trust / (np.abs(d).max() or 1.0))
         return d * size, misfit
 
     def line_search(self, here: Trial, plan: StepPlan) -> Trial | DesignStatus:
@@ -307,29 +298,31 @@ class Search:
         t, longest = plan.first, float((np.abs(plan.step) / self.sizes(here)).max())
         reason = DesignStatus.SOLVES
         for attempt in range(TRIES):
-            if self.solves >= self.max_solves:
+            if self.solves >= self.most_solves:
                 return DesignStatus.SOLVES
             x = self.ahead(here, t * plan.step)
             small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
-            there = self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
+            there = self.solve_from(here.surface, x, **({"min_quality": 0.0} if small else {}))
             if there is not None and there.phi < here.phi:
-                self.trust = max(t * longest, min(1.0, 2.0 * t * longest) if not attempt else 0.0)
-                return there
+                more = min(1.0, 2.0 * t * longest) if not attempt else 0.0
+                return replace(there, trust=max(t * longest, more))
             reason = DesignStatus.AT_FOLD if there is None else DesignStatus.CONFLICT
             t *= 0.3 if there is None else 0.5
             if there is None and t * longest < LEAST_CHANGE:
                 break
         return reason
 
-    def record(self, x: Floats, status: str, trial: Trial | None = None) -> None:
-        """Add a row to the history, and call the callback with it."""
-        row = dict(zip((p.label for p in self.parameters), self.values(x).tolist(), strict=True))
-        if trial is not None:
-            row |= zip((t.label for t in self.targets), trial.quantities.tolist(), strict=True)
-        misfit = math.nan if trial is None else trial.phi
-        self.rows.append({**row, "status": status, "misfit": misfit})
+    def record(self, trial: Trial) -> None:
+        """Remember a point that was tried, and call the callback with its row."""
+        self.tried.append(trial)
         if self.callback is not None:
-            self.callback(pd.Series(self.rows[-1]))
+            self.callback(pd.Series(self.row(trial)))
+
+    def row(self, trial: Trial) -> dict[str, Any]:
+        """The row of the history for a point."""
+        values = dict(zip((p.label for p in self.parameters), self.values(trial.x).tolist(), strict=True))
+        found = zip((t.label for t in self.targets), trial.quantities.tolist(), strict=bool(trial.aims))
+        return {**values, **dict(found), "status": trial.status, "misfit": trial.phi}
 
     def design(self, status: DesignStatus, here: Trial, limit: Floats | None = None) -> Design:
         """The design that ends here; ``limit`` (targets,) if it is not the quantities here."""
@@ -347,18 +340,19 @@ class Search:
         }
         parameters = {
             "start": self.given,
-            "value": [p.value(here.result.surface) for p in self.parameters],
+            "value": [p.value(here.surface) for p in self.parameters],
             "dimension": [p.dimension for p in self.parameters],
             "low": self.limits[:, 0],
             "high": self.limits[:, 1],
         }
+        assert isinstance(here.result, Result)
         return Design(
             status,
             here.result,
             pd.DataFrame(targets, index=[t.label for t in self.targets]),
             pd.DataFrame(parameters, index=[p.label for p in self.parameters]),
             self.solves,
-            pd.DataFrame(self.rows),
+            pd.DataFrame([self.row(trial) for trial in self.tried]),
             self.failure if status is DesignStatus.AT_FOLD else "",
         )
 
@@ -382,10 +376,8 @@ def _middle(surface: Surface, vertices: Ints, held: Bools) -> Target:
 
 
 def _metric(parameters: Sequence[Parameter], reciprocal: Bools) -> Floats:
-    """(p,p) the norm by which the shortest of equal steps is chosen: all tensions change alike.
-
-    Sheets and walls that pull at a junction stay nearly in balance while their tensions keep their
-    ratios; if only some of them change, the junction moves away.
+    """(p,p) the norm by which the shortest of equal steps is chosen: all tensions change alike, as sheets and
+    walls at a junction stay nearly in balance while their tensions keep their ratios.
     """
     alike = np.array([p.kind in ("tension", "cable") for p in parameters]) * np.where(reciprocal, 1.0, -1.0)
     square = max(1.0, float(alike @ alike))

@@ -18,7 +18,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.tolerances import AT_REST
@@ -27,7 +26,7 @@ from ..forces.parameters import gradient_by
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from ..surface.values import rates_of
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
@@ -77,8 +76,7 @@ def sensitivities(
     apex of roof             -0.397748
     curvature of roof        -0.500000
     """
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     targets, parameters = as_targets(of), as_parameters(to)
     for parameter in parameters:
         parameter.check(surface)

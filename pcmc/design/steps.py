@@ -7,12 +7,15 @@ the reachable limit.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..base.arrays import Floats
+from ..certificate.proof import Overload
 from ..solvers.result import Result
+from ..surface import Surface
 from .targets import Target
 
 FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
@@ -21,18 +24,35 @@ FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A surface at rest: unknowns x, quantities, relative misfits r, φ = ‖r‖, and J = ∂r/∂x once it is known.
+    """A point that was tried; at rest with its quantities, relative misfits r, φ = ‖r‖, and J = ∂r/∂x.
 
     ``aims`` are the quantities whose misfits these are: the targets', but at a held top (``Search.aimed``).
     """
 
-    x: Floats
-    result: Result
-    quantities: Floats
-    r: Floats
-    phi: float
-    aims: list[Target]
-    jacobian: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    x: Floats  # the unknowns
+    result: Result | Overload  # a load beyond what the boundary carries, where no solve was tried
+    quantities: Floats = field(default_factory=lambda: np.empty(0))
+    r: Floats = field(default_factory=lambda: np.empty(0))
+    phi: float = math.nan
+    aims: list[Target] = field(default_factory=list)  # empty where no equilibrium was found
+    jacobian: Floats = field(default_factory=lambda: np.empty(0))
+    trust: float = 1.0  # longest step from here, as a part of the unknowns' sizes
+
+    @property
+    def surface(self) -> Surface:
+        """The surface of a solve."""
+        assert isinstance(self.result, Result)
+        return self.result.surface
+
+    @property
+    def status(self) -> str:
+        """How the solve ended, as in the history."""
+        return self.result.status.name.lower() if isinstance(self.result, Result) else "overloaded"
+
+    @property
+    def reason(self) -> str:
+        """Why there is no equilibrium."""
+        return self.result.certificate.detail if isinstance(self.result, Result) else str(self.result)
 
 
 @dataclass(frozen=True, eq=False)

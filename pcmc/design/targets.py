@@ -11,8 +11,7 @@ from ..base import validate
 from ..base.errors import OptionError
 from ..certificate.measures import MEASURES as MEASURED
 from ..certificate.measures import Measure, Measurement
-from ..certificate.parameters import KINDS, Parameter, as_list, as_parameters
-from ..certificate.quantities import dimension_of
+from ..certificate.quantities import KINDS, Parameter, as_list, as_parameters, dimension_of
 from ..surface import Surface
 
 __all__ = ["KINDS", "MEASURES", "Parameter", "Target", "as_parameters", "as_targets", "measure"]

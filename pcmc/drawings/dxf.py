@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.libraries import load_library
 from ..base.units import TABLE, length_factor
-from ..io.libraries import load_library
 from .sheet import LAYERS, SMALL, Sheet
 
 VERSION = "R2018"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..io.libraries import require
+from ..base.libraries import require
 from .sheet import LAYERS, Sheet, SheetLine, Text
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"

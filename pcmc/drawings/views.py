@@ -39,6 +39,7 @@ ELEVATIONS = {  # to the right, and towards the viewer
     "north, seen against y": ((-1.0, 0.0), (0.0, 1.0)),
     "west, seen along x": ((0.0, -1.0), (-1.0, 0.0)),
 }
+Lines = Sequence[SheetLine]
 
 
 @dataclass
@@ -75,7 +76,7 @@ def model_curves(surface: Surface) -> list[SheetLine]:
     ]
 
 
-def outline_places(curves: Sequence[SheetLine], axis: Sequence[float]) -> Floats:
+def outline_places(curves: Lines, axis: Sequence[float]) -> Floats:
     """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
     places = []
     for curve in curves:
@@ -100,16 +101,14 @@ def cut_lines(surface: Surface, point: Floats, normal: Floats) -> list[SheetLine
     ]
 
 
-def _seen(title: str, surface: Surface, curves: Sequence[SheetLine], axes: Floats, faces: Bools) -> DrawnView:
+def _seen(title: str, surface: Surface, curves: Lines, axes: Floats, faces: Bools) -> DrawnView:
     """The edges of faces and the curves on two axes (2,3)."""
     edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[faces])]
     lines = [SheetLine(pair, "PCMC-PANEL") for pair in surface.vertices[edges] @ axes.T]
     return DrawnView(title, lines + [curve._replace(points=curve.points @ axes.T) for curve in curves])
 
 
-def plan_view(
-    surface: Surface, curves: Sequence[SheetLine], points: Sequence[tuple[Floats, str, str]]
-) -> DrawnView:
+def plan_view(surface: Surface, curves: Lines, points: Sequence[tuple[Floats, str, str]]) -> DrawnView:
     """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
@@ -123,7 +122,7 @@ def plan_view(
     return view
 
 
-def elevations(surface: Surface, curves: Sequence[SheetLine]) -> list[DrawnView]:
+def elevations(surface: Surface, curves: Lines) -> list[DrawnView]:
     """From four sides: curves, the edges of the panels that face the viewer, and levels."""
     height, normal = surface.vertices[:, 2], area_vectors(surface.vertices[surface.faces])
     views = []
@@ -137,9 +136,7 @@ def elevations(surface: Surface, curves: Sequence[SheetLine]) -> list[DrawnView]
     return views
 
 
-def contours(
-    surface: Surface, curves: Sequence[SheetLine], cuts: Sequence[tuple[float, list[SheetLine]]]
-) -> DrawnView:
+def contours(surface: Surface, curves: Lines, cuts: Sequence[tuple[float, list[SheetLine]]]) -> DrawnView:
     """Sections at heights, seen from above, each with its height."""
     view = plan_view(surface, curves, ())
     view.title = "sections at heights"
@@ -151,7 +148,7 @@ def contours(
     return view
 
 
-def profile(name: str, start: Floats, along: Floats, lines: Sequence[SheetLine]) -> DrawnView:
+def profile(name: str, start: Floats, along: Floats, lines: Lines) -> DrawnView:
     """A section along a line in the plan: distance from the line's first point, and height.
 
     Its stations and levels are the ends of its lines, where the roof ends or meets a wall, and its top.
@@ -190,6 +187,7 @@ def placed(
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
         spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
         shift = place + spare - factor * low
+        sheet.places.append((factor, shift))
         _add_dimensions(sheet, view, factor, shift, decimals)
         if len(views) > 1:
             at = float(0.5 * factor * (low + high)[0] + shift[0]), float(place[1] - BEFORE[1]) + SMALL

@@ -13,8 +13,7 @@ from .. import solvers
 from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END, SOUND
-from ..certificate.balance import load_name, load_ratio
-from ..certificate.neck import held_groups
+from ..certificate.diagnosis import held_groups
 from ..certificate.proof import Attempt
 from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..forces.functional import gradient
@@ -215,15 +214,15 @@ def classify_end(branch: Branch, back: float | None = None) -> BranchEnd:
     return BranchEnd("fold" if folded else "lost", farthest, quality)
 
 
-def raise_loads(low: Surface) -> Homotopy:
+def raise_loads(low: Surface, load: str, ratio: float) -> Homotopy:
     """All net pressures and weights grow in proportion, from the highest of a few loads with a minimum.
 
-    What grows is p - s, so the snow is not there at the start and comes with the pressure.
+    What grows is p - s, so the snow comes with the pressure; it has a name ``load`` and a ``load_ratio``.
     """
-    load, none = load_name(low), {patch.name: 0.0 for patch in low.patches}
+    none = {patch.name: 0.0 for patch in low.patches}
     pressures = {patch.name: patch.net_pressure for patch in low.patches if patch.net_pressure != 0.0}
     weights = {patch.name: patch.weight for patch in low.patches if patch.weight != 0.0}
-    carried = min(1.0, 1.0 / max(load_ratio(low), 1e-300))
+    carried = min(1.0, 1.0 / max(ratio, 1e-300))
     # λ is the load over what the boundary carries, so that a fold is near 1 however weak the patches
     direction = Direction(
         pressures={name: carried * p for name, p in pressures.items()},
@@ -239,14 +238,16 @@ def raise_loads(low: Surface) -> Homotopy:
     return Homotopy(load, f"by raising the {load} from {{share:.3g}} of it", low, starts, carried)
 
 
-def relax_tensions(low: Surface) -> Homotopy | None:
-    """From equal tensions of all patches under pressure to those asked for; None for one such patch alone."""
+def relax_tensions(low: Surface, strongest: float, ratio: float) -> Homotopy | None:
+    """From equal tensions of all patches under pressure to those asked for; None for one such patch alone.
+
+    ``ratio`` is the ``load_ratio`` with the ``strongest`` tension for all of them.
+    """
     asked = {patch.name: patch.tension for patch in low.patches if patch.tension > 0.0}
     pressed = [patch.name for patch in low.patches if not patch.auxiliary]
     if len(pressed) < 2:
         return None
-    strongest = max(asked[name] for name in pressed)
-    needed = strongest * max(1.0, STRONGER * load_ratio(low.retensioned(dict.fromkeys(pressed, strongest))))
+    needed = strongest * max(1.0, STRONGER * ratio)
 
     def start(raised: float, most: float) -> HomotopyStart:
         equal = raised * needed

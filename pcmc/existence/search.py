@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,12 +13,14 @@ from ..certificate.balance import (
     describe_growing,
     growing_part,
     hardly_balanced,
+    load_name,
+    load_ratio,
     overload,
     unbalanced,
     unheld,
 )
 from ..certificate.cables import weak_cable
-from ..certificate.neck import pinched_neck
+from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..forces.pinching import standing_part
 from ..solvers.result import Callback, Result, Status
@@ -69,17 +71,16 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result | tuple[lis
     minimum = solves.options.get("target", "minimum") == "minimum"
     pinchable = standing_part(start).walls.pinchable
     load = overload(start) if first.status in (Status.DIVERGED, Status.DEGENERATE) else None
-    proofs = [proof for proof in (unbalanced(start, pinchable), unheld(start), weak_cable(start)) if proof]
+    found = unbalanced(start, pinchable), unheld(start), weak_cable(start)
+    proofs: list[Proof] = [proof for proof in found if proof is not None]
     growing = growing_part(start) if minimum and not proofs else None
     tried, given = [Attempt("given start", _name(first))], _name(first).replace("_", " ")
-    ways: Iterable[HomotopyOutcome | Homotopy] = ()
+    ways = _further_ways(start, pinchable) if growing is None and not proofs else ()
     if growing is not None:
         result = solves.solve(start, target="stationary")
         if result.converged:
             return replace(result, status=Status.SADDLE, note=describe_growing(growing))
         tried.append(Attempt("stationary point", _name(result)))
-    elif not proofs:
-        ways = _further_ways(start, pinchable)
     for way in ways:
         outcome = attempt(way, solves) if isinstance(way, Homotopy) else way
         if outcome.surface is not None:
@@ -104,10 +105,14 @@ def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome 
         yield HomotopyOutcome("low start", low, "from a lower start")
     if low.rooms:  # their pressures are not given, and no homotopy begins at others
         return
+    most = max((patch.tension for patch in low.patches if not patch.auxiliary), default=0.0)
+    equal = low.retensioned({patch.name: most for patch in low.patches if not patch.auxiliary})
+    what, ratio, ratio_of_equal = load_name(low), load_ratio(low), load_ratio(equal)
+    balanced = not hardly_balanced(start, pinchable)
     if loaded:
-        yield raise_loads(low)
-    if pressed and not hardly_balanced(start, pinchable):
-        yield from filter(None, [relax_tensions(low)])
+        yield raise_loads(low, what, ratio)
+    if pressed and balanced:
+        yield from filter(None, [relax_tensions(low, most, ratio_of_equal)])
     yield from filter(None, [continue_in_distance(start, low)])
 
 

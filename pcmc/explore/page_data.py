@@ -125,14 +125,9 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
         "at_rest": state.failure is None,
         "findings": _findings(certificate, moving),
         "figures": figures_data(surface, certificate),
-        "undo": state.undo,
-        "redo": state.redo,
-        "message": state.message,
-        "met": state.met,
-        "number": state.number,
         "way": state.note,
         "variants": [{**v.data, "word": _verdict(v.certificate)["word"]} for v in state.variants],
-        "compared": state.compared,
+        **{key: getattr(state, key) for key in ("undo", "redo", "message", "met", "number", "compared")},
     }
 
 

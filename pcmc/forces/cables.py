@@ -80,7 +80,7 @@ def cable_pulls(surface: Surface, X: Floats) -> Floats:
 
 def pull_along(surface: Surface, cable: Cable, vertices: Ints) -> Floats:
     """(k,) τ + g z, the pull of a cable at the mean of some vertices (k,) or (k,2), force."""
-    z = surface.plane.height(surface.vertices)[vertices].reshape(len(vertices), -1).mean(axis=1)
+    z = np.atleast_2d(surface.plane.height(surface.vertices)[vertices].T).mean(axis=0)
     return np.asarray(cable.tension + cable.weight * z)
 
 

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, kept_with_owner
+from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
@@ -108,9 +108,7 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     walls = surface.walls & surface.room_signs.any(axis=0)
     new = dict(zip(names, pressures.tolist(), strict=True))
     other = surface.retensioned(None, new, [names[k] for k in np.flatnonzero(walls)])
-    for kept in ("origin", "closing_volumes"):  # neither depends on the pressures in a room that is closed
-        if kept in vars(surface):
-            vars(other)[kept] = vars(surface)[kept]
+    hand_over(surface, other, "origin", "closing_volumes")  # no pressures in a closed room change them
     return other
 
 

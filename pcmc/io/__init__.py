@@ -1,6 +1,6 @@
 """Surfaces from files and to files, by suffix: a file here per format.
 
-Gives ``read``, ``write`` and ``load``. May import ``meshing`` and the rooms below it.
+Gives ``read``, ``write`` and ``load``. May import ``meshing`` and the subpackages below it.
 """
 
 from .formats import FORMATS, READ_ONLY, metres_note

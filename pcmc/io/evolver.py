@@ -2,17 +2,13 @@
 
 A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0 are one body with
 ``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π, and on
-``constraint 2`` and so on, the other planes; a comment names these, and marks mirrors.
-A cable is a line ``tension`` of its edges, which also have its number as the attribute ``cable``. A weight
-w is the attribute ``weight`` of faces, and one quantity for each w, ``self_weight_k``: their integral of w z.
-Snow is the attribute ``snow`` of faces, which the reader adds to the net pressures of the bodies.
-Evolver measures volumes from the origin (``symmetric_content``: det/6 per face, Eq. 10b), so the
-coordinates are relative to the point of Π, or with other planes to ``Surface.origin``, and a comment says
-where that is. A plane that does not pass there has the ``content`` of its flat pieces, as an integral along
-its edges: ∫ ⟨-c × x / 6, dx⟩ = -⟨c, a × b⟩ / 6; the ends of these pieces are a quantity ``corner_k`` of their
-vertex, with its pressure. Then the program's ``total_energy`` is E of Eq. (20).
-A room of prescribed volume is a body with that ``volume``; its Lagrange multiplier is the pressure, and
-``volconst`` the part of the volume that the program's cones do not see. ``evolver_reading`` has the reader.
+``constraint 2`` and so on, the other planes. A cable is a line ``tension`` of its edges. A weight w is one
+quantity ``self_weight_k``: the integral of w z. Evolver measures volumes from the origin (det/6 per face,
+Eq. 10b), so coordinates are relative to the point of Π, or with other planes to ``Surface.origin``. A plane
+that does not pass there has the ``content`` of its flat pieces, as an integral along its edges:
+∫ ⟨-c × x / 6, dx⟩ = -⟨c, a × b⟩ / 6; the ends of these pieces are a quantity ``corner_k`` of their vertex.
+Then ``total_energy`` is E of Eq. (20). A room of prescribed volume is a body with that ``volume``; its
+Lagrange multiplier is the pressure, ``volconst`` the part of the volume that the cones do not see.
 """
 
 from __future__ import annotations
@@ -23,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, format_rows
 from ..base.errors import FileError
 from ..forces.flat_pieces import add_plane_volumes, flat_pieces
 from ..forces.rooms import room_pressures, room_volumes
@@ -32,7 +28,7 @@ from ..surface import Surface
 from .evolver_reading import ROUNDING, read
 from .formats import Content
 from .mesh_data import FREE, SLIDING, support_of
-from .text import escaped, format_rows
+from .text import escaped
 
 __all__ = ["read", "write"]
 
@@ -52,7 +48,6 @@ DEFINE FACET ATTRIBUTE patch INTEGER
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """The datafile of a surface."""
     patches = list(enumerate(surface.patches, 1))
     weights = np.unique(surface.weights[surface.weights != 0.0]).tolist()
     face_tags = []
@@ -131,10 +126,7 @@ def _attributes(surface: Surface, origin: Floats, weights: Sequence[float]) -> s
 
 
 def _tags(surface: Surface) -> tuple[Any, Any]:
-    """What follows the numbers of each vertex (n,) and of each edge (e,).
-
-    A boundary edge with held ends is held itself, for vertices that refinement puts there.
-    """
+    """What follows the numbers of each vertex (n,) and edge (e,). Boundary edges with held ends are held."""
     topo, support = surface.topology, support_of(surface, planes=True)
     of_edge = support[topo.edges].min(axis=1)
     off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
@@ -158,10 +150,7 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
 
 
 def _bodies(surface: Surface) -> str:
-    """A body for each room, with its volume, and one for each net pressure beside that of a room.
-
-    It is on the positive side of a face or, where a room is there, on the other.
-    """
+    """A body for each room, and one for each net pressure, on the side of a face where no room is."""
     pressures, signs = surface.net_pressures, surface.room_signs
     side = np.where((signs > 0.0).any(axis=0), -1, 1)[surface.patch_of_face]
     bodies: list[tuple[Ints, str]] = []

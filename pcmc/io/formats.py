@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -34,7 +34,6 @@ class Format:
 
     @property
     def functions(self) -> Any:
-        """The module that reads and writes the format."""
         return import_module(f".{self.module}", __package__)
 
     def carried(self, surface: Surface, scalars: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -44,17 +43,8 @@ class Format:
 
     def lost(self, surface: Surface, units: Units) -> list[str]:
         """What of a surface the format does not hold, in words."""
-        there = {
-            "weights": surface.weights.any(),
-            "snow": surface.snows.any(),
-            "lines": surface.given_supports.on_line,
-            "cables": surface.cables,
-            "cable weights": surface.cable_edges.weight.any(),
-            "rooms": surface.rooms,
-            "planes": surface.on_planes,
-            "unit": units,
-        }
-        return [LOST[part].format(unit=units.length) for part in self.loses if there[part]]
+        parts = [LOST[part] for part in self.loses]
+        return [words.format(unit=units.length) for words, there in parts if there(surface, units)]
 
 
 @dataclass(frozen=True)
@@ -70,17 +60,19 @@ class Content:
     bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
 
 
-LOST = {
-    "weights": "weights",
-    "snow": "snow",
-    "lines": "lines or circles that vertices slide along (they are fixed in it)",
-    "cables": "cables",
-    "cable weights": "weights of cables",
-    "rooms": "volumes of rooms (it has the pressures reached)",
-    "planes": "planes other than Π that vertices slide on, and mirror planes (fixed in it)",
-    "unit": "its unit {unit}",
+PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"
+LINES = "lines or circles that vertices slide along (they are fixed in it)"
+LOST: dict[str, tuple[str, Callable[[Surface, Units], object]]] = {
+    "weights": ("weights", lambda surface, _: surface.weights.any()),
+    "snow": ("snow", lambda surface, _: surface.snows.any()),
+    "lines": (LINES, lambda surface, _: surface.given_supports.on_line),
+    "cables": ("cables", lambda surface, _: surface.cables),
+    "cable weights": ("weights of cables", lambda surface, _: surface.cable_edges.weight.any()),
+    "rooms": ("volumes of rooms (it has the pressures reached)", lambda surface, _: surface.rooms),
+    "planes": (PLANES, lambda surface, _: surface.on_planes),
+    "unit": ("its unit {unit}", lambda _, units: units),
 }
-"""The parts of a surface that a format may lose, in words."""
+"""The parts of a surface that a format may lose, in words, and whether a surface has them."""
 
 OURS = ("support", "patch")
 FORMATS = {
@@ -106,7 +98,6 @@ READ_ONLY = {suffix: Format("repairing") for suffix in (".off", ".3ds", ".dae", 
 
 
 def format_of(path: Path, known: Mapping[str, Format]) -> Format:
-    """The format of a path by its suffix."""
     suffix = path.suffix.lower()
     if suffix not in known:
         readable = f"{suffix} files are read only; " if suffix in READ_ONLY else ""

@@ -1,11 +1,8 @@
-"""glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
+"""glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in metres and single precision, y up.
 
-In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Lengths are metres. Single precision
-keeps seven digits only, so a surface far from the origin, as in a survey's coordinates, is written about its
-middle, and the nodes place it. Each patch has a material of its name, in its colour. With ``colour`` the
-materials are white, and the vertices have the colours of a scalar; the metadata note its limits.
-Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane and walls without
-height are metadata of the scene.
+A surface far from the origin is written about its middle, and the nodes place it. Each patch has a material
+of its name, in its colour, or white where the vertices have the colours of a scalar. Supports and scalars are
+attributes of vertices; tensions, pressures, plane and walls without height are metadata of the scene.
 """
 
 from __future__ import annotations
@@ -20,11 +17,11 @@ import numpy as np
 
 from ..base.errors import FileError
 from ..base.files import check_regular
+from ..base.libraries import load_library, translated_errors
 from ..surface import Surface
 from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
 from .formats import Content
-from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import parse_metadata
 from .patch_meshes import WALLS, from_scene, patch_meshes
@@ -35,7 +32,6 @@ ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
     for name, values in content.scalars.items():
@@ -65,18 +61,15 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     scene.metadata["pcmc"] = content.metadata
     if content.walls is not None:
         scene.metadata[WALLS] = content.walls
+    library = trimesh.exchange.gltf
     if path.suffix.lower() == ".glb":
-        path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
+        path.write_bytes(library.export_glb(scene, include_normals=True))
     else:
-        files = trimesh.exchange.gltf.export_gltf(scene, embed_buffers=True, include_normals=True)
-        path.write_bytes(files["model.gltf"])
+        path.write_bytes(library.export_gltf(scene, embed_buffers=True, include_normals=True)["model.gltf"])
 
 
 def read(path: Path) -> MeshData:
-    """Meshes as patches, by the names of their nodes.
-
-    trimesh believes that parts are files, and that arrays are not larger than the bytes there are.
-    """
+    """Meshes as patches, by the names of their nodes. trimesh believes the names and counts in a file."""
     trimesh, content = load_library("trimesh"), path.read_bytes()
     size, items = len(content), 0
     if path.suffix.lower() == ".glb":
@@ -102,8 +95,7 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=str(error)) from None
     mesh = from_scene(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_")}
+    held = support_kinds(named.pop(SUPPORT[1:])) if SUPPORT in mesh.scalars else None
     scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}
-    support = mesh.scalars.get(SUPPORT)
-    held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))

@@ -1,10 +1,8 @@
 """IFC4 (.ifc), for building information models: a roof of one element per patch, with its properties.
 
-Project, site, building, storey and one IfcRoof. Its parts are an IfcSlab of type ROOF for each patch and an
-IfcWall for each wall, with an IfcTriangulatedFaceSet in double precision, a colour, and the property set
-``Pcmc_Patch``; and an IfcTendon for each cable, with its axis, its force, and ``Pcmc_Cable``. The roof has
-``Pcmc_Certificate`` and, so that pcmc can read the file, ``Pcmc_Surface``. The same surface gives the same
-bytes: the content makes the identifiers, and the time stamp is always the same.
+The parts of an IfcRoof are an IfcSlab of type ROOF for each patch and an IfcWall for each wall, as
+IfcTriangulatedFaceSet, and an IfcTendon for each cable. pcmc reads ``Pcmc_Surface`` back. The same surface
+gives the same bytes: the content makes the identifiers, and the time stamp is always the same.
 """
 
 from __future__ import annotations
@@ -19,12 +17,13 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.libraries import load_library, read_arrays, require
 from ..base.units import NEWTONS, TABLE, Units, length_factor
+from ..base.validate import real
 from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.geometry import file_origin
 from .formats import Content
-from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .patch_meshes import patch_meshes
@@ -33,12 +32,17 @@ SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
 TIME = "2000-01-01T00:00:00"
 NAMES = {name: unit.ifc for name, unit in TABLE.items()}
 NAMES |= {"N": "", "kN": "KILO", "MN": "MEGA", "lbf": "pound-force", "kip": "kip"}
-NUMBERS = {  # in the property set of the certificate, by the name there
-    "Residual": "residual",
-    "CurvatureError": "curvature_error",
-    "TriangleQuality": "quality",
-    "LoadRatio": "load_ratio",
+FINDINGS = {  # in the property set of the certificate, by the name there
+    "Verdict": ("IfcLabel", "verdict"),
+    "Detail": ("IfcText", "detail"),
+    "MorseIndex": ("IfcInteger", "index"),
+    "Residual": ("IfcReal", "residual"),
+    "CurvatureError": ("IfcReal", "curvature_error"),
+    "TriangleQuality": ("IfcReal", "quality"),
+    "LoadRatio": ("IfcReal", "load_ratio"),
+    "LowestEigenvalue": ("IfcReal", "lowest_eigenvalue"),
 }
+TYPES: dict[str, Callable[[Any], Any]] = {"IfcText": str, "IfcInteger": int, "IfcReal": float}
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
@@ -85,21 +89,17 @@ class _Model:
         return self.add(kind, GlobalId=compress(uuid.uuid5(SPACE, f"{self.digest} {role}").hex), **values)
 
     def axes(self, point: Iterable[float] = (0.0, 0.0, 0.0)) -> Any:
-        """Axes at a point, not turned."""
         origin = self.add("IfcCartesianPoint", Coordinates=tuple(map(float, point)))
         return self.add("IfcAxis2Placement3D", Location=origin)
 
     def placement(self, relative: Any = None, point: Iterable[float] = (0.0, 0.0, 0.0)) -> Any:
-        """A place without rotation."""
         axes = self.axes(point)
         return self.add("IfcLocalPlacement", PlacementRelTo=relative, RelativePlacement=axes)
 
     def aggregate(self, role: str, whole: Any, parts: list[Any]) -> None:
-        """Parts of a whole."""
         self.rooted("IfcRelAggregates", role, RelatingObject=whole, RelatedObjects=parts)
 
     def add_roof(self) -> Any:
-        """The roof in its storey."""
         context = self.add(
             "IfcGeometricRepresentationContext",
             ContextType="Model",
@@ -202,29 +202,21 @@ class _Model:
 
 
 def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
-    """The certificate's verdict and numbers, as far as they are there."""
-    found: dict[str, tuple[str, Any]] = {}
-    verdict = certificate.get("verdict")
-    if verdict is not None:
-        found["Verdict"] = "IfcLabel", str(getattr(verdict, "name", verdict)).lower()
-    if certificate.get("detail"):
-        found["Detail"] = "IfcText", str(certificate["detail"])
-    if certificate.get("index") is not None:
-        found["MorseIndex"] = "IfcInteger", int(certificate["index"])
-    values = {name: certificate.get(key) for name, key in NUMBERS.items()}
-    eigenvalues = certificate.get("eigenvalues", ())
-    values["LowestEigenvalue"] = next(iter(eigenvalues), certificate.get("lowest_eigenvalue"))
-    for name, value in values.items():
-        if isinstance(value, int | float | np.number) and np.isfinite(value):
-            found[name] = "IfcReal", float(value)
+    """The certificate's verdict and numbers, as far as they are there and finite."""
+    found, values = dict[str, tuple[str, Any]](), dict(certificate)
+    if len(eigenvalues := values.get("eigenvalues", ())):
+        values["lowest_eigenvalue"] = eigenvalues[0]
+    for name, (kind, key) in FINDINGS.items():
+        value = values.get(key)
+        if name == "Verdict" and value is not None:
+            found[name] = kind, str(getattr(value, "name", value)).lower()
+        elif np.isfinite(real(value)) if kind == "IfcReal" else value not in (None, ""):
+            found[name] = kind, TYPES[kind](value)
     return found
 
 
 def assigned_units(add: Callable[..., Any], units: Units) -> Any:
-    """Units of length and angle; areas and volumes in m², m³; and the units of tensions and pressures.
-
-    ``add`` makes an entity.
-    """
+    """The units of length, angle, area, volume, tension and pressure; ``add`` makes an entity."""
     length = _unit(add, "LENGTHUNIT", "METRE", units.length, (1, 0, 0), length_factor(units.length, "m"))
     kinds = {"AREAUNIT": "SQUARE_METRE", "VOLUMEUNIT": "CUBIC_METRE", "PLANEANGLEUNIT": "RADIAN"}
     listed = [length, *(add("IfcSIUnit", UnitType=kind, Name=name) for kind, name in kinds.items())]

@@ -1,13 +1,12 @@
 """The mesh of a file and its data, as every reader returns them, before they become a Surface.
 
-They can be converted to another unit of length. With the factor f, lengths become f times as large, tensions
-(force/length) 1/f, pressures, weights and snow (force/length²) 1/f², volumes f³. Forces stay, so the shape at
-rest stays the same.
+In a unit f times smaller, lengths become f times as large, tensions 1/f, pressures, weights and snow 1/f²,
+volumes f³. Forces stay, so the shape at rest stays the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -59,10 +58,7 @@ class MeshData:
 
 
 def checked(data: MeshData) -> MeshData:
-    """The same with arrays of the right type, shape and range; FileError for others.
-
-    Readers and libraries do not all check the numbers of a file, and indices out of range would reach numpy.
-    """
+    """The same with arrays of the right type, shape and range; FileError where a library let others pass."""
     X = checks.positions(numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64))
     n, m, support, scalars = len(X), len(data.faces), data.support, dict(data.scalars)
     F = within(numeric(data.faces, "faces", "iu", (None, 3)), "faces", n)
@@ -195,14 +191,8 @@ def to_surface(
         held = support == FIXED
     else:
         held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
-    patches, names = data.patches, [p.name for p in data.patches]
-    for key, values in (("tension", tensions), ("pressure", pressures)):
-        by_name: Any = values if isinstance(values, Mapping) else dict.fromkeys(names, values)
-        for name in by_name:
-            if name not in names:
-                raise OptionError(unknown("patch", name, names), what=f"{key}s", where=name)
-        if values is not None:
-            patches = tuple(replace(p, **{key: by_name.get(p.name, getattr(p, key))}) for p in patches)
+    given = given_values("patch", [p.name for p in data.patches], tension=tensions, pressure=pressures)
+    patches = tuple(replace(p, **given[p.name]) for p in data.patches)
     plane = plane or data.plane or Plane()
     height, size = plane.height(X), bounding_size(X)
     rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
@@ -214,6 +204,18 @@ def to_surface(
     parts = data.cables, data.rooms, data.curves
     surface = Surface(X, data.faces, data.patch_of_face, patches, *supports, *parts)
     return surface if drawn is held or np.array_equal(drawn, held) else surface.rebuilt(fixed=held)
+
+
+def given_values(kind: str, names: Collection[str], **values: Any) -> dict[str, dict[str, Any]]:
+    """The values by field that are given to each of these names: by name, or one for all, or None."""
+    given: dict[str, dict[str, Any]] = {name: {} for name in names}
+    for key, value in values.items():
+        by_name = value if isinstance(value, Mapping) else dict.fromkeys(names, value)
+        for name in by_name if value is not None else ():
+            if name not in given:
+                raise OptionError(unknown(kind, name, names), what=f"{key}s", where=name, found=name)
+            given[name][key] = by_name[name]
+    return given
 
 
 def scaled(value: Any, factor: float) -> Any:
@@ -257,8 +259,7 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
 def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     """A file's data in another unit of length, if any is given, with a note if that changes them.
 
-    ``assumed`` is the unit of a file that names none. Tensions and pressures change only where the file has
-    them; scalars stay.
+    ``assumed`` is the unit of a file that names none. Scalars stay, and tensions that the file does not have.
     """
     units = data.units or Units(assumed, data.units.force)
     factor = length_factor(units.length, length)

@@ -1,7 +1,6 @@
 """One line of JSON with what formats of plain meshes have no place for: patches, plane, cables, rooms, ...
 
-Vertices are named by their number where the mesh keeps its vertices, or by their position where the file
-has a mesh per patch.
+Vertices are named by their number where the mesh keeps its vertices, by position where each patch has a mesh.
 """
 
 from __future__ import annotations
@@ -36,14 +35,10 @@ def metadata_text(
     counts: tuple[int, int] | None = None,
     bare: Collection[str] = (),
 ) -> str:
-    """Everything of a surface but its mesh and supports on Π, as JSON: a format's comment or metadata.
+    """Everything of a surface but its mesh and supports on Π, as JSON.
 
-    Parameters
-    ----------
-    joined : whether vertices keep their numbers in the file.
-    without : the parts that the format holds itself.
-    counts : numbers of vertices and faces in the file, if not those of the surface.
-    bare : the patches whose tension and pressure of 1 stand for none.
+    ``joined``: vertices keep their numbers in the file; ``without``: the parts that the format holds itself;
+    ``counts``: of vertices and faces in the file; ``bare``: patches without tension and pressure.
     """
 
     def where(chosen: Ints | Bools) -> Any:
@@ -80,8 +75,6 @@ def row_of(patch: Patch) -> tuple[object, ...]:
 
 @dataclass(frozen=True)
 class Metadata:
-    """The same read back."""
-
     patches: Mapping[str, Patch | None] = field(default_factory=dict)  # by name; bare ones are None
     plane: Plane | None = None
     counts: tuple[int, int] | None = None
@@ -101,7 +94,7 @@ class Metadata:
     def of_meshes(self, meshes: Iterable[tuple[str, Any, Any]], default: str = "", **more: Any) -> MeshData:
         """Meshes of a name, points (n,3) and triangles (m,3) each; those of one name are one patch.
 
-        ``default`` is the name of the only patch, if it is to have another.
+        ``default`` names the only patch.
         """
         X, F, named, start = [], [], list[str](), 0
         for name, points, faces in meshes:
@@ -149,26 +142,17 @@ def _damaged(text: str) -> FileError:
 
 
 def with_parts(data: MeshData) -> MeshData:
-    """A file's mesh with the cables, rooms, lines and planes of its metadata.
-
-    Those whose vertices are no longer there are left out, with a note; what they hold stays fixed.
-    """
-    try:
-        return _with_parts(data) if data.parts else data
-    except DAMAGED:
-        raise _damaged(str(dict(data.parts))) from None
-
-
-def _with_parts(data: MeshData) -> MeshData:
+    """The mesh with the cables, rooms, lines and planes of its metadata; a note on those that do not fit."""
+    if not data.parts:
+        return data
     X, parts, lost = data.vertices, data.parts, dict[str, None]()
     keep: Ints = np.arange(len(X))
     group: Ints = keep
 
     def groups(where: Any, what: str, exact: bool = False) -> Ints | None:
-        """The groups of vertices at one place that are meant, by number or position.
+        """The groups of vertices at a place, by number or position; None, and ``what`` lost, if one is gone.
 
-        None, and ``what`` is lost, if one is gone. With ``exact`` the vertices get the positions of the
-        metadata, to the last digit.
+        With ``exact`` the vertices get the positions of the metadata, to the last digit.
         """
         nonlocal X, keep, group
         given = np.array(where)
@@ -194,25 +178,31 @@ def _with_parts(data: MeshData) -> MeshData:
             if (own := groups(where, what, exact=True)) is not None
         ]
 
-    cables = [
-        Cable(name, pull, keep[ends], *weight)
-        for name, pull, where, *weight in parts.get("cables", ())
-        if (ends := groups(where, f"cable {name!r} was left out")) is not None
-    ]
-    lines = sliding("lines", "what slides along a line is fixed")
-    planes, support = sliding("planes", off := "what slides on a plane is fixed"), data.support
-    if support is not None and planes and off not in lost:
-        support = support.copy()
-        for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
-            if len(where) and (own := groups(where, off)) is not None:
-                support[np.isin(group, own)] = kind
+    try:
+        cables = [
+            Cable(name, pull, keep[ends], *weight)
+            for name, pull, where, *weight in parts.get("cables", ())
+            if (ends := groups(where, f"cable {name!r} was left out")) is not None
+        ]
+        lines = sliding("lines", "what slides along a line is fixed")
+        planes, support = sliding("planes", off := "what slides on a plane is fixed"), data.support
+        if support is not None and planes and off not in lost:
+            support = support.copy()
+            for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
+                if len(where) and (own := groups(where, off)) is not None:
+                    support[np.isin(group, own)] = kind
+        rooms = tuple(Room(*row) for row in parts.get("rooms", ()))
+        guides = tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines)
+        on_planes = () if off in lost else tuple((Plane(*row), own) for row, own in planes)
+    except DAMAGED:
+        raise _damaged(str(dict(parts))) from None
     return replace(
         data,
         vertices=X,
         support=support,
         cables=tuple(cables),
-        rooms=tuple(Room(*row) for row in parts.get("rooms", ())),
-        lines=tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines),
-        planes=() if off in lost else tuple((Plane(*row), own) for row, own in planes),
+        rooms=rooms,
+        lines=guides,
+        planes=on_planes,
         notes=(*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else [])),
     )

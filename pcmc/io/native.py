@@ -1,10 +1,8 @@
 """The native format (.pcmc): everything there is to a surface, to the last bit.
 
-A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
-``patch_of_face``, ``support``; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
-certificate, and ``meta``, a JSON text with the format's version, the description of ``metadata``, the curves
-with their vertices and the parameters of these, and the rest of the certificate, its tables as lists of rows.
-Up to version 5 cables, lines and planes were arrays.
+A zip archive of NumPy arrays that ``numpy.load`` opens: ``vertices``, ``faces``, ``patch_of_face``,
+``support``, ``scalar <name>``, ``certificate <name>``, and ``meta``, a JSON text with the version, the
+description of ``metadata``, the curves and the rest of the certificate.
 """
 
 from __future__ import annotations
@@ -21,9 +19,9 @@ import numpy as np
 import pandas as pd
 
 from ..base.errors import FileError, PcmcError
+from ..base.libraries import translated_errors
 from ..surface import HeldCurve, Surface
 from .formats import Content
-from .libraries import translated_errors
 from .mesh_data import MeshData, numeric, support_of, within
 from .metadata import DAMAGED, parse_metadata
 
@@ -65,7 +63,6 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 
 
 def read(path: Path) -> MeshData:
-    """All of it."""
     with translated_errors("pcmc"), zipfile.ZipFile(path) as packed:
         size, given = sum(item.file_size for item in packed.infolist()), path.stat().st_size
         most = INFLATED * given + ROOM
@@ -77,31 +74,25 @@ def read(path: Path) -> MeshData:
         meta = json.loads(str(arrays.pop("meta")))
         if not isinstance(meta, dict) or not isinstance(meta["certificate"], dict):
             raise FileError(f"its description is damaged: {str(meta)[:60]!r}", where="meta")
-        if meta["format"] != FORMAT:
-            text = f"expected the format {FORMAT!r}, found {meta['format']!r}"
-            raise FileError(text, where="format", found=meta["format"], expected=FORMAT)
-        newer = meta["version"]
-        if newer > VERSION:
-            text = f"written by a newer pcmc (format {newer}, this one reads up to {VERSION}); update pcmc"
-            raise FileError(text, where="version", found=newer, expected=VERSION)
+        kind, version = meta["format"], meta["version"]
+        if kind != FORMAT:
+            text = f"expected the format {FORMAT!r}, found {kind!r}"
+            raise FileError(text, where="format", found=kind, expected=FORMAT)
+        if version > VERSION:
+            text = f"written by a newer pcmc (format {version}, this one reads up to {VERSION}); update pcmc"
+            raise FileError(text, where="version", found=version, expected=VERSION)
         metadata = parse_metadata(meta["description"])
-        curves = _curves(meta.get("curves", ()), len(arrays["vertices"]))
-        parts = {**_older_parts(meta, arrays), **metadata.parts}
-        return metadata.mesh_data(
-            arrays.pop("vertices"),
-            arrays.pop("faces"),
-            arrays.pop("patch_of_face"),
-            list(metadata.patches),
-            support=arrays.pop("support"),
-            parts=parts,
-            curves=curves,
-            scalars=_under("scalar ", arrays),
-            certificate={**meta["certificate"], **_under("certificate ", arrays)},
-        )
+        X, F, patch, support = (arrays[key] for key in ("vertices", "faces", "patch_of_face", "support"))
+        about: dict[str, Any] = {
+            "parts": {**_older_parts(meta, arrays), **metadata.parts},
+            "curves": _curves(meta.get("curves", ()), len(X)),
+            "scalars": _under("scalar ", arrays),
+            "certificate": {**meta["certificate"], **_under("certificate ", arrays)},
+        }
+        return metadata.mesh_data(X, F, patch, list(metadata.patches), support=support, **about)
 
 
 def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:
-    """The curves of a file with n vertices."""
     curves = list[HeldCurve]()
     try:
         for one in map(HeldCurve.from_plain, rows):

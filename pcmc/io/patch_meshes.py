@@ -1,8 +1,7 @@
 """A mesh per patch, as formats and trimesh have them: those of a surface, and back to one mesh.
 
-Below a junction on Π the triangles of a wall have no area, and its vertices lie on the junction. Such meshes
-cannot hold them, and a reader that joins patches by position would merge them. So the file has the meshes
-without them and a text with all walls; the reader puts these walls back.
+Below a junction on Π a wall's triangles have no area, and readers that join patches by position would merge
+its vertices. So the file has the meshes without them, and a text from which the reader puts the walls back.
 """
 
 from __future__ import annotations
@@ -75,10 +74,7 @@ def encode_walls(surface: Surface, shown: Surface) -> str:
 
 
 def restore_walls(data: MeshData) -> MeshData:
-    """The same, its patches joined, with the walls of ``data.walls`` in place of those in the meshes.
-
-    If the surface has changed since, the walls are left out, with a note.
-    """
+    """The same, joined, with the walls of ``data.walls``; without them, with a note, if it has changed."""
     if data.walls is None:
         return data
     walls, above, shown = _parsed(data.walls)
@@ -119,15 +115,8 @@ def _parsed(text: str) -> tuple[MeshData, Bools, int]:
     """The walls, which of their vertices lie on other patches, and how many of their faces are shown."""
     try:
         values = json.loads(text)
-        walls = checked(
-            MeshData(
-                np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
-                np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
-                np.array(values["patch"], dtype=np.int64),
-                tuple(Patch(*p) for p in values["patches"]),
-                np.array(values["support"], dtype=np.int8),
-            )
-        )
+        X, F, patch, support = (values[key] for key in ("vertices", "faces", "patch", "support"))
+        walls = checked(MeshData(X, F, patch, tuple(Patch(*p) for p in values["patches"]), support))
         above, shown = np.array(values["above"], dtype=bool), int(values["shown"])
         if len(above) != len(walls.vertices):
             raise ValueError

@@ -1,9 +1,8 @@
 """Stanford PLY (.ply): written binary in double precision, read in any form.
 
-Faces carry ``patch``, vertices ``support`` (0 free, 1 sliding, 2 fixed) and both the scalars, as
-properties; names, tensions, pressures and plane are a comment. The usual libraries lose double precision
-and properties (VTK), cannot read properties of faces (meshio), or refuse polygons of different sizes in
-binary files and accept a text file that is cut off (trimesh).
+Faces carry ``patch``, vertices ``support`` and both the scalars, as properties; the rest is a comment. The
+usual libraries lose precision and properties (VTK), cannot read properties of faces (meshio), or refuse
+polygons of different sizes in binary files and accept a text file that is cut off (trimesh).
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ NAMES = {"u1": "uchar", "i4": "int", "f8": "double"}
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """Little-endian binary."""
     vertex = {c: surface.vertices[:, d].astype("<f8") for d, c in enumerate("xyz")}
     vertex["support"] = support_of(surface).astype("u1")
     face = {"patch": surface.patch_of_face.astype("<i4")}
@@ -144,7 +142,7 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
         text = f"its header must list vertices, then faces; found {', '.join(names) or 'none'}"
         raise FileError(text, where="header")
     for element in elements:
-        columns = [p[0] for p in element.properties] + [f"{p[0]} count" for p in element.properties if p[2:]]
+        columns = [p[0] for p in element.properties]
         if len(set(columns)) < len(columns):
             text = f"two properties of its element {element.name} have the same name"
             raise FileError(text, where="header", found=element.name)

@@ -24,9 +24,8 @@ LABELS = ("patch", "PatchId", "RegionId", "GroupIds", "MaterialIds", "medit:ref"
 def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:
     """Triangles (m,3), the polygon each comes from (m,), and a note if any was cut.
 
-    ``corners`` lists the vertex indices of polygon after polygon, ``counts`` how many each has. The
-    order of the polygons is kept. A polygon of k corners becomes the fan of k - 2 triangles whose
-    worst one is best, which for a quad is the better diagonal.
+    ``corners`` lists the vertices of polygon after polygon, ``counts`` how many each has. A polygon of k
+    corners becomes the fan of k - 2 triangles whose worst one is best: for a quad the better diagonal.
 
     >>> X = np.array([[0, 0, 0], [2, 0, 0], [3, 1, 0], [1, 1, 0.0]])
     >>> triangulate(X, np.array([0, 1, 2, 3]), np.array([4]))[0].tolist()
@@ -93,9 +92,7 @@ def from_polygons(
 ) -> MeshData:
     """The mesh of polygons as in ``triangulate``, with data on its points and cells.
 
-    "support" of the points holds supports, the first of LABELS of the cells patches; other data of one number
-    each are scalars. The metadata name the patches; else they are "patch 1", "patch 2", ..., and without
-    labels the only patch has the name ``default``.
+    "support" of the points holds supports, the first of LABELS of the cells patches, which the metadata name.
     """
     if not len(counts):
         raise FileError("the file has no faces", where="faces", found=0)

@@ -1,7 +1,5 @@
-"""Surfaces from files, with warnings about meshes of other programs.
-
-Open seams, patches turned against each other or a wrong axis up can be solved, but probably give another roof
-than the one drawn.
+"""Surfaces from files, with warnings about meshes of other programs: open seams, patches turned against each
+other or a wrong axis up can be solved, but probably give another roof than the one drawn.
 """
 
 from __future__ import annotations
@@ -21,13 +19,13 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
 from ..base.files import as_path, check_regular, system_error
+from ..base.libraries import unreadable
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import topology
 from .formats import FORMATS, READ_ONLY, Format, format_of
-from .libraries import unreadable
 from .mesh_data import MeshData, checked, converted, merged, to_surface, without_unused
 from .metadata import with_parts
 from .patch_meshes import restore_walls
@@ -58,9 +56,8 @@ def read(
     fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` fixes all boundary
         vertices, and is the default for formats without supports.
     plane : Π in place of the file's, or of z = 0.
-    units : the unit of length of the Surface. A file in another unit is converted: coordinates, and the
-        tensions and pressures that it has. The numbers of a file without a unit stay. A Surface itself has no
-        unit: give the same to ``write``.
+    units : the unit of length of the Surface, to which coordinates, tensions and pressures of the file are
+        converted; the numbers of a file without a unit stay. A Surface has no unit: give it to ``write``.
 
     Warns
     -----
@@ -69,8 +66,7 @@ def read(
 
     Raises
     ------
-    FileError : for a file that is missing, cut off or not of its suffix's format. ``what`` is the
-        file, ``where`` the line or element.
+    FileError : for a file that is missing, cut off or not of its format; ``where`` is the line or element.
     SurfaceError : for a mesh that is not a surface.
     MissingExtra, OptionError : for a library that is not installed, and an unknown unit.
     """
@@ -81,10 +77,7 @@ def read(
 def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
     """The Surface in a file and all its data; a note if it lacks supports, tensions or a unit.
 
-    Parameters
-    ----------
-    units : the unit of length wanted; by default the file's own.
-    assumed : of the numbers in a file without a unit; by default the one wanted.
+    ``units`` is the unit of length wanted, by default the file's own; ``assumed`` that of a file without one.
     """
     data = converted(load(path), units, assumed or units)
     return _surface(path, data, ()), data
@@ -152,9 +145,7 @@ def opened(path: Path) -> Iterator[Format]:
 
 
 def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tuple[str, ...]:
-    """A sentence for each probable mistake; none where the format has supports, as pcmc's files do.
-
-    ``path`` is the file, for the command to type.
+    """A sentence for each probable mistake in the file ``path``; none where the format has supports.
 
     >>> from pcmc import Patch
     >>> X = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])

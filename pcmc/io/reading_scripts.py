@@ -1,7 +1,6 @@
 """What VTK, rhino3dm, IfcOpenShell and MeshLab do in a process of their own: read files, and repair.
 
-``libraries`` loads this file by its path, so it imports nothing of pcmc, and each function only the library
-that it needs, and only those parts of VTK that read. A path goes in, plain values come out.
+``base.libraries`` loads this file by its path: it imports nothing of pcmc, each function only its library.
 """
 
 from __future__ import annotations
@@ -273,7 +272,6 @@ def _vertices(mesh: Any) -> Any:
 
 
 def _flat(X: Any, F: Any) -> Any:
-    """(m,) triangles without area."""
     corner = X[F]
     edges = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)
     return np.linalg.norm(_area_vectors(X, F), axis=1) <= FLAT * edges.max(axis=1) ** 2

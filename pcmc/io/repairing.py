@@ -1,6 +1,5 @@
-"""Meshes of other programs through MeshLab (pymeshlab, licence GPL): it reads formats, and repairs them.
-
-It reads .off, .3ds, .dae and .x3d, which are not written.
+"""Meshes of other programs through MeshLab (pymeshlab, licence GPL), which repairs them and also reads .off,
+.3ds, .dae and .x3d.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ import numpy as np
 from ..base import validate
 from ..base.errors import FileError, OptionError, PcmcError
 from ..base.files import as_path
+from ..base.libraries import read_arrays, require, unreadable
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
-from .libraries import read_arrays, require, unreadable
 from .mesh_data import MeshData, converted, to_surface, within
 from .metadata import Metadata
 from .reading import contents, opened
@@ -60,11 +59,10 @@ def repair(
 ) -> Repaired:
     """Repair the mesh in a file, which stays as it is.
 
-    Polygons are cut into triangles; vertices nearer to each other than ``weld`` become one; repeated
-    triangles, those without area and those at points that are no numbers are left out; edges with three or
-    more triangles of one patch are split (with triangles of three patches they are junctions and stay);
-    triangles of a patch are turned alike, towards z; small holes within a patch are closed. Groups of the
-    file stay patches.
+    Groups stay patches. Polygons are cut into triangles; vertices nearer to each other than ``weld`` become
+    one; repeated triangles, those without area and those at points that are no numbers are left out; edges
+    with three or more triangles of one patch are split (with triangles of three patches they are junctions
+    and stay); triangles of a patch are turned alike, towards z; small holes within a patch are closed.
 
     Parameters
     ----------

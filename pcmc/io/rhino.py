@@ -1,8 +1,7 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
-Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds
-on the layers "fixed" and "sliding". Each cable is polylines on a layer "cable NAME". Ridges, rims and wall
-lines are curves on layers of their own, for drawing; reading leaves them out. Scalars are lost.
+Metadata are the layers' user text; supports are point clouds on the layers "fixed" and "sliding". Each cable
+is polylines on a layer "cable NAME". Ridges, rims and wall lines are curves, which reading leaves out.
 """
 
 from __future__ import annotations
@@ -19,12 +18,12 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.libraries import load_library, read_arrays, require
 from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
 from ..surface.geometry import bounding_size
 from ..surface.sections import curves_by_kind
 from .formats import Content
-from .libraries import load_library, read_arrays, require
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, parse_metadata
 from .patch_meshes import WALLS, patch_meshes
@@ -111,9 +110,8 @@ def read(path: Path) -> MeshData:
     metadata, walls, others, start = Metadata(), None, 0, 0
     cables: dict[str, list[Any]] = {}
     for item in arrays["objects"]:
-        layer: dict[str, Any] = {"name": path.stem, "texts": {}}
-        if 0 <= item["layer"] < len(layers):
-            layer = layers[item["layer"]]
+        known = 0 <= item["layer"] < len(layers)
+        layer: Any = layers[item["layer"]] if known else {"name": path.stem, "texts": {}}
         name, texts = layer["name"], layer["texts"]
         in_file, _, own = texts.get(NAME, "").partition("\n")
         name = own if in_file == name else name
@@ -163,7 +161,6 @@ def read(path: Path) -> MeshData:
 
 
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:
-    """Vertices at which a support's point lies."""
     support = np.full(len(X), FREE, dtype=np.int8)
     tree, reach = cKDTree(X), TOLERANCE * bounding_size(X)
     for kind in (SLIDING, FIXED):

@@ -1,8 +1,7 @@
-"""STL (.stl): written as text with one solid per patch, read in either form.
+"""STL (.stl): written as text with one solid per patch, read in either form: only triangles and names.
 
-It holds only triangles and names: supports, tensions, pressures and scalars are lost. Programs read the
-coordinates in single precision, seven digits. So a surface far from the origin, as in a survey's
-coordinates, is written about its middle, which the format has no place for.
+Programs read the coordinates in single precision. So a surface far from the origin is written about its
+middle, which the format has no place for.
 """
 
 from __future__ import annotations
@@ -12,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.arrays import format_rows
 from ..base.errors import FileError
+from ..base.libraries import load_library, translated_errors
 from ..surface import Surface
 from ..surface.geometry import area_vectors, file_origin
 from .formats import Content
-from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata
 from .patch_meshes import from_scene
-from .text import format_rows
 
 SPECIAL = re.compile("solid|vertex", re.I)  # readers look for these words, in names too
 FACET = (

@@ -1,4 +1,4 @@
-"""Numbers, names and expressions such as "sqrt(2)/2" or "z - 0.5*x" in files of text."""
+"""Columns, numbers, names and expressions such as "sqrt(2)/2" or "z - 0.5*x" in files of text."""
 
 from __future__ import annotations
 
@@ -8,25 +8,19 @@ import operator
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+import pandas as pd
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
 
 LONGEST = 500  # characters: Python's parser cannot bear any depth of brackets and signs
 Fail = Callable[[str], FileError]
-
-
-def format_rows(template: str, *columns: np.ndarray) -> str:
-    """The template filled with each row of the columns; ``%r`` writes a float exactly.
-
-    >>> format_rows("v %r %d\\n", np.array([0.1, 2.0]), np.array([3, 4]))
-    'v 0.1 3\\nv 2.0 4\\n'
-    """
-    return "".join(template % row for row in zip(*(column.tolist() for column in columns), strict=True))
 
 
 def numbers(words: Sequence[str], kind: type = np.float64) -> Any:
@@ -107,3 +101,81 @@ def _term(node: ast.expr, known: Mapping[str, float]) -> Floats:
             if not value[1:].any() and value[0] >= 0.0:
                 return math.sqrt(value[0]) * np.eye(4)[0]
     raise ValueError(f"{ast.unparse(node)!r} is not a number, a parameter or linear in x, y, z")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a text file. A form feed stands for a line end that does not end a statement."""
+
+    text: str
+    first_line: int = 1
+    known: Mapping[str, float] = field(default_factory=dict)  # parameters of expressions by name
+
+    def error(self, problem: str, row: int | None = None, offset: int = 0, found: str = "") -> FileError:
+        """An error on the given line of those that are not blank (from 0), or at an offset into the text."""
+        if row is not None:
+            starts = [m.start() for m in re.finditer(r"^[^\S\n]*\S", self.text, re.M)]
+            offset = starts[min(row, len(starts) - 1)]
+        line, found = self.first_line + line_ends(self.text[:offset]), " ".join(found.split())[:60]
+        text = f"line {line}: {problem}" + (f", found {found!r}" if found else "")
+        return FileError(text, where=line, found=found or None)
+
+    def columns(self, pattern: str, what: str) -> list[tuple[str, ...]]:
+        """For each group of the pattern its texts on all lines that are not blank."""
+        matches = re.findall(rf"^[^\S\n]*{pattern}$", self.text, re.M)
+        lines = re.findall(r"^[^\S\n]*\S[^\n]*$", self.text, re.M)
+        one = re.compile(rf"[^\S\n]*{pattern}")
+        if len(matches) != len(lines):
+            row = next(k for k, line in enumerate(lines) if not one.fullmatch(line))
+            raise self.error(f"expected {what}", row, found=lines[row])
+        return list(zip(*matches, strict=True)) or [()] * one.groups
+
+    def integers(self, words: Sequence[str], row: int | Ints | None = None) -> Ints:
+        """Integers from words of the given rows, by default one of each row."""
+        try:
+            return np.array(words, dtype=np.int64)
+        except (OverflowError, ValueError):
+            bad = next((k for k, word in enumerate(words) if len(word.lstrip("-0")) > 18), 0)
+            at = bad if row is None else int(np.broadcast_to(row, len(words))[bad])
+            raise self.error("expected whole numbers below 2^63", at, found=words[bad][:40]) from None
+
+    def numbers(self, words: Sequence[str], row: int | None = None) -> Floats:
+        """Floats from words of the given row, by default one of each row: numbers, or expressions."""
+        try:
+            return numbers(words)
+        except ValueError:
+            rows = range(len(words)) if row is None else [row] * len(words)
+            fails = (partial(self.error, row=k) for k in rows)
+            values = [constant(w, self.known, fail) for w, fail in zip(words, fails, strict=True)]
+            return np.array(values)
+
+    def values(self, rest: Sequence[str], key: str, default: float = 0.0) -> tuple[Floats, Bools]:
+        """(k,) the number after a key in what follows each element, and where there is one."""
+        pattern = re.compile(rf"\b(?:{key})\s+\{{?([^\s{{}}]+)", re.I)
+        if not pattern.search("\n".join(set(rest))):
+            return np.full(len(rest), default), np.zeros(len(rest), dtype=bool)
+        code, kinds, first = kinds_of(rest)
+        value, given = np.full(len(kinds), default), np.zeros(len(kinds), dtype=bool)
+        for k, words in enumerate(kinds):
+            if hit := pattern.search(words):
+                value[k], given[k] = self.numbers((hit[1],), int(first[k]))[0], True
+        return value[code], given[code]
+
+    def places(self, ids: Ints, wanted: Ints, what: str, row: Ints | None = None) -> Ints:
+        order = np.argsort(ids, kind="stable")
+        place = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]
+        bad = np.flatnonzero(ids[place] != wanted)
+        if len(bad):
+            problem, at = f"there is no {what} {wanted[bad[0]]}", bad if row is None else row[bad]
+            raise self.error(problem, int(at[0]))
+        return place
+
+
+def line_ends(content: str) -> int:
+    return content.count("\n") + content.count("\f")
+
+
+def kinds_of(rest: Sequence[str]) -> tuple[Ints, Any, Ints]:
+    """The number of each text, the different texts, and where each is first."""
+    code, kinds = pd.factorize(np.array(rest, dtype=object))
+    return code, kinds, np.unique(code, return_index=True)[1]

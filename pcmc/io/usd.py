@@ -1,9 +1,7 @@
-"""Universal Scene Description (.usda), written only: a mesh per patch, in single precision.
+"""Universal Scene Description (.usda), written only: a mesh per patch, in single precision, z up.
 
-z is up, and the file names the unit of length (metres if the surface has none). Each patch is a mesh with a
-material of its name, in its colour; with ``colour`` the vertices have the colours of a scalar. A surface far
-from the origin is written about its middle, and the transform of the roof places it. Supports and scalars are
-primvars; tensions, pressures, plane and walls without height are custom data of the roof.
+A surface far from the origin is written about its middle, and the transform of the roof places it. Each patch
+has a material, or colours at the vertices. Supports and scalars are primvars, the rest custom data.
 """
 
 from __future__ import annotations
@@ -29,7 +27,6 @@ SUPPORT = "support"
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """One layer."""
     try:
         from pxr import Sdf, Usd, UsdGeom, Vt
     except ImportError:

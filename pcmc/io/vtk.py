@@ -1,23 +1,19 @@
 """VTK's XML files (.vtp, .vtu), which ParaView reads: only the certificate is lost.
 
-Cells carry ``patch``, points ``support`` (0 free, 1 sliding, 2 fixed), both the scalars; names,
-tensions, pressures and plane are field data.
+Cells carry ``patch``, points ``support``, both the scalars; the metadata are field data.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Ints
 from ..base.errors import FileError
+from ..base.libraries import load_library, read_arrays, require
 from ..surface import Surface
 from .formats import Content
-from .libraries import load_library, read_arrays, require
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import from_polygons
@@ -28,7 +24,6 @@ FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
-    """Polygons in a .vtp, cells in a .vtu."""
     pyvista = load_library("pyvista")
     mesh = pyvista.PolyData.from_regular_faces(surface.vertices, surface.faces)
     mesh.point_data["support"] = support_of(surface)
@@ -36,12 +31,9 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     for name, values in content.scalars.items():
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
     mesh.field_data["pcmc"] = [content.metadata]
-    if path.suffix.lower() == ".vtu":
-        mesh = mesh.cast_to_unstructured_grid()
-    library = load_library("vtkmodules.vtkIOXML")
-    flat = isinstance(mesh, pyvista.PolyData)
+    library, flat = load_library("vtkmodules.vtkIOXML"), path.suffix.lower() == ".vtp"
     writer = library.vtkXMLPolyDataWriter() if flat else library.vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(mesh)
+    writer.SetInputData(mesh if flat else mesh.cast_to_unstructured_grid())
     writer.SetDataModeToBinary()
     writer.WriteToOutputStringOn()  # where a disk is full, VTK crashes
     writer.Write()
@@ -59,15 +51,6 @@ def read(path: Path) -> MeshData:
             text = f"{match[0][:60].decode()}, but the file has only {len(data)} bytes"
             raise FileError(text, where=1 + data.count(b"\n", 0, match.start()), found=match[1][:60].decode())
     arrays = read_arrays("io/reading_scripts.py", "vtk_arrays", path)
-    corners, counts, chosen = _cells(arrays)
-    points = np.asarray(arrays["points"]).reshape(-1, 3)
-    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
-    metadata = parse_metadata(arrays["text"])
-    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)
-
-
-def _cells(arrays: Mapping[str, Any]) -> tuple[Ints, Ints, Ints]:
-    """Corners, corners per face, and the faces' places among all cells."""
     types, offsets, connected = (np.asarray(arrays[name]) for name in ("types", "offsets", "corners"))
     solid = np.flatnonzero(types >= FIRST_SOLID)
     if len(solid):
@@ -81,4 +64,8 @@ def _cells(arrays: Mapping[str, Any]) -> tuple[Ints, Ints, Ints]:
     chosen = np.flatnonzero(np.isin(types, FLAT))
     counts = np.diff(offsets)[chosen] if len(chosen) else np.zeros(0, dtype=np.int64)
     start = np.repeat(offsets[chosen] - np.cumsum(counts) + counts, counts)
-    return connected[start + np.arange(counts.sum())], counts, chosen
+    corners = connected[start + np.arange(counts.sum())]
+    points = np.asarray(arrays["points"]).reshape(-1, 3)
+    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
+    metadata = parse_metadata(arrays["text"])
+    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)

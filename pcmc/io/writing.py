@@ -6,7 +6,7 @@ import os
 import re
 import warnings
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,17 +24,9 @@ from .metadata import metadata_text
 from .patch_meshes import encode_walls
 
 
-class Solved(Protocol):
-    """The result of a solver, whose certificate is written, too, or of ``repair``."""
-
-    @property
-    def surface(self) -> Surface:
-        """The surface reached."""
-
-
 def write(
     path: str | os.PathLike[str],
-    surface: Surface | Solved,
+    surface: Surface | Any,
     *,
     scalars: Mapping[str, Floats] | None = None,
     certificate: object | None = None,
@@ -43,21 +35,20 @@ def write(
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
-    A wall below a junction on Π has triangles without area. Formats with a mesh per patch (.stl, .glb,
-    .gltf, .3dm, .ifc, .usda) leave them out; all but .stl hold these walls as text, and ``read`` puts them
-    back. From .stl, and if another program changed the surface, the junction comes back sliding on Π.
+    A wall below a junction on Π has triangles without area. Formats with a mesh per patch (.stl, .glb, .gltf,
+    .3dm, .ifc, .usda) leave them out; all but .stl hold these walls as text, and ``read`` puts them back.
+    From .stl, and if another program changed the surface, the junction comes back sliding on Π.
 
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
-    surface : a Surface, or the result of a solver, whose certificate is then written, too; or that of
-        ``repair``: the file then says which patches have no tension of their own.
+    surface : a Surface, or the result of a solver, whose certificate is then written, or of ``repair``.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
     certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
     colour : the (n,) scalar that colours the vertices (.glb, .gltf, .usda); else each patch has a colour.
-    units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units`` with that of forces.
-        The file names them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
-        (scalars are not). Without a unit the numbers stay, and .3dm, .ifc and .usda files are in metres.
+    units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units``; the file names them.
+        To .glb and .gltf, which are in metres, the surface is converted (scalars are not). Without a unit the
+        numbers stay, and .3dm, .ifc and .usda files are in metres.
 
     Warns
     -----
@@ -67,10 +58,9 @@ def write(
     path = as_path(path)
     check_name(path)
     form, solved = format_of(path, FORMATS), surface
-    surface = solved if isinstance(solved, Surface) else getattr(solved, "surface", solved)
+    surface = getattr(solved, "surface", solved)
     expect_surface(surface)
-    assert isinstance(surface, Surface)
-    if surface is not solved and form.certificate and certificate is None:
+    if form.certificate and certificate is None:
         certificate = getattr(solved, "certificate", None)
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
@@ -98,12 +88,12 @@ def write(
     bare = getattr(solved, "bare", ())
     metadata = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
     content = Content(metadata, carried, colour, _values(certificate), walls, units, bare)
+    for name in carried:
+        if re.sub(r"\s+", "_", name) in form.reserved:
+            text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
+            raise FileError(text, what=str(path), where=name, found=name)
     with writing(path), atomic_write(path) as temporary:
         try:
-            for name in carried:
-                if re.sub(r"\s+", "_", name) in form.reserved:
-                    text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
-                    raise FileError(text, where=name, found=name)
             note = form.functions.write(temporary, shown, content)
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
@@ -122,9 +112,8 @@ def _values(certificate: Any) -> Mapping[str, Any]:
     names = getattr(certificate, "FILED", None)
     if names is None:
         found = type(certificate).__name__
-        raise FileError(
-            f"certificate: expected a Certificate, found {found}", what="certificate", found=found
-        )
+        text = f"certificate: expected a Certificate, found {found}"
+        raise FileError(text, what="certificate", found=found)
     return {name: getattr(certificate, name) for name in names}
 
 

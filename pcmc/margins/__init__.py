@@ -4,7 +4,6 @@ Gives ``margin`` and ``Margin``, and the quantity "margin" to targets. May impor
 below it.
 """
 
-from .edge import Margin, margin
-from .ending import MarginEnd
+from .edge import Margin, MarginEnd, margin
 
 __all__ = ["Margin", "MarginEnd", "margin"]

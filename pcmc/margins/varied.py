@@ -11,7 +11,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..certificate.parameters import Parameter
+from ..certificate.quantities import Parameter
 from ..continuation import Direction
 from ..surface import Surface
 

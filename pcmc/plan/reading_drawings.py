@@ -1,6 +1,6 @@
 """The part of the reading process that reads drawings: entities of a .dxf or .3dm as plain values.
 
-``io.libraries`` loads this file by its path, so it imports nothing of pcmc. Every reader returns a dict
+``base.libraries`` loads this file by its path, so it imports nothing of pcmc. Every reader returns a dict
 with the ``unit`` as the format names it, the ``entities``, and the counts of ``others``, by layer and kind,
 and of ``hidden`` ones, by layer. An entity has its ``layer``, ``kind`` and ``handle``, and one of:
 ``pieces``, the smooth pieces of a curve in order; ``point``; ``text`` with its ``point``. A piece is

@@ -18,8 +18,8 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError, MissingExtra, unknown
 from ..base.files import check_regular, system_error
+from ..base.libraries import read_arrays
 from ..base.units import length_factor, unit_in_file
-from ..io.libraries import read_arrays
 from ..surface.curves import Curve
 from ..surface.pieces import Piece
 

@@ -1,7 +1,6 @@
 """Pictures of surfaces (pyvista or matplotlib) and of curves; needs the extra ``plot``, no display.
 
-With a path every function writes a PNG; each returns the picture as an (h,w,3) array of bytes. May import
-``panels`` and the rooms below it.
+With a path every function writes a picture; each returns it as an (h,w,3) array of bytes.
 """
 
 from .curves import convergence, diagram, heatmap, histories, lines

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra
+from ..base.libraries import require
 from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL, Image
 from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Rendering
@@ -38,7 +38,6 @@ class ColorScale:
         return colors
 
     def bar(self, figure: Any, axes: Sequence[Any], label: str) -> None:
-        """Draw the scale below the axes."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
@@ -58,11 +57,9 @@ def color_bar(figure: Any, mappable: Any, axes: Sequence[Any], label: str) -> An
 
 
 def color_map(name: str) -> Any:
-    """The matplotlib colour map of this name."""
-    try:
-        from matplotlib import colormaps
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    require("matplotlib", extra="plot")
+    from matplotlib import colormaps
+
     return colormaps[validate.choice("cmap", name, sorted(colormaps))]
 
 
@@ -117,7 +114,6 @@ def _visible(image: Image, color: Floats, step: int = 2) -> bool:
 
 
 def add_legend(figure: Any, pictures: Iterable[Picture]) -> None:
-    """The legend at the foot of the figure."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch as Swatch
 

@@ -17,8 +17,6 @@ from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, fit_height, g
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..continuation import Branch
-
 SCALES = ("linear", "log")
 MARKERS = "osD^vPX"
 EVENT_MARKERS = {"fold": "o", "index": "D", "contact": "x"}
@@ -51,9 +49,7 @@ def lines(
     """
     for scale in (xscale, yscale):
         validate.choice("scale", scale, SCALES)
-    figure, axes = new_axes(width, height, title, x, y)
-    axes.set_xscale(xscale)
-    axes.set_yscale(yscale)
+    figure, axes = new_axes(width, height, title, x, y, xscale, yscale)
     for k, (label, (xs, ys)) in enumerate(curves.items()):
         px, py = _curve(label, xs, ys, xscale, yscale)
         color = CURVES[k % len(CURVES)]
@@ -126,9 +122,7 @@ def convergence(
     height: int = 640,
 ) -> Image:
     """Errors against edge lengths on logarithmic axes, with the least-squares slope of each."""
-    figure, axes = new_axes(width, height, title, x, y)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    figure, axes = new_axes(width, height, title, x, y, "log", "log")
     for k, (name, (xs, ys)) in enumerate(curves.items()):
         color, label = CURVES[k % len(CURVES)], name
         px, py = _curve(name, xs, ys, "log", "log")
@@ -171,12 +165,11 @@ def heatmap(
     """
     xs, ys = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     shape = (len(ys), len(xs))
-    data = {k: _table("tables", k, v, shape).astype(float) for k, v in tables.items()}
-    if not data:
+    given = {k: v.astype(float) for k, v in _tables("tables", tables, shape).items()}
+    if not given:
         validate.refuse("tables", 0, "at least one table")
-    for name, v in data.items():
-        data[name] = np.where(np.isfinite(v) & ((v > 0.0) | (not log)), v, np.nan)
-    crosses = {k: _table("marks", k, v, shape) for k, v in (marks or {}).items()}
+    data = {k: np.where(np.isfinite(v) & ((v > 0.0) | (not log)), v, np.nan) for k, v in given.items()}
+    crosses = _tables("marks", marks or {}, shape)
     for name in crosses.keys() - data.keys():
         raise OptionError(unknown("table", name, data), what="marks", where=name)
     columns = min(columns, len(data))
@@ -202,7 +195,7 @@ def heatmap(
 
 
 def diagram(
-    branches: Mapping[str, Branch],
+    branches: Mapping[str, Any],
     path: Path | None = None,
     *,
     x: str = "parameter",
@@ -213,7 +206,7 @@ def diagram(
     width: int = 900,
     height: int = 640,
 ) -> Image:
-    """Branches by label: columns y against x, solid where stable (index 0), dashed where not.
+    """Branches of ``pcmc.follow`` by label: columns y against x, solid where stable, dashed where not.
 
     Folds, changes of index and changes of contact are marked.
     """
@@ -239,7 +232,7 @@ def diagram(
     return finish(figure, path)
 
 
-def _pieces(branch: Branch, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:
+def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:
     """The branch cut where its stability changes; events are points of it too."""
     columns = ["arclength", x, y]
     events = branch.events[columns].assign(index=branch.events.index_after)
@@ -251,10 +244,10 @@ def _pieces(branch: Branch, x: str, y: str) -> list[tuple[bool, tuple[Floats, Fl
     return [(bool(stable[i]), (every[i : k + 1, 1], every[i : k + 1, 2])) for i, k in ends]
 
 
-def new_axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, Any]:
-    """A figure with one pair of axes, their title and labels."""
+def new_axes(width: int, height: int, title: str, x: str, y: str, *scales: str) -> tuple[Any, Any]:
     figure = new(width, height, pad=8.0)
     axes = style(figure.subplots())
+    axes.set(**dict(zip(("xscale", "yscale"), scales, strict=False)))
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
     label_axes(axes, x, y)
     return figure, axes
@@ -300,11 +293,12 @@ def _curve(
     return px, py
 
 
-def _table(what: str, title: str, values: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[Any]:
-    table = np.asarray(values)
-    if table.shape != shape:
-        validate.refuse(what, table.shape, f"shape {shape}, (len(y), len(x))", where=title)
-    return table
+def _tables(what: str, given: Mapping[str, npt.ArrayLike], shape: tuple[int, int]) -> dict[str, Any]:
+    tables = {title: np.asarray(values) for title, values in given.items()}
+    for title, table in tables.items():
+        if table.shape != shape:
+            validate.refuse(what, table.shape, f"shape {shape}, (len(y), len(x))", where=title)
+    return tables
 
 
 def _norm(values: Floats, log: bool, limits: tuple[float, float] | None) -> Any:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import MissingExtra
 from ..base.files import atomic_write, suffix_of, writing
+from ..base.libraries import require
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
@@ -26,16 +26,12 @@ Path = str | os.PathLike[str]
 
 
 def new(width: float, height: float, pad: float = 4.0) -> Any:
-    """A figure of the given size in pixels, drawn by Agg; no global state.
+    """A figure of a size in pixels, drawn by Agg, its parts ``pad`` pixels apart; no global state."""
+    require("matplotlib", extra="plot")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    Matplotlib's constrained layout places its parts, ``pad`` pixels apart.
-    """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-        from matplotlib.layout_engine import ConstrainedLayoutEngine
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
     gap = pad / DPI
     layout = ConstrainedLayoutEngine(w_pad=gap, h_pad=gap, wspace=0.0, hspace=0.0)
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white", layout=layout)
@@ -53,12 +49,9 @@ def grid(figure: Any, count: int, columns: int, **options: Any) -> tuple[list[An
 
 
 def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
-    """Choose the figure's height so that each row of axes has its ratio of height to width.
+    """Choose the figure's height so that each row of axes has its ratio of height to width; end the layout.
 
-    Parameters
-    ----------
-    ratios : height / width by axes, one of each row. Titles, labels, scales and legends take the
-        space that the layout finds for them. The layout is then final: nothing moves any more.
+    ``ratios`` are height / width by axes, one of each row; titles, scales and legends keep their space.
     """
     _as_written(figure)
     for _ in range(4):
@@ -73,10 +66,7 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
 
 
 def _as_written(figure: Any) -> None:
-    """Draw the names in a figure as they are, and no mathematics between two signs $.
-
-    Numbers at axes have no text yet, and are mathematics once they are drawn: powers of ten.
-    """
+    """Draw names as they are, and no mathematics between two signs $; powers of ten at axes come later."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
@@ -98,9 +88,8 @@ def style(axes: Any) -> Any:
 
 
 def overlap_style(k: int, count: int) -> dict[str, Any]:
-    """Line style of curve ``k`` of ``count`` by which curves that lie on each other all stay visible.
-
-    The first is wide and solid, the others are thinner and thinner, dashed in each other's gaps.
+    """Line style of curve ``k`` of ``count`` by which curves that lie on each other all stay visible: wide
+    and solid, then thinner and thinner, dashed in each other's gaps.
     """
     if k == 0:
         return {"linewidth": 2.6, "linestyle": "-"}
@@ -109,15 +98,13 @@ def overlap_style(k: int, count: int) -> dict[str, Any]:
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a path that is not a picture's."""
     suffix_of(path, SUFFIXES, "a picture")
 
 
 def finish(figure: Any, path: Path | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG, SVG or PDF if there is a path.
 
-    The file has no date and no program's name: the same figure gives the same bytes. In SVG and PDF, text
-    and curves are lines, and surfaces are pictures in them.
+    No date and no program's name: the same figure gives the same bytes. In SVG and PDF, text is lines.
     """
     _as_written(figure)
     figure.canvas.draw()
@@ -132,7 +119,6 @@ def finish(figure: Any, path: Path | None) -> Image:
 
 
 def png(image: Image) -> bytes:
-    """The content of a PNG file."""
     from PIL import Image as Pillow
 
     stream = io.BytesIO()
@@ -141,13 +127,10 @@ def png(image: Image) -> bytes:
 
 
 def _vector(figure: Any, kind: str) -> bytes:
-    """The figure as an SVG or a PDF."""
     from matplotlib import rc_context
 
-    nobody: dict[str, Any] = {
-        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-        "svg": {"Date": None},
-    }
+    nobody: dict[str, Any] = {"svg": {"Date": None}}
+    nobody["pdf"] = dict.fromkeys(("CreationDate", "Creator", "Producer"))
     stream = io.BytesIO()
     with rc_context({"svg.hashsalt": "pcmc", "pdf.fonttype": 42}):
         figure.savefig(stream, format=kind, metadata=nobody[kind], dpi=DPI)

@@ -25,7 +25,7 @@ from .raster import paint
 from .scene import Camera, Rendering, mean_edge, scene, view_of
 
 if TYPE_CHECKING:
-    from ..panelling import Panels
+    from .. import Panels
 
 ViewName = str | tuple[float, float]
 
@@ -49,11 +49,11 @@ def draw(
     width: int = 900,
     **options: Any,
 ) -> Image:
-    """A picture of a surface, in parallel projection.
+    """A picture of a surface, in parallel projection: an (h,w,3) uint8 array.
 
     Parameters
     ----------
-    path : PNG file to write, or None.
+    path : PNG, SVG or PDF file to write, or None.
     view : "diagonal", "elevation" (along Π), "plan" (onto Π), or (azimuth, elevation) in degrees.
     scalars : (n,) or (m,) values shown as colours, with a scale; NaN is grey. None: patch colours.
     label : what the scalars are, beneath the scale.
@@ -68,25 +68,14 @@ def draw(
     width : of the picture in pixels.
     renderer : "pyvista", "matplotlib", or "auto": pyvista for many triangles where the system has OpenGL.
 
-    Returns
-    -------
-    (h,w,3) uint8 array, the picture.
-
     Raises
     ------
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
     """
-    return panel(
-        [surface],
-        path,
-        views=[view],
-        scalars=None if scalars is None else [scalars],
-        numbers=None if numbers is None else [numbers],
-        titles=[title] if title else (),
-        width=width,
-        **options,
-    )
+    given = {"views": view, "scalars": scalars, "numbers": numbers}
+    one: dict[str, Any] = {name: None if value is None else [value] for name, value in given.items()}
+    return panel([surface], path, titles=[title] if title else (), width=width, **one, **options)
 
 
 def panel(
@@ -134,8 +123,7 @@ def compose(
 ) -> Image:
     """The picture of all drawings; the options are those of ``draw`` and ``panel``.
 
-    Points ``around`` (k,2) have a place in it, too, as has a text at its ``foot``; ``overlay`` draws on the
-    last of the axes.
+    Points ``around`` (k,2) and a text at the ``foot`` have a place; ``overlay`` draws on the last axes.
     """
     points = [np.concatenate([drawing.points(one_scale), *around]) for drawing in drawings]
     frames = frames_of(points, columns, width, one_scale)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra
+from ..base.libraries import load_library, require
 from .figure import Image
 from .scene import Scene
 
@@ -22,9 +22,8 @@ MANY = 40_000  # triangles from which pyvista is faster than matplotlib, its imp
 
 
 def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto") -> Image:
-    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner.
-
-    ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
+    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner, ``scale``
+    pixels per unit of length, ``size`` (w, h) in pixels.
     """
     from PIL import Image as Pillow
 
@@ -40,7 +39,7 @@ def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], render
 @cache
 def opengl() -> bool:
     """Whether VTK can draw here. A child process tries it: without a driver VTK aborts the process."""
-    _pyvista()
+    require("pyvista", extra="plot")
     probe = (
         "import vtkmodules.vtkRenderingOpenGL2\n"
         "from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow\n"
@@ -51,16 +50,8 @@ def opengl() -> bool:
     return done.returncode == 0
 
 
-def _pyvista() -> Any:
-    try:
-        import pyvista
-    except ImportError:
-        raise MissingExtra("pyvista", "plot") from None
-    return pyvista
-
-
 def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
-    pyvista = _pyvista()
+    pyvista = load_library("pyvista", "plot")
     width, height = size[0] * SAMPLES, size[1] * SAMPLES
     with pyvista.vtk_verbosity("off"):
         plotter = pyvista.Plotter(off_screen=True, window_size=(width, height), lighting="none")

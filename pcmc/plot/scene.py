@@ -1,7 +1,6 @@
 """A surface as coloured triangles, lines and dots, in a view: everything except the painting.
 
-Projection is parallel throughout, so lengths can be compared between pictures and text can be
-placed on the vertices. Light and colour are computed here, so both painters show the same.
+Projection is parallel, so lengths can be compared. Light and colour are the same for both painters.
 """
 
 from __future__ import annotations
@@ -45,8 +44,7 @@ class Camera:
 def view_of(surface: Surface, view: str | tuple[float, float]) -> Camera:
     """From a name or (azimuth, elevation) in degrees; the normal of Π is up.
 
-    Azimuth turns about the normal, from the first of x, y, z that is not along it; -90 looks along
-    +y when Π is horizontal.
+    Azimuth turns about it, from the first of x, y, z that is not along it: -90 looks along +y above a floor.
     """
     if isinstance(view, str):
         view = VIEWS[validate.choice("view", view, tuple(VIEWS))]
@@ -91,8 +89,7 @@ class Rendering:
 class Scene:
     """Everything that a painter needs.
 
-    ``order`` (t + s + d,) numbers triangles, then segments, then dots, farthest first: a triangle is as near
-    as its middle, what lies on triangles as near as the nearest of them.
+    ``order`` (t + s + d,) numbers triangles, then segments, then dots, farthest first.
     """
 
     view: Camera
@@ -115,9 +112,9 @@ def scene(
     edges: bool,
     patches: Sequence[str] | None = None,
 ) -> Scene:
-    """``values`` is None for patch colours, or RGB (n,3) or (m,3), NaN where there is none.
+    """The scene of a surface, or of the ``patches`` named; ``edges`` draws the mesh.
 
-    ``edges`` draws the mesh, ``patches`` only those named.
+    ``values`` are None for patch colours, or RGB (n,3) or (m,3), NaN where there is none.
     """
     shown = np.ones(surface.m, dtype=bool)
     if patches is not None:
@@ -167,9 +164,8 @@ def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
 
 
 def _light(surface: Surface, shown: Bools, view: Camera, strength: float, smooth: bool) -> Floats:
-    """(t,3) brightness at the corners of a matt sheet seen from either side, lit from above the left.
-
-    The normals are the faces', or if ``smooth`` their means at each vertex in its patch.
+    """(t,3) brightness at the corners of a matt sheet seen from either side, lit from above the left; normals
+    are the faces', or if ``smooth`` their means at each vertex in its patch.
     """
     F = surface.faces
     area = area_vectors(surface.vertices[F])
@@ -188,10 +184,7 @@ def _light(surface: Surface, shown: Bools, view: Camera, strength: float, smooth
 
 
 def _cells(P: Floats, known: Floats, light: Floats) -> tuple[Floats, Floats]:
-    """Each triangle in six, two around each corner in the corner's colour.
-
-    So no colour shows that no vertex has.
-    """
+    """Each triangle in six, two around each corner in its colour: no colour shows that no vertex has."""
     middle, bright = P.mean(axis=1), light.mean(axis=1)
     corners, colors = [], []
     for k in range(3):

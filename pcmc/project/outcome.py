@@ -15,7 +15,6 @@ from ..base.errors import PcmcError
 from ..base.units import NO_UNITS, Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
-from ..forces.pinching import standing_part
 from ..solvers.result import Progress, Result
 from ..surface import Surface, mirrored, unfolded
 from .settings import Output
@@ -158,7 +157,7 @@ class Outcome:
         advice takes the place of."""
         message, detail = self.solved.message, self.certificate.detail
         if self.advice:
-            strained = strained_junction(self.surface, standing_part(self.surface).walls.pinchable)
+            strained = strained_junction(self.surface)
             if strained is not None:
                 message, detail = (text.replace(strained.hint, "") for text in (message, detail))
         return message, detail

@@ -38,12 +38,9 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     edges = [float(np.linalg.norm(line.points[1] - line.points[0])) for line in panels]
     drop = bool(edges) and float(np.mean(edges)) < LEAST_EDGE
     lines = [line for line in sheet.lines if not (drop and line.layer == "PCMC-PANEL")]
-    low, _ = view.box
-    drawn = [line.points for line in sheet.lines if line.layer not in ("PCMC-TEXT", "PCMC-PANEL")]
-    factor = length_factor(units.length, "mm") / float(sheet.scale.removeprefix("1:"))
-    shift = np.concatenate(drawn or [line.points for line in panels]).min(axis=0) - factor * low
     marks, texts = sheet.drawn()
     lines += marks[len(sheet.lines) :]
+    ((factor, shift),) = sheet.places
     supports = zip(certificate.supports["support"], certificate.supports[["x", "y"]].to_numpy(), strict=True)
     labels = [(name, at, "PCMC-SUPPORT") for name, at in supports]
     if len(certificate.junctions):

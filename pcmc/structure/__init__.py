@@ -1,8 +1,4 @@
-"""Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer.
-
-Gives ``StructuralModel``, ``Material``, the loads, ``write_structure`` and ``read_results``. Imports
-``solvers``, ``certificate`` and the rooms below.
-"""
+"""Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer."""
 
 from .inp import write_structure
 from .loads import SelfWeight, Snow, Step, Wind

@@ -1,7 +1,5 @@
-"""Write a structural model as the input file of CalculiX (``.inp``, in the language of Abaqus).
-
-Cables are trusses with the tension of the cable. Beams would bend: beside a held end over a length √(EI/τ),
-which a thick cable feels over a whole bay.
+"""Write a structural model as the input file of CalculiX (``.inp``, in the language of Abaqus). Cables are
+trusses: a beam would bend beside a held end over a length √(EI/τ), for a thick cable a whole bay.
 """
 
 from __future__ import annotations
@@ -12,15 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base import validate
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, format_rows
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
-from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from .loads import Step
-from .model import Material, StructuralModel
+from .model import Material, StructuralModel, expect_model
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
 POINTS, CABLE_POINTS = 2, 8  # integration points: one above the other; a truss is expanded to a brick
@@ -45,15 +41,13 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     path = Path(path)
     check_name(path)
     suffix_of(path, (".inp",), "a structural model")
-    if not isinstance(model, StructuralModel):
-        validate.refuse("model", type(model).__name__, "a StructuralModel")
+    expect_model(model)
     text = "".join(_sections(model))
     with writing(path), atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _sections(model: StructuralModel) -> Iterator[str]:
-    """The text of the file, part by part."""
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
     yield f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"
     yield f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")
@@ -64,8 +58,6 @@ def _sections(model: StructuralModel) -> Iterator[str]:
     yield "*NODE, NSET=NALL\n"
     yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)
     yield from _elements(model)
-    if surface.cables:
-        yield from _cable_elements(model)
     yield from _supports(model)
     yield from _prestress(model)
     for k, step in enumerate(model.steps):
@@ -73,25 +65,22 @@ def _sections(model: StructuralModel) -> Iterator[str]:
 
 
 def _elements(model: StructuralModel) -> Iterator[str]:
-    """Elements, node sets and sections by patch, and the material."""
+    """Elements, node sets and sections by patch and by cable, and their materials."""
     surface, (name, section, _) = model.standing, KINDS[model.elements]
-    present = []
-    for k, thickness in enumerate(model.thicknesses.tolist(), 1):
-        mine = surface.patch_of_face[model.active] == k - 1
-        if not mine.any():
-            continue
+    patch_of = surface.patch_of_face[model.active]
+    present = np.unique(patch_of) + 1
+    for k, thickness in zip(present, model.thicknesses[present - 1].tolist(), strict=True):
+        mine = patch_of == k - 1
         corners = surface.faces[model.active[mine]]
-        present.append(f"PATCH_{k},\n")
         yield f"*ELEMENT, TYPE={name}, ELSET=PATCH_{k}\n"
         yield format_rows("%d,%d,%d,%d\n", model.faces[mine] + 1, *(corners.T + 1))
         yield _set(f"NODES_{k}", np.unique(corners))
         yield f"*{section} SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{short(thickness)}\n"
-    yield "".join(["*ELSET, ELSET=EALL\n", *present])
+    yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
     yield _material("MEMBRANE", model.material)
 
-
-def _cable_elements(model: StructuralModel) -> Iterator[str]:
-    """Elements, sections and material of the cables, and the set CABLES of all."""
+    if not surface.cables:
+        return
     for k, (cable, area, numbers, _) in enumerate(model.cable_edges(), 1):
         yield f"*ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}\n"
         yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))
@@ -171,7 +160,6 @@ def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
 
 
 def _set(name: str, vertices: Ints) -> str:
-    """A node set; empty text for none."""
     numbers = (np.asarray(vertices) + 1).astype(str)
     rows = [",".join(numbers[k : k + PER_LINE]) + "\n" for k in range(0, len(numbers), PER_LINE)]
     return "".join([f"*NSET, NSET={name}\n", *rows] if rows else [])
@@ -187,5 +175,4 @@ def short(value: float) -> str:
 
 
 def _line(text: str) -> str:
-    """The text in one line of at most LONGEST characters."""
     return " ".join(text.split())[:LONGEST]

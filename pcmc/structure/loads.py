@@ -36,7 +36,7 @@ class SelfWeight:
     def __post_init__(self) -> None:
         if self.gravity is not None:
             gravity = validate.number("SelfWeight.gravity", self.gravity, least=SMALLEST, most=LARGEST)
-            object.__setattr__(self, "gravity", gravity)
+            vars(self)["gravity"] = gravity
         _check_name(self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
@@ -56,10 +56,9 @@ class Snow:
 
     def __post_init__(self) -> None:
         load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
-        object.__setattr__(self, "load", load)
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
-        object.__setattr__(self, "patches", tuple(self.patches))
+        vars(self).update(load=load, patches=tuple(self.patches))
         _check_name(self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:

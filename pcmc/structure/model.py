@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,6 @@ from ..certificate.certificate import certified
 from ..forces.cables import directions
 from ..forces.pinching import standing_part
 from ..forces.triangles import effective_tensions
-from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
@@ -49,13 +48,10 @@ class Material:
     density: float = 0.0
 
     def __post_init__(self) -> None:
-        limits: dict[str, dict[str, Any]] = {
-            "young": {"least": SMALLEST, "most": LARGEST},
-            "poisson": {"least": 0.0, "below": 0.5},
-            "density": {"least": 0.0, "most": LARGEST},
-        }
-        for name, bounds in limits.items():
-            object.__setattr__(self, name, validate.number(f"Material.{name}", getattr(self, name), **bounds))
+        most: dict[str, Any] = {"most": LARGEST}
+        limits = {"young": {"least": SMALLEST, **most}, "poisson": {"least": 0.0, "below": 0.5}}
+        for name, bounds in (limits | {"density": {"least": 0.0, **most}}).items():
+            vars(self)[name] = validate.number(f"Material.{name}", getattr(self, name), **bounds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +69,9 @@ class StructuralModel:
     elements : "membrane", without bending stiffness, or "shell". CalculiX's shells of three nodes are too
         stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
-    cable_material : of the cables; by default that of the patches.
-    certificate : of the surface, where it is known; by default it is computed.
-    units : of the surface's numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it
-        is not given. Without a unit of length that takes metres.
+    cable_material, certificate : by default those of the patches, and the one of the surface.
+    units : of the numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it is not
+        given. Without a unit of length that takes metres.
 
     Raises
     ------
@@ -106,9 +101,8 @@ class StructuralModel:
     units: Units = NO_UNITS
 
     def __post_init__(self) -> None:
-        given: Any = self.surface
-        solved = given if isinstance(given, Result) else None
-        surface = given if solved is None else solved.surface
+        solved: Any = self.surface  # or a surface, which has neither of these
+        surface = getattr(solved, "surface", solved)
         expect_surface(surface)
         if not isinstance(self.material, Material):
             hint = "give Material(young=..., poisson=...)"
@@ -118,16 +112,17 @@ class StructuralModel:
         checked_areas(self.cable_area, surface)
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
-        loads = check_loads(self.loads, surface)
-        heavy = any(isinstance(load, SelfWeight) for entry in loads for load in acting_together(entry))
-        if self.material.density == 0.0 and heavy:
+        vars(self).update(surface=surface, thickness=thickness, loads=check_loads(self.loads, surface))
+        if self.material.density == 0.0 and self.weights:
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
-        known = solved.certificate if self.certificate is None and solved is not None else self.certificate
-        certificate = certified(surface, self.anyway, known)
-        values = {"surface": surface, "thickness": thickness, "loads": loads, "certificate": certificate}
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        known = self.certificate or getattr(solved, "certificate", None)
+        vars(self).update(certificate=certified(surface, self.anyway, known))
+
+    @property
+    def weights(self) -> list[SelfWeight]:
+        single = [load for entry in self.loads for load in acting_together(entry)]
+        return [load for load in single if isinstance(load, SelfWeight)]
 
     @property
     def verdict(self) -> str:
@@ -144,27 +139,19 @@ class StructuralModel:
         """The units of the file's numbers in a line, or what was assumed as they are not known."""
         if self.units:
             return f"{self.units.sentence}, masses in {self.units.mass}, times in s"
-        single = [load for entry in self.loads for load in acting_together(entry)]
-        if any(isinstance(load, SelfWeight) and not load.gravity for load in single):
-            return (
-                f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
-            )
-        return ""
+        if all(load.gravity for load in self.weights):
+            return ""
+        return f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
 
     @cached_array
     def thicknesses(self) -> Floats:
         """(k,) thickness t of each patch."""
-        given, patches = self.thickness, self.surface.patches
-        return np.array(
-            [given[p.name] if isinstance(given, Mapping) else given for p in patches], dtype=float
-        )
+        return np.array([t for _, t in _each(self.thickness, self.surface.patches)], dtype=float)
 
     @cached_array
     def prestress(self) -> Floats:
-        """(e,) the membrane stress of each element under the form-finding load, force/area.
-
-        α/t; with a weight w per area (α + w z)/t, z the height of the middle above Π: so E = ∫ (α + w z) dA
-        has it, whose tension carries the part of the weight along the surface.
+        """(e,) the membrane stress of each element under the form-finding load, force/area: α/t, with a
+        weight w per area (α + w z)/t, z the height of the middle above Π, as E = ∫ (α + w z) dA has it.
         """
         s = self.standing
         faces, patch = s.faces[self.active], s.patch_of_face[self.active]
@@ -226,10 +213,8 @@ class StructuralModel:
 
     @cached_array
     def axes(self) -> Floats:
-        """(n,3,3) rows: the axes in which supports hold a vertex, those of space where none guides it.
-
-        On a plane the first axis is its normal, and held; along a line it is the line, and the others are
-        held.
+        """(n,3,3) rows: the axes in which supports hold a vertex. On a plane the first is its normal, held;
+        along a line it is the line, and the others are held.
         """
         axes = np.tile(np.eye(3), (self.surface.n, 1, 1))
         guided = np.flatnonzero(self.held & (self.freedom > 0))
@@ -250,8 +235,7 @@ class StructuralModel:
         return load_steps(self.standing, self.loads, GRAVITY * metre)
 
     def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
-        """(n,3) the loads of a step as forces on the vertices: thirds of triangles', halves of cable edges'.
-
+        """(n,3) the loads of a step as forces on the vertices: thirds of triangles', halves of cable edges';
         ``displacements`` (n,3) turn the pressures with the surface.
         """
         s, down = self.standing, -np.array(self.standing.plane.normal)
@@ -273,10 +257,8 @@ class Structure:
 
     Attributes
     ----------
-    young : Young's modulus, force per area.
+    young, poisson, density : as of ``Material``: t/m³ with kN and m. With a density, self-weight is a load.
     thickness : of all patches, length, or a table with one for each patch.
-    poisson : Poisson's ratio.
-    density : mass per volume, as of ``Material``: t/m³ with kN and m. Above 0, self-weight is a load.
     gravity : length/s²; by default 9.81 m/s² in the unit of length.
     snow : load per plan area, besides the snow that the form was found under; 0 for none.
     wind : pressures by patch, above 0 for suction on a roof.
@@ -292,17 +274,16 @@ class Structure:
     wind: Mapping[str, float] = field(default_factory=dict)
     cable_area: float | Mapping[str, float] | None = None
 
-    def __post_init__(self) -> None:
-        self.material  # noqa: B018 (refuses bad values before any work)
-        self.loads  # noqa: B018
-
-    @property
-    def material(self) -> Material:
-        """The material of the patches and cables."""
+    def __post_init__(self) -> None:  # refuses bad values before any work
         for name in ("young", "thickness"):
             if getattr(self, name) is None:
                 text = f"a structural model needs {name}; give --{name} or the key {name} of [structure]"
                 raise OptionError(text, what=name)
+        self.material, self.loads  # noqa: B018
+
+    @property
+    def material(self) -> Material:
+        """The material of the patches and cables."""
         return Material(young=self.young or 0.0, poisson=self.poisson, density=self.density)
 
     @property
@@ -326,10 +307,15 @@ class Structure:
         units: Units = NO_UNITS,
     ) -> StructuralModel:
         """The structural model of a surface at rest or of a result; errors as in ``pcmc.StructuralModel``."""
-        given: dict[str, Any] = {"cable_area": self.cable_area, "certificate": certificate, "units": units}
-        return StructuralModel(
-            surface, self.material, self.thickness or 0.0, self.loads, anyway=anyway, **given
-        )
+        about: dict[str, Any] = {"cable_area": self.cable_area, "certificate": certificate, "units": units}
+        thickness = self.thickness or 0.0
+        return StructuralModel(surface, self.material, thickness, self.loads, anyway=anyway, **about)
+
+
+def expect_model(value: object) -> None:
+    """Refuse anything but a StructuralModel."""
+    if not isinstance(value, StructuralModel):
+        validate.refuse("model", type(value).__name__, "a StructuralModel")
 
 
 def checked_thickness(given: object, surface: Surface) -> float | dict[str, float]:
@@ -337,24 +323,26 @@ def checked_thickness(given: object, surface: Surface) -> float | dict[str, floa
     limits: dict[str, Any] = {"least": THINNEST * surface.size, "most": surface.size}
     if not isinstance(given, Mapping):
         return validate.number("thickness", given, **limits)
-    for name in given:
-        surface.patch_index(name)
-    names = [patch.name for patch in surface.patches]
-    return {name: validate.number("thickness", given.get(name), where=name, **limits) for name in names}
+    values = _each(given, surface.patches, "patch")
+    return {name: validate.number("thickness", value, where=name, **limits) for name, value in values}
 
 
 def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
     """The area of each cable's section, from one number or one by name."""
-    names = [cable.name for cable in surface.cables]
     limits: dict[str, Any] = {"least": (THINNEST * surface.size) ** 2, "most": surface.size**2}
-    if given is None and names:
-        message = f"cable_area is missing: give the area of the section of cable {names[0]!r}, length²"
-        raise OptionError(message, what="cable_area", where=names[0])
-    if isinstance(given, Mapping):
-        for name in given:
-            validate.choice("cable", name, names)
-    areas = [given.get(name) if isinstance(given, Mapping) else given for name in names]
-    return tuple(
-        validate.number("cable_area", area, where=name, **limits)
-        for name, area in zip(names, areas, strict=True)
-    )
+    if given is None and surface.cables:
+        name = surface.cables[0].name
+        message = f"cable_area is missing: give the area of the section of cable {name!r}, length²"
+        raise OptionError(message, what="cable_area", where=name)
+    areas = _each(given, surface.cables, "cable")
+    return tuple(validate.number("cable_area", area, where=name, **limits) for name, area in areas)
+
+
+def _each(given: Any, parts: Iterable[Any], kind: str = "") -> list[tuple[str, Any]]:
+    """The name of each part, and the value given for it or for all; a ``kind`` refuses other names."""
+    names = [part.name for part in parts]
+    if not isinstance(given, Mapping):
+        return [(name, given) for name in names]
+    for name in given if kind else ():
+        validate.choice(kind, name, names)
+    return [(name, given.get(name)) for name in names]

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
 from ..surface.geometry import area_vectors
-from .model import StructuralModel
+from .model import StructuralModel, expect_model
 from .tables import ResultBlock, read
 
 TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
@@ -26,8 +25,7 @@ FAR = 1e-4  # of the size: a node farther from its vertex belongs to another sur
 class StepResults:
     """The end of one step of the analysis. Vertices and faces that are not in the model have NaN.
 
-    Stresses from an .frd file are the mean of a triangle's corners, where all elements around have been
-    averaged, those of other patches too.
+    Stresses from an .frd file are the mean of a triangle's corners, averaged over all elements around each.
     """
 
     name: str  # of the step
@@ -74,8 +72,7 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     FileError for a file that is missing, damaged, incomplete, or of another model.
     """
     path = Path(path)
-    if not isinstance(model, StructuralModel):
-        validate.refuse("model", type(model).__name__, "a StructuralModel")
+    expect_model(model)
     check_regular(path)
     suffix = suffix_of(path, (".dat", ".frd"), "a result of CalculiX")
     try:
@@ -139,10 +136,8 @@ def _check(steps: list[dict[str, ResultBlock]], model: StructuralModel) -> None:
         if moved.places is not None:
             gap = np.abs(moved.places - model.standing.vertices[nodes - 1]).max(initial=0.0)
             if gap > FAR * model.surface.size:
-                text = (
-                    f"its nodes are up to {gap:.3g} from the model's vertices; they belong to another surface"
-                )
-                raise FileError(text, found=float(gap))
+                text = f"its nodes are up to {gap:.3g} from the model's vertices"
+                raise FileError(f"{text}; they belong to another surface", found=float(gap))
     if len(steps) != len(model.steps):
         names = [step.name for step in model.steps]
         state = f"{len(steps)} of the model's {len(names)} steps"
@@ -152,7 +147,6 @@ def _check(steps: list[dict[str, ResultBlock]], model: StructuralModel) -> None:
 
 
 def _same(what: str, found: Ints, expected: Ints) -> None:
-    """Refuse other numbers of nodes or elements than those expected."""
     if len(found) != len(expected):
         text = f"has {len(found)} {what}, the model {len(expected)}; they belong to different surfaces"
         raise FileError(text, found=len(found), expected=len(expected))

@@ -1,7 +1,5 @@
-"""The tables of numbers in CalculiX's result files, by step.
-
-``.dat`` is printed by node, and by integration point of each element. ``.frd``, for viewers, is read in
-ASCII: columns of fixed width, six digits, all by node.
+"""The tables of numbers in CalculiX's result files, by step: ``.dat``, by node and integration point, and
+``.frd`` in ASCII, columns of fixed width, six digits, all by node.
 """
 
 from __future__ import annotations

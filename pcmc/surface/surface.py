@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
+from ..base.arrays import Bools, Floats, Ints, cached_array, hand_over, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from ..base.tolerances import FAR
 from . import checks, supports
@@ -401,6 +401,6 @@ class Surface(supports.Supported):
             other.__dict__[name] = changes.get(name, getattr(self, name))
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin
-            if "flat_pieces" in vars(self) and "faces" not in changes:
-                vars(other)["flat_pieces"] = vars(self)["flat_pieces"]
+            if "faces" not in changes:
+                hand_over(self, other, "flat_pieces")
         return other

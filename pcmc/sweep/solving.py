@@ -103,12 +103,8 @@ def case_row(result: Result, names: Container[str], outcome: Outcome | None = No
     from ..certificate.quantities import figures  # takes long to import
 
     surface, certificate = result.surface, result.certificate
-    numbers = {
-        "iterations_taken": result.iterations,
-        "evaluations_made": result.evaluations,
-        "triangles": surface.m,
-        "gradient_squared": float((gradient(surface) ** 2).sum()),
-    }
+    counts = {"iterations_taken": result.iterations, "evaluations_made": result.evaluations}
+    numbers = counts | {"triangles": surface.m, "gradient_squared": float((gradient(surface) ** 2).sum())}
     words = {"status": result.status.name.lower().replace("_", " ")}
     at_rest = certificate.index is not None
     if at_rest and outcome is not None:
@@ -140,8 +136,7 @@ def mesh_columns(outcome: Outcome) -> dict[str, Any]:
 def _tables(certificate: Certificate) -> dict[str, Any]:
     """The numbers of the certificate's tables, each named by its row and column."""
     cables = list(certificate.cables.get("cable", ()))  # numbered where supports cut one into several rows
-    order = [cables[:k].count(name) + 1 for k, name in enumerate(cables)]
-    named = [f"{n} {k}" if cables.count(n) > 1 else n for n, k in zip(cables, order, strict=True)]
+    named = [f"{n} {cables[:k].count(n) + 1}" if cables.count(n) > 1 else n for k, n in enumerate(cables)]
     cells: dict[str, Any] = {}
     for frame, names in (
         (certificate.patches, certificate.patches["patch"]),

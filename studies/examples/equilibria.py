@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
-from pcmc import Surface, gradient, solve
+from pcmc import Surface, check_mesh, gradient, solve
 
 from ..folder import Folder
 from ..study import Study
@@ -25,6 +25,11 @@ EXAMPLES: dict[str, Callable[[], Surface]] = {
     "example3": four_fans,
     "example4": bezier_hall,
 }
+ON_FINER = {  # what the mesh check finds, in a title
+    "persists": "so on finer meshes",
+    "changes": "other on finer meshes",
+    "held by mesh": "held by its mesh",
+}
 
 
 def data(folder: Folder, short: bool) -> None:
@@ -35,12 +40,14 @@ def data(folder: Folder, short: bool) -> None:
         options: dict[str, Any] = {"iterations": 5} if short else {}
         result = solve(start, "newton", target="stationary", **options)
         certificate = result.certify(modes=0)
+        on_finer = "" if short else check_mesh(result).verdict.name.lower()
         rows.append(
             {
                 "example": name,
                 "triangles": start.m,
                 "status": result.status.name.lower(),
                 "verdict": certificate.verdict.name.lower(),
+                "mesh_verdict": on_finer.replace("_", " "),
                 "index": -1 if certificate.index is None else certificate.index,
                 "energy": result.energy,
                 "gradient_squared": float((gradient(result.surface) ** 2).sum()),
@@ -62,15 +69,16 @@ def table(folder: Folder) -> dict[str, float]:
 
 
 def figure(folder: Folder) -> None:
-    """The README's picture: Examples 4, 3 and 2, each drawn to the same size."""
+    """The README's picture: Examples 4, 3 and 2, each drawn to the same size, with both verdicts."""
     from pcmc.plot import panel
 
-    verdicts = folder.read_table("records").set_index("example").verdict
+    records = folder.read_table("records").set_index("example")
+    said = records.verdict + ": " + records.mesh_verdict.map(ON_FINER).fillna("not checked")
     shapes, titles = [], []
     for name in ("example4", "example3", "example2"):
         surface = folder.read_mesh(name)["final"]
         shapes.append(surface.moved(surface.vertices / surface.size))
-        titles.append(f"Example {name.removeprefix('example')}: {verdicts[name]}")
+        titles.append(f"Example {name.removeprefix('example')}, {said[name]}")
     panel(shapes, folder.figure("shapes"), columns=3, supports=False, edges=False, titles=titles)
 
 

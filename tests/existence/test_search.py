@@ -9,7 +9,7 @@ from starts import sphere, spherical_cap, two_caps, two_squares
 from generators import spherical_cap_exact
 from pcmc import Circle, Patch, Verdict, certify, solve, write
 from pcmc.certificate.balance import unheld
-from pcmc.certificate.neck import narrowest_neck
+from pcmc.certificate.diagnosis import narrowest_neck
 from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
 from pcmc.io import native
 from pcmc.plan import Divider, Hole, Plan

@@ -12,6 +12,7 @@ import pcmc
 from generators import hypar_roof, spherical_cap
 from pcmc import Parameter, Patch, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
+from pcmc.certificate.balance import load_name, load_ratio
 from pcmc.design.targets import measure
 from pcmc.existence.homotopy import Solves, attempt, raise_loads
 from pcmc.explore.following import between, reach, wanted
@@ -214,7 +215,8 @@ def test_the_form_pressure_of_a_structure_is_net_and_more_snow_is_a_load_of_its_
 def test_the_search_raises_what_is_net_of_the_snow(tension, word):
     """The cap over the unit disc rests up to a net pressure of 2 α: 0.8 carries 0.75, and 0.3 does not."""
     snowy = spherical_cap(0.25, alpha=tension).with_snow(0.25)
-    found, other = (attempt(raise_loads(low_start(s)), Solves(None, {})) for s in (snowy, net(snowy)))
+    lows = [low_start(s) for s in (snowy, net(snowy))]
+    found, other = (attempt(raise_loads(s, load_name(s), load_ratio(s)), Solves(None, {})) for s in lows)
     assert word in (found.note or str(found.attempt))
     if found.attempt is None:
         np.testing.assert_array_equal(found.surface.vertices, other.surface.vertices)

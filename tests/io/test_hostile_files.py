@@ -15,9 +15,8 @@ from refusals import refused
 
 import pcmc
 from pcmc import cli
-from pcmc.base import child_script
+from pcmc.base import child_script, libraries
 from pcmc.base.errors import FileError, FileWarning
-from pcmc.io import libraries
 from tests.io.test_io_foreign import X, expected
 
 pytest.importorskip("pyvista")

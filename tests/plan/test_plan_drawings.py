@@ -15,7 +15,7 @@ from refusals import refused
 import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError
-from pcmc.io.libraries import read_arrays
+from pcmc.base.libraries import read_arrays
 from pcmc.plan import plan_from
 from pcmc.plan.drawing import read_drawing
 from pcmc.plan.proposal import ABOVE_LEAST, least_tension, proposed

@@ -11,7 +11,7 @@ from refusals import refused
 from tents import tent
 
 import pcmc
-from generators import double_bubble, two_squares
+from generators import double_bubble, two_caps, two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
@@ -119,6 +119,20 @@ def test_legend_names_what_is_seen(monkeypatch):
         ([], []),
     ]
     assert shown[1][1] == {"fixed": FIXED_DOT, "sliding": SLIDING_DOT}
+
+
+def test_legend_has_dots_of_a_few_pixels(monkeypatch):
+    """Four sliding vertices below a wall, as small as in a picture of four."""
+    surface, shown = two_caps(1.2), []
+    entries = colors.legend_entries
+    monkeypatch.setattr(
+        colors, "legend_entries", lambda pictures: shown.append(entries(pictures)) or shown[-1]
+    )
+    for width in (900, 1500):
+        views = ["diagonal", "elevation", (-165.0, 15.0)]
+        patches = [None, None, ["wall"]]
+        plot.panel([surface] * 3, views=views, patches=patches, legend=True, one_scale=False, width=width)
+    assert [list(dots) for _, dots in shown] == [["fixed", "sliding"]] * 2
 
 
 def test_names_are_drawn_as_written_and_not_as_mathematics():

@@ -97,6 +97,19 @@ def test_what_the_mesh_holds_goes_to_what_a_sliding_end_shows():
 
 
 @pytest.mark.nightly
+def test_a_level_solved_anew_has_the_same_shape_with_its_vertices_elsewhere():
+    """Example 1, wall 1, held: the energy's step at level 6 is the mesh's, and goes with h²."""
+    initial = two_squares(8, alpha_aux=1.0)
+    rows, reached = ladder.climb(initial, 6, corners.REACH * initial.size, "held")
+    assert [row["anew"] for row in rows] == [False] * 6 + [True]
+    assert max(row["slid"] for row in rows[1:6]) < 0.05 < rows[6]["slid"]
+    (found,) = ladder.halved(rows, reached, "held")
+    assert (found["level"], found["anew"]) == (6, True)
+    assert found["step_halved"] == pytest.approx(found["step"] / 4.0, rel=0.3)
+    assert ladder.halved(rows[:6], reached[:7], "held") == []  # steps of less and less
+
+
+@pytest.mark.nightly
 def test_a_case_of_the_grid_with_its_bottoms_held_and_sliding():
     held, sliding = (corners.grid_case([1.5, 6.0, 6.0], bottom) for bottom in ("held", "sliding"))
     assert (held["label"], held["levels"], held["index"]) == (PERSISTS, 6, 0)

@@ -1,7 +1,6 @@
 """Case functions for the tests of the sweep engine. Cheap to import: workers load this file."""
 
 import asyncio
-import fcntl
 import math
 import os
 import signal
@@ -113,6 +112,8 @@ def noted(n, folder, pause):
 
 def holding(n, folder, pause=0.5):
     """Hold a lock for as long as the process lives."""
+    import fcntl  # Windows has none
+
     global held
     held = (Path(folder) / "held").open("w")
     fcntl.flock(held, fcntl.LOCK_EX)

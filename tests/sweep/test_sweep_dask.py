@@ -118,8 +118,7 @@ def test_ctrl_c_ends_the_cases_on_the_cluster(cluster, tmp_path):
 
 
 def free(path):
-    import fcntl
-
+    fcntl = pytest.importorskip("fcntl")  # Windows has none
     with path.open() as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,9 +1,7 @@
 """The store of a sweep in use by another, on a full disk, its sweep killed."""
 
-import fcntl
 import os
 import random
-import resource
 import signal
 import sqlite3
 import subprocess
@@ -134,6 +132,7 @@ def test_a_real_limit_on_the_files_size(monkeypatch, tmp_path):
     """The system itself cuts a transaction in the middle."""
     path, frame = tmp_path / "s.sqlite", run(LARGE, workers=1)
     monkeypatch.setattr("pcmc.sweep.running.PACE", 0.0)
+    resource = pytest.importorskip("resource")  # Windows has none
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (8 * 4096 - 2000, hard))
     try:
@@ -199,6 +198,7 @@ def test_workers_leave_when_the_sweep_is_killed(tmp_path):
         time.sleep(0.01)
     killed.kill()
     killed.wait()
+    fcntl = pytest.importorskip("fcntl")  # Windows has none
     with held.open() as file:
         for _ in range(600):
             with suppress(BlockingIOError):

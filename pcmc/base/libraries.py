@@ -1,9 +1,7 @@
 """Libraries that read and write formats: imported on demand, their errors translated.
 
 VTK, rhino3dm, IfcOpenShell and MeshLab believe the counts and offsets in a file, so bad files crash them, or
-fill the memory; to check all beforehand is to parse the file a second time. So they read in a process, with
-limits of time and, on Linux, of memory. Starting it takes as long as importing PyVista here would. It is kept
-for the next file, and ends with this process.
+fill the memory. So they read in a process of limited time and, on Linux, memory, kept for the next file.
 """
 
 from __future__ import annotations
@@ -19,8 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..base.child_process import ChildError, ChildProcess
-from ..base.errors import FileError, MissingExtra, PcmcError
+from .child_process import ChildError, ChildProcess
+from .errors import FileError, MissingExtra, PcmcError
 
 SECONDS, PACE = 30.0, 1e6  # time limit of a file: this, and one more for so many bytes
 MEMORY = 100  # bytes for each byte of the file, which may be compressed
@@ -31,7 +29,6 @@ _processes: dict[int, ChildProcess] = {}  # by the process that started it: a fo
 
 
 def load_library(name: str, extra: str = "files") -> Any:
-    """The module of that name, or MissingExtra."""
     logging.getLogger(name).addHandler(SILENT)
     try:
         return import_module(name)
@@ -66,8 +63,7 @@ def unreadable(kind: str, error: Exception) -> FileError:
 
 
 def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
-    """The plain values that a function in a script of this package, such as io/reading_scripts.py, returns.
-
+    """The plain values that a function in a script of this package, such as io/reading_scripts.py, returns;
     FileError if the library refuses the file, crashes or takes too long.
     """
     place, size = Path(__file__).parents[1] / script, path.stat().st_size
@@ -94,7 +90,6 @@ def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
 
 @atexit.register
 def end_process() -> None:
-    """End the process that reads for this one."""
     process = _processes.pop(os.getpid(), None)
     if process is not None:
         process.close()

@@ -1,4 +1,4 @@
-"""The picture of the page on drawings: two plans with every layer, and the roofs that they become."""
+"""Two drawings with every layer, and the roofs that they become."""
 
 from __future__ import annotations
 
@@ -94,4 +94,4 @@ def picture(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    picture(Path(__file__).parent / "how-to" / "drawing-layers.png")
+    picture(Path("drawing_layers.png"))

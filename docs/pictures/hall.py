@@ -1,0 +1,14 @@
+"""A hall of two bays with a wall between them."""
+
+import pcmc
+from pcmc.plan import Divider, Plan
+from pcmc.plot import draw
+
+plan = Plan(
+    [[0, 0], [12, 0], [12, 8], [0, 8]],
+    [Divider([[6, 0], [6, 8]], wall=1.5)],
+    edge_length=0.5,
+    patches={"west": {"tension": 5.0}, "east": {"tension": 4.5}},
+)
+roof = pcmc.solve(plan.surface()).surface
+draw(roof, "hall.png", width=600)
