@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 import shapely
@@ -47,10 +47,7 @@ class Arrangement:
 
     @cached_property
     def _by_line(self) -> dict[int, list[Chain]]:
-        chains: dict[int, list[Chain]] = {}
-        for chain in self.chains:
-            chains.setdefault(chain.line, []).append(chain)
-        return chains
+        return {line: list(own) for line, own in groupby(self.chains, key=lambda chain: chain.line)}
 
 
 def arrange(

@@ -165,10 +165,9 @@ def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         raise PlanError(problem, what="patches", found=len(specs), expected=parts)
     else:
         owner = np.argsort(np.lexsort(centroid.round(6).T[::-1]))
-    patches = []
-    for spec in specs:
-        snow = plan.snow if spec.snow is None else spec.snow
-        patches.append(Patch(spec.name, spec.tension, spec.pressure, weight=spec.weight, snow=snow))
+    snows = [plan.snow if spec.snow is None else spec.snow for spec in specs]
+    loads = zip(specs, snows, strict=True)
+    patches = [Patch(s.name, s.tension, s.pressure, weight=s.weight, snow=snow) for s, snow in loads]
     return patches, owner[mesh.region]
 
 

@@ -366,5 +366,4 @@ def _projected(curve: Curve) -> Curve:
 
 
 def _plain(point: Floats) -> tuple[float, ...]:
-    """A point as plain numbers."""
     return tuple(point.tolist())

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..advice.rises import RISES, WHOLE
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
@@ -34,12 +34,11 @@ def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
 
     Not those that follow from others: pressures around rooms of given volume and of walls, snow of walls.
     """
-    result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
-    free = {p.name for p, r in zip(surface.patches, result.tolist(), strict=True) if not r}
+    computed = _names(surface, surface.room_signs.any(axis=0) | surface.walls)
     points = surface.vertices[single_points(surface)].tolist()
     return {
         **(values := all_values(surface)),
-        "pressures": {name: p for name, p in values["pressures"].items() if name in free},
+        "pressures": {name: p for name, p in values["pressures"].items() if name not in computed},
         "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
         "weights": {name: w for name, w in values["weights"].items() if w},
         "points": {f"point {k}": place for k, place in enumerate(points, 1)},
@@ -68,10 +67,14 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
     }
 
 
+def _names(surface: Surface, chosen: Bools) -> set[str]:
+    """The names of the patches (k,) chosen."""
+    return {surface.patches[k].name for k in np.flatnonzero(chosen)}
+
+
 def _by_name(surface: Surface) -> dict[Name, float]:
     """Every value by kind and name, also the pressures of walls; not the pressures that are results."""
-    result = (surface.room_signs != 0.0).any(axis=0)
-    computed = {p.name for p, r in zip(surface.patches, result.tolist(), strict=True) if r}
+    computed = _names(surface, np.asarray(surface.room_signs.any(axis=0)))  # of rooms with a volume
     values = {
         (kind, name): value
         for kind, named in all_values(surface).items()

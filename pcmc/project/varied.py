@@ -235,10 +235,9 @@ def _moved(part: Any, by: Floats, plane: Plane) -> Any:
             if plane != Plane():
                 raise OptionError("give it three coordinates, as the plane is not z = 0", what="z")
             points = np.pad(points, ((0, 0), (0, 1)))
-        share = (
-            np.array([1.0, 0.0, 0.0]) if of_arc else np.ones(len(points))
-        )  # vectors follow an arc's centre
-        return points + share[:, None] * by[: points.shape[1]]
+        shifts = np.tile(by[: points.shape[1]], (len(points), 1))
+        shifts[1:] *= not of_arc  # vectors follow an arc's centre
+        return points + shifts
 
     if not isinstance(part, Curve):
         return moved(np.array([part]))[0].tolist()
