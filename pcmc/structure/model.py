@@ -257,7 +257,9 @@ class Structure:
 
     Attributes
     ----------
-    young, poisson, density : as of ``Material``: t/m³ with kN and m. With a density, self-weight is a load.
+    young : Young's modulus E > 0, force per area.
+    poisson : Poisson's ratio ν, 0 ≤ ν < 0.5.
+    density : mass per volume, as of ``Material``: t/m³ with kN and m. With a density, self-weight is a load.
     thickness : of all patches, length, or a table with one for each patch.
     gravity : length/s²; by default 9.81 m/s² in the unit of length.
     snow : load per plan area, besides the snow that the form was found under; 0 for none.
