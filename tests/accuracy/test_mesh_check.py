@@ -223,6 +223,7 @@ def test_sliding_vertices_stay_on_the_plane():
     assert np.abs(fine.vertices[fine.on_plane, 2]).max() < 1e-12
 
 
+@pytest.mark.nightly
 def test_the_study_s_bars_hold_the_true_errors(tmp_path):
     """On the coarsest mesh of each closed form; the study has all meshes."""
     perform(STUDY, tmp_path, short=True)

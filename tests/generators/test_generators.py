@@ -339,6 +339,7 @@ def test_the_defaults_are_the_calibrated_ones():
         assert squared == pytest.approx(PRINTED[example], rel=off)
 
 
+@pytest.mark.nightly
 def test_the_search_finds_the_defaults(monkeypatch):
     monkeypatch.setattr(calibration, "EDGES_2", (1.2, 0.4, 0.36, 0.34))
     monkeypatch.setattr(calibration, "RINGS_3", (12, 13, 14))

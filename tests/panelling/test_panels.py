@@ -279,6 +279,7 @@ def test_the_command_refuses_bad_input_in_one_line(tmp_path, capsys, options):
     assert {path.name for path in tmp_path.iterdir()} == {"start.pcmc"}
 
 
+@pytest.mark.nightly
 def test_the_study_compares_families_before_and_after(tmp_path):
     perform(panel_families.STUDY, tmp_path, short=True)
     records = pd.read_csv(tmp_path / "panels" / "families.csv")

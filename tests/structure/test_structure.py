@@ -373,7 +373,7 @@ def test_the_how_to_page_has_the_keys_of_the_section():
     assert [load.name for load in wanted.loads] == ["self-weight", "snow", "wind"]
     example = re.search(r"```python\n(.*?)pcmc.write_structure", page, re.S)[1]
     named = pyramid().retensioned()
-    surface = Surface(named.vertices, named.faces, [0] * 4, [Patch("north", 1.0)], fixed=range(4))
+    surface = Surface(named.vertices, named.faces, [0] * 4, [Patch("hall", 1.0)], fixed=range(4))
     names = {"result": pcmc.solve(surface)}
     exec(compile(example, "structural-model.md", "exec"), names)
     assert len(names["model"].steps) == 4

@@ -50,6 +50,7 @@ def test_labels():
     assert ladder.label([good[0], lost | {"walls_quality": 1e-5}], 1, "held") == SINKS
 
 
+@pytest.mark.nightly
 def test_ends_and_the_angle_of_the_outline_there():
     for build, count, angle in ((two_squares, 2, 180.0), (four_fans, 4, 180.0), (three_patches, 3, 180.0)):
         surface = build()
