@@ -80,7 +80,7 @@ at level {corners.example1-1_held_jump_level}, after steps of less and less. Tha
 and the junction comes down on its bottom. Its vertices are up to {corners.example1-1_held_jump_slid:.2g}
 from where they were. With every triangle cut into four the same two shapes differ by
 {corners.example1-1_held_jump_step_halved:.2g}. So the step is no other equilibrium; it is a part of the
-mesh's error, of which the energy has {corners.example1-1_held_jump_mesh_error:.2g} on this mesh."""
+mesh's error: on this mesh the energy is wrong by {corners.example1-1_held_jump_mesh_error:.2g}."""
 
 ACCURACY = """\
 The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. For

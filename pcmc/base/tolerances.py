@@ -10,7 +10,7 @@ import numpy as np
 
 EPS = float(np.finfo(float).eps)
 
-# places: of the size of the surface or curve, where nothing else is said
+# places: of the size of the surface or curve, unless stated otherwise
 ON = 1e-9  # a point this near to a plane, line, circle, curve or place is on it; a shorter length is none
 ON_CURVE = 1e-8  # a fixed vertex this near to the curve that it was drawn on follows it
 SAME_PLACE = 1e-12  # places this near are one up to rounding: points on several planes, apices

@@ -29,7 +29,7 @@ from . import balls
 from .balls import Ball, Balls, U, exact, gather, minus, plus, times
 
 
-class Elements(NamedTuple):
+class MeshArrays(NamedTuple):
     """Triangles and cable edges with what acts on them, for compiled loops."""
 
     X: Floats  # (n+k,3) positions, those of the k flat pieces' apices last
@@ -47,13 +47,13 @@ class Elements(NamedTuple):
     corner: Ints  # (e,) vertices where flat pieces end, and the normals there (e,3)
     push: Floats
 
-    def of_volume(self, signs: Floats) -> Elements:
+    def of_volume(self, signs: Floats) -> MeshArrays:
         """The elements whose energy is Σ s_i V_i, with s (k,) of the patches; the push is as before."""
         zero = 0.0 * self.tension
         return self._replace(tension=zero, weight=zero, pressure=-signs[self.patch], pull=0.0 * self.pull)
 
 
-def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elements:
+def mesh_arrays(surface: Surface, classes: VertexClasses, pattern: Pattern) -> MeshArrays:
     """The elements of a standing part at its own vertices."""
     F, offset, patch = classes.faces, pattern.offset, classes.patch_of_face
     X, (ends, pull, _) = surface.vertices, surface.cable_edges
@@ -77,10 +77,10 @@ def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elem
     at = np.array(surface.origin), np.array(plane.point), np.array(plane.normal)
     faces, places, patches, cables = (np.array(part, dtype=np.int64) for part in (F, offset, patch, ends))
     laws = tension, weight, pressure
-    return Elements(np.array(X), faces, places, patches, *laws, *at, cables, pull, corner, push)
+    return MeshArrays(np.array(X), faces, places, patches, *laws, *at, cables, pull, corner, push)
 
 
-def forces(items: Elements, pressures: Floats) -> tuple[Floats, Floats]:
+def forces(items: MeshArrays, pressures: Floats) -> tuple[Floats, Floats]:
     """∇E (n,3) and the radii of its balls; ``pressures`` (e,) act on the ends of flat pieces."""
     value, radius = np.zeros_like(items.X), np.zeros_like(items.X)
     _add_forces(items, value, radius)
@@ -91,13 +91,13 @@ def forces(items: Elements, pressures: Floats) -> tuple[Floats, Floats]:
 
 
 @inlined
-def _triangle(items: Elements, f: int) -> tuple[Balls, Balls, Balls]:
+def _triangle(items: MeshArrays, f: int) -> tuple[Balls, Balls, Balls]:
     F, X = items.faces, items.X
     return balls.row(X, F[f, 0]), balls.row(X, F[f, 1]), balls.row(X, F[f, 2])
 
 
 @inlined
-def _bent(items: Elements, f: int, a: Balls, b: Balls, c: Balls) -> tuple[Ball, Ball, Ball, Balls]:
+def _bent(items: MeshArrays, f: int, a: Balls, b: Balls, c: Balls) -> tuple[Ball, Ball, Ball, Balls]:
     """2A, 1/(2A), τ and ν of triangle f with the corners a, b, c."""
     area_vector = balls.cross(balls.sub(b, a), balls.sub(c, a))
     twice = balls.root(balls.dot(area_vector, area_vector))
@@ -112,7 +112,7 @@ def _bent(items: Elements, f: int, a: Balls, b: Balls, c: Balls) -> tuple[Ball, 
 
 
 @compiled
-def _add_forces(items: Elements, value: Floats, radius: Floats) -> None:
+def _add_forces(items: MeshArrays, value: Floats, radius: Floats) -> None:
     F, n, half = items.faces, balls.of(vector(items.normal)), exact(0.5)
     origin = balls.of(vector(items.origin))
     sixth = balls.inverse(exact(6.0))
@@ -157,7 +157,7 @@ def coordinates(space: MotionSpace, value: Floats, radius: Floats) -> tuple[Floa
 
 
 @compiled
-def second_variation(items: Elements, space: MotionSpace, pattern: Pattern) -> tuple[Floats, Floats]:
+def second_variation(items: MeshArrays, space: MotionSpace, pattern: Pattern) -> tuple[Floats, Floats]:
     """B₀ᵀ ∇²E B₀ in the pattern: (k,) values and radii."""
     value, radius = np.zeros(len(pattern.indices)), np.zeros(len(pattern.indices))
     F, dimension, half = items.faces, np.append(space.dimension, np.zeros(len(items.X), np.int64)), exact(0.5)
@@ -210,7 +210,9 @@ def _slope(b: Balls, c: Balls, nu: Balls, e_i: Balls, e_j: Balls, n: Balls) -> B
 
 
 @compiled
-def _add_cables(items: Elements, space: MotionSpace, pattern: Pattern, value: Floats, radius: Floats) -> None:
+def _add_cables(
+    items: MeshArrays, space: MotionSpace, pattern: Pattern, value: Floats, radius: Floats
+) -> None:
     dimension, start, indptr = space.dimension, space.start, pattern.indptr
     for e in range(len(items.ends)):
         i, j = min(items.ends[e, 0], items.ends[e, 1]), max(items.ends[e, 0], items.ends[e, 1])
@@ -231,7 +233,7 @@ def _add_cables(items: Elements, space: MotionSpace, pattern: Pattern, value: Fl
                     gather(value, radius, at + s, (sign * entry[0], entry[1]))
 
 
-def volume(items: Elements, signs: Floats, patch_of_end: Ints) -> tuple[Floats, Floats]:
+def volume(items: MeshArrays, signs: Floats, patch_of_end: Ints) -> tuple[Floats, Floats]:
     """(r,) Σ s_i V_i for each row of signs (r,k), flat pieces included, and its radius."""
     value, radius = np.zeros(len(signs)), np.zeros(len(signs))
     for r, row in enumerate(signs):
@@ -240,7 +242,7 @@ def volume(items: Elements, signs: Floats, patch_of_end: Ints) -> tuple[Floats, 
 
 
 @compiled
-def _add_volume(items: Elements, sign: Floats, end_sign: Floats, value: Floats, radius: Floats) -> None:
+def _add_volume(items: MeshArrays, sign: Floats, end_sign: Floats, value: Floats, radius: Floats) -> None:
     origin, sixth = balls.of(vector(items.origin)), balls.inverse(exact(6.0))
     for f in range(len(items.faces)):
         if sign[f] != 0.0:

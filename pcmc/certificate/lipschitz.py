@@ -40,14 +40,14 @@ from ..base.compiled import compiled
 from ..forces.motion_space import MotionSpace
 from ..surface.geometry import add, cross, dot, norm, point, scaled, sub, vector
 from .balls import SAFE
-from .enclosures import Elements
+from .enclosures import MeshArrays
 
 ROUNDING = 1.0 + 1e-9  # on bounds of positive terms: far more than the rounding of some hundred operations
 BLUR = 1e-13  # of the coordinates: far more than the rounding of differences of them and their products
 
 
 @compiled
-def lipschitz(items: Elements, space: MotionSpace, R: float, more: float) -> tuple[float, Floats, float]:
+def lipschitz(items: MeshArrays, space: MotionSpace, R: float, more: float) -> tuple[float, Floats, float]:
     """L while vertices move by at most R and pressures by ``more``; (n,) bounds of |∂∇E_v/∂d|; a height.
 
     The second is for motions in all directions, the third the least height of a triangle, length. L is

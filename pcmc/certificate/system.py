@@ -31,7 +31,7 @@ from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.pinching import StandingPart
 from ..forces.rooms import closing_volumes, prescribed_volumes
 from .balls import SAFE, U
-from .enclosures import Elements, coordinates, elements, forces, second_variation, volume
+from .enclosures import MeshArrays, coordinates, forces, mesh_arrays, second_variation, volume
 from .lipschitz import lipschitz
 
 CUBIC = 1.0 / np.sqrt(27.0)  # |det(d_0, d_1, d_2)| ≤ this times |d|³
@@ -41,7 +41,7 @@ CUBIC = 1.0 / np.sqrt(27.0)  # |det(d_0, d_1, d_2)| ≤ this times |d|³
 class System:
     """F and K at the given vertices, s = 0 and η = 0."""
 
-    items: Elements
+    items: MeshArrays
     space: MotionSpace  # the frozen frames
     pattern: Pattern  # of the upper triangle of K
     forces: Floats  # (n,3) ∇E, and the radii of its balls
@@ -81,7 +81,7 @@ def system(part: StandingPart, space: MotionSpace, rigid: Floats) -> System:
     """The system of a standing part in these frames; ``rigid`` (N,k) is Q."""
     surface = part.surface
     pattern = hessian_pattern(part.classes, space)
-    items = elements(surface, part.classes, pattern)
+    items = mesh_arrays(surface, part.classes, pattern)
     patch_of_end = flat_pieces(surface).end_patch
     force, force_radius = forces(items, surface.net_pressures[patch_of_end])
     left, error = coordinates(space, force, force_radius)

@@ -218,10 +218,12 @@ def _compressed(f: Findings) -> str:
     if not len(faces) + len(edges) or f.evidence is Evidence.INFLATED:
         return ""
     if not len(faces):
-        place = surface.vertices[surface.cable_edges.ends[edges[0]]].mean(axis=0).round(4).tolist()
+        ends = surface.cable_edges.ends[edges[0]]
+        name = next(c.name for c in surface.cables if (c.edges == np.sort(ends)).all(axis=1).any())
+        place = surface.vertices[ends].mean(axis=0).round(4).tolist()
         return (
-            f"a cable is under compression in {len(edges)} edges, the first at {place}: its weight leaves"
-            " τ + g z ≤ 0; raise its tension, or put Π lower"
+            f"cable {name!r} is under compression at {place} ({len(edges)} edges of cables are): its weight"
+            " leaves τ + g z ≤ 0; raise its tension, or put Π lower"
         )
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
     worst = faces[pull.argmin()]

@@ -50,7 +50,7 @@ class DrawingSet:
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
         jobs: list[tuple[Path, Callable[[Path], None]]] = []
-        wanted = [(path, check_suffix(path)) for path in map(Path, paths)]
+        wanted = [(path, suffix_of(path, SUFFIXES, "a drawing")) for path in map(Path, paths)]
         document: Any = dxf.document(self) if wanted else None
         for path, suffix in wanted:
             if suffix == ".dxf":
@@ -185,11 +185,6 @@ def drawing_set(
     add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
     return DrawingSet(surface, length, certificate, curves, cut, points, marks, schedule, flat, sheets)
-
-
-def check_suffix(path: Path) -> str:
-    """The suffix of a drawing's file; another is refused."""
-    return suffix_of(path, SUFFIXES, "a drawing")
 
 
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:

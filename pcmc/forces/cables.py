@@ -89,6 +89,11 @@ def compressed_cables(surface: Surface) -> Bools:
     return (surface.cable_edges.weight != 0.0) & (cable_pulls(surface, surface.vertices) <= 0.0)
 
 
+def heavy_cable_pulls(surface: Surface) -> Floats:
+    """τ + g z̄ of the edges of cables with a weight, force."""
+    return cable_pulls(surface, surface.vertices)[surface.cable_edges.weight != 0.0]
+
+
 def squared_cable_forces(surface: Surface, X: Floats) -> Floats:
     """(c,) squared pulls at both ends of each edge, added up, force²."""
     return np.asarray(2.0 * cable_pulls(surface, X) ** 2)

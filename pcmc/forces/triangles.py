@@ -185,6 +185,12 @@ def compressed(surface: Surface) -> Bools:
     return np.asarray((surface.weights[surface.patch_of_face] != 0.0) & (pull <= 0.0))
 
 
+def heavy_triangle_pulls(surface: Surface) -> Floats:
+    """α + w z̄ of the triangles with a weight, force/length."""
+    pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)
+    return np.asarray(pull[surface.weights[surface.patch_of_face] != 0.0])
+
+
 class Block(NamedTuple):
     """s t tᵀ + k 1."""
 

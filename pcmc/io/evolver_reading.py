@@ -21,7 +21,7 @@ from ..base.validate import names_from_file
 from ..surface import Cable, Patch, Plane, Room
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
 from .polygons import triangulate
-from .text import Section, constant, kinds_of, line_ends, linear
+from .text import TextSection, constant, kinds_of, line_ends, linear
 
 WRITTEN = "written by pcmc"
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
@@ -67,7 +67,7 @@ def read(path: Path) -> MeshData:
     )
 
 
-class _Datafile(dict[str, Section]):
+class _Datafile(dict[str, TextSection]):
     """The sections by name without their comments, and ``header``, what stands before the vertices."""
 
     def __init__(self, content: str) -> None:
@@ -80,7 +80,7 @@ class _Datafile(dict[str, Section]):
         names = ["top", *(h[1].lower().replace("facets", "faces") for h in heads)]
         known = {"pi": math.pi}
         for name, start, end in zip(names, starts, ends, strict=True):
-            self.setdefault(name, Section(bare[start:end], 1 + line_ends(bare[:start]), known))
+            self.setdefault(name, TextSection(bare[start:end], 1 + line_ends(bare[:start]), known))
             if name == "read":
                 break  # what follows are commands
         self.header = re.split(r"^[^\S\n]*vertices\b", content, maxsplit=1, flags=re.I | re.M)[0]
@@ -91,7 +91,7 @@ class _Datafile(dict[str, Section]):
         for hit in re.finditer(r"^[^\S\n]*parameter\s+(\w+)\s*=\s*([^\n]+)", top.text, re.I | re.M):
             known[hit[1].lower()] = constant(hit[2], known, partial(top.error, offset=hit.start()))
 
-    def __missing__(self, name: str) -> Section:
+    def __missing__(self, name: str) -> TextSection:
         known = ", ".join(k for k in self if k != "top") or "none"
         problem = f"no {name} section (found: {known}); the file is cut off or no Surface Evolver datafile"
         raise FileError(problem, where=name)
@@ -104,7 +104,7 @@ class _Datafile(dict[str, Section]):
         return {number: shown(names[name]) for number, name in rows}
 
 
-def _vertices(section: Section) -> tuple[Ints, Floats, Ints, dict[int, Bools]]:
+def _vertices(section: TextSection) -> tuple[Ints, Floats, Ints, dict[int, Bools]]:
     """Ids, positions, support, and by the number of each constraint the vertices that lie on it."""
     pattern = r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)"
     ids, *coordinates, rest = section.columns(pattern, "a vertex number and three coordinates")
@@ -125,7 +125,7 @@ def _vertices(section: Section) -> tuple[Ints, Floats, Ints, dict[int, Bools]]:
     return section.integers(ids), X, support[code], of_vertex
 
 
-def _faces(section: Section, edge_ids: Ints, ends: Ints) -> tuple[Ints, Ints, Ints, Sequence[str]]:
+def _faces(section: TextSection, edge_ids: Ints, ends: Ints) -> tuple[Ints, Ints, Ints, Sequence[str]]:
     """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
     pattern, what = r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges"
     numbers, edges, rest = section.columns(pattern, what)
@@ -143,7 +143,9 @@ def _faces(section: Section, edge_ids: Ints, ends: Ints) -> tuple[Ints, Ints, In
     return section.integers(numbers), tail, counts, rest
 
 
-def _cables(names: Mapping[str, str], section: Section, ends: Ints, rest: Sequence[str]) -> tuple[Cable, ...]:
+def _cables(
+    names: Mapping[str, str], section: TextSection, ends: Ints, rest: Sequence[str]
+) -> tuple[Cable, ...]:
     """The edges (e,2) with a line tension as cables, those of one number and tension together."""
     tension, _ = section.values(rest, "tension|density")
     number, given = section.values(rest, "cable")
@@ -210,7 +212,7 @@ def _planes(
     Π is constraint 1, or the first that sliding vertices lie on; those on others alone are free of it.
     """
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
-    header = Section(file.header, 1, file["top"].known)
+    header = TextSection(file.header, 1, file["top"].known)
     origin = header.numbers(given.groups(), 0) if given else np.zeros(3)
     used = [number for number, mask in constraints.items() if (mask & (support == SLIDING)).any()]
     rows = re.findall(r"^// plane (\d+) (mirror|support)\b([^\n]*)$", file.header, re.M)
@@ -230,7 +232,7 @@ def _planes(
     return ground, tuple(others), origin
 
 
-def _plane(top: Section, number: int, origin: Floats, needed: bool) -> Plane | None:
+def _plane(top: TextSection, number: int, origin: Floats, needed: bool) -> Plane | None:
     """The plane of this constraint; None if it is not needed and not there."""
     pattern = rf"^[^\S\n]*constraint\s+{number}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
     hit = re.search(pattern, top.text, re.I | re.M)

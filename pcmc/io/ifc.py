@@ -20,6 +20,7 @@ from ..base.errors import FileError
 from ..base.libraries import load_library, read_arrays, require
 from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..base.validate import real
+from ..forces.cables import pull_along
 from ..forces.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.geometry import file_origin
@@ -165,10 +166,11 @@ class _Model:
             points = (self.surface.vertices[chain.vertices] - self.middle).tolist()
             entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
             lines.append(self.add("IfcPolyline", Points=entities + entities[:1] * chain.closed))
-        about = {"TensionForce": cable.tension if self.units.force else None, "PredefinedType": "NOTDEFINED"}
+        pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
+        about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
         shape = self.axis, "Curve3D", lines
         tendon = self.element("IfcTendon", f"cable {cable.name}", cable.name, place, shape, **about)
-        force = ("IfcForceMeasure" if self.units.force else "IfcReal", cable.tension)
+        force = ("IfcForceMeasure" if self.units.force else "IfcReal", pull)
         self.add_properties("Pcmc_Cable", tendon, {"Force": force}, cable.name)
         return tendon
 

@@ -21,7 +21,7 @@ from .formats import Content
 from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import triangulate
-from .text import Section, escaped, numbers
+from .text import TextSection, escaped, numbers
 
 MARK = "# pcmc "
 SPECIAL = "\\"
@@ -48,7 +48,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 
 def read(path: Path) -> MeshData:
     """Groups (``g``, else ``o``, else ``usemtl``) as patches."""
-    file = Section(re.sub(r"\\[^\S\n]*\n", " \f", path.read_text(encoding="utf-8-sig")))
+    file = TextSection(re.sub(r"\\[^\S\n]*\n", " \f", path.read_text(encoding="utf-8-sig")))
     comment = re.search(rf"^{MARK}(.*)$", file.text, re.M)
     metadata = parse_metadata(comment[1] if comment else None)
     X = _vertices(file)
@@ -84,7 +84,7 @@ def _places(statements: Iterable[re.Match[str]]) -> Ints:
     return np.array([one.start() for one in statements], dtype=np.int64)
 
 
-def _vertices(file: Section) -> Floats:
+def _vertices(file: TextSection) -> Floats:
     coordinates = VERTEX.findall(file.text)
     try:
         if len(coordinates) == len(re.findall(r"^[^\S\n]*v(?=\s)", file.text, re.M)):
@@ -100,7 +100,7 @@ def _vertices(file: Section) -> Floats:
     raise FileError("its vertices cannot be read", where="vertices")
 
 
-def _faces(file: Section, faces: list[str], n: int) -> tuple[Ints, Ints]:
+def _faces(file: TextSection, faces: list[str], n: int) -> tuple[Ints, Ints]:
     """The vertex at each corner of face after face, and corners per face."""
     bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
     counts = np.array([len(face.split()) for face in bare], dtype=np.int64)

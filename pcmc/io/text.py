@@ -104,7 +104,7 @@ def _term(node: ast.expr, known: Mapping[str, float]) -> Floats:
 
 
 @dataclass(frozen=True)
-class Section:
+class TextSection:
     """A part of a text file. A form feed stands for a line end that does not end a statement."""
 
     text: str

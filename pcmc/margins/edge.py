@@ -27,8 +27,9 @@ from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
 from ..continuation import Branch, Ending, follow
 from ..continuation.branch_point import ALONG
+from ..forces.cables import heavy_cable_pulls
 from ..forces.pinching import standing_part
-from ..forces.triangles import compressed, effective_tensions
+from ..forces.triangles import heavy_triangle_pulls
 from ..solvers import solve
 from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
@@ -37,6 +38,7 @@ from .varied import Varied
 
 FIRST, LARGEST = 0.05, 0.15  # the first and the longest step along the branch, as of ``follow``
 SHORTER, FINEST = 0.25, 1e-4  # of a step on which contact and index change; where they count as one
+HEAVY = (heavy_triangle_pulls, heavy_cable_pulls)  # what a weight may leave under compression
 BEYOND = 0.01  # of λ: how far beyond the last point of a lost branch the surface is solved once more
 
 
@@ -47,7 +49,7 @@ class MarginEnd(Enum):
     BIFURCATION = "bifurcation: beyond it the equilibrium is a saddle"
     CONTACT = "contact: a ridge comes to rest or lifts off, and a saddle is left"
     WALL_DOWN = "wall down: a ridge comes down on the held bottom of its wall"
-    COMPRESSION = "compression: the weight of a sheet is more than its tension holds"
+    COMPRESSION = "compression: the weight of a sheet or cable is more than its tension holds"
     NONE = "no end found: it was followed no further"
     MESH = "the mesh gave out: it could not be followed further"
 
@@ -123,7 +125,7 @@ def _follow(
             callback(progress)
         row = progress.row
         left = row["index"] > index or sense * row["slope"] < 0.0
-        over[0] = left or bool(compressed(progress.surface()).any())
+        over[0] = left or any((pulls(progress.surface()) <= 0.0).any() for pulls in HEAVY)
         if over[0]:
             raise StopIteration
 
@@ -141,15 +143,19 @@ def _worst_place(surface: Surface) -> str:
 
 
 def _compression(branch: Branch) -> float | None:
-    """λ at which α + w z̄ of a triangle reaches 0, linear between the last two points; None if none does."""
-    if len(branch.points) < 2 or not compressed(branch.last).any():
+    """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points.
+
+    None if none does.
+    """
+    if len(branch.points) < 2:
         return None
     parameters, surfaces = branch.points.parameter.tolist()[-2:], [*branch.surfaces.values()][-2:]
-    least = [
-        effective_tensions(s, s.vertices, s.faces, s.patch_of_face)[s.weights[s.patch_of_face] != 0.0].min()
-        for s in surfaces
-    ]
-    return float(np.interp(0.0, least[::-1], parameters[::-1]))
+    ends = []
+    for pulls in HEAVY:
+        before, after = (pulls(surface).min(initial=np.inf) for surface in surfaces)
+        if after <= 0.0:
+            ends.append(float(np.interp(0.0, [after, before], parameters[::-1])))
+    return min(ends, key=lambda end: abs(end - parameters[0]), default=None)
 
 
 MOST = 10.0  # times, up or down: a margin this wide is no worry of a designer's

@@ -36,6 +36,10 @@ class Varied:
         if towards is not None:
             validate.choice("towards", towards, ("more", "less"))
         walls = {patch.name for patch, wall in zip(surface.patches, surface.walls, strict=True) if wall}
+        heavy = next((cable.name for cable in surface.cables if cable.weight != 0.0), "")
+        if what == "weight" and heavy:
+            text = f"margin: 'weight' varies the patches alone, and cable {heavy!r} has a weight of its own"
+            raise OptionError(f"{text}; name one patch: 'weight of PATCH'", what="what", found=what)
         pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
         more = not pulls if towards is None else towards == "more"
         values = np.array([Parameter(name, kind).value(surface) for kind, name in parts])

@@ -113,7 +113,7 @@ def _visible(image: Image, color: Floats, step: int = 2) -> bool:
     return bool((alike[1:, 1:] & alike[1:, :-1] & alike[:-1, 1:] & alike[:-1, :-1]).any())
 
 
-def add_legend(figure: Any, pictures: Iterable[Picture]) -> None:
+def add_picture_legend(figure: Any, pictures: Iterable[Picture]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch as Swatch
 

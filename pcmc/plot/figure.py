@@ -97,10 +97,6 @@ def overlap_style(k: int, count: int) -> dict[str, Any]:
     return {"linewidth": width, "linestyle": (3.0 * (k % 2), (3.0, 3.0))}
 
 
-def check_suffix(path: Path) -> None:
-    suffix_of(path, SUFFIXES, "a picture")
-
-
 def finish(figure: Any, path: Path | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG, SVG or PDF if there is a path.
 
@@ -111,7 +107,7 @@ def finish(figure: Any, path: Path | None) -> Image:
     image = np.ascontiguousarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
     if path is None:
         return image
-    check_suffix(path)
+    suffix_of(path, SUFFIXES, "a picture")
     kind = os.path.splitext(path)[1].lower()
     with writing(path), atomic_write(path) as temporary:
         temporary.write_bytes(png(image) if kind == ".png" else _vector(figure, kind.removeprefix(".")))

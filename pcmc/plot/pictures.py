@@ -19,7 +19,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.forces import Forces
 from ..surface import Surface
 from ..surface.geometry import area_vectors
-from .colors import add_legend, color_scale
+from .colors import add_picture_legend, color_scale
 from .figure import DPI, INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
 from .raster import paint
 from .scene import Camera, Rendering, mean_edge, scene, view_of
@@ -148,7 +148,7 @@ def compose(
         painted = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
         images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
     if legend:
-        add_legend(figure, list(zip(drawings, dotted, images, strict=True)))
+        add_picture_legend(figure, list(zip(drawings, dotted, images, strict=True)))
     if foot:
         figure.supxlabel(foot, fontsize=2.0 * SMALL)
     first = zip(axes[::columns], frames[::columns], strict=True)

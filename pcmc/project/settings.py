@@ -15,12 +15,12 @@ from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.files import PathLike, suffix_of
 from ..base.units import LENGTHS, Units, expect_length
-from ..drawings.drawing_set import check_suffix as check_drawing
+from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import FORMATS
 from ..meshing.remeshing import check_lengths, remesh, size_note
-from ..plot.figure import SUFFIXES, check_suffix
+from ..plot.figure import SUFFIXES
 from ..plot.scene import VIEWS
-from ..report.document import check_suffix as check_report
+from ..report.document import SUFFIXES as REPORTS
 from ..structure.model import Structure
 from ..surface import Surface
 
@@ -176,13 +176,13 @@ class Output:
         if self.tolerance is not None:
             validate.positive("tolerance", self.tolerance)
         for drawing in self.drawings:
-            check_drawing(Path(drawing))
+            suffix_of(drawing, DRAWINGS, "a drawing")
         if self.panels is not None:
             suffix_of(self.panels, (CSV,), "a schedule of panels")
         if self.structure is not None:
             check_model(self.structure)
         if self.report is not None:
-            check_report(self.report)
+            suffix_of(self.report, REPORTS, "a report")
         for name in ("panels", "panel_sheets"):
             if getattr(self, name) and self.tolerance is None:
                 text = f"{name}: needs the largest difference of edges in a family; add tolerance = LENGTH"
@@ -251,7 +251,7 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
             text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
             raise FileError(text, what=str(file), found=suffix)
     if picture is not None:
-        check_suffix(picture)
+        suffix_of(picture, SUFFIXES, "a picture")
 
 
 def check_picture(views: Sequence[Any], colour: str) -> None:

@@ -26,6 +26,8 @@ from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
+SUFFIXES = (".pdf",)
+
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
 
@@ -57,7 +59,8 @@ class RoofReport:
 
         FileError for another suffix than .pdf, or a file that cannot be written.
         """
-        path = check_suffix(path)
+        suffix_of(path, SUFFIXES, "a report")
+        path = Path(path)
         content = self.pdf()
         with writing(path), atomic_write(path) as temporary:
             temporary.write_bytes(content)
@@ -163,9 +166,3 @@ def roof_report(
     figures = quantities.figures(surface, certificate) if figures is None else figures
     plan = paper_plan(surface, certificate, units)
     return RoofReport(surface, units, certificate, plan, figures, schedule, **about)
-
-
-def check_suffix(path: str | os.PathLike[str]) -> Path:
-    """The path of a report; refuses another suffix than .pdf."""
-    suffix_of(path, (".pdf",), "a report")
-    return Path(path)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Statement(Protocol):
-    """A theorem, a margin: what is said about a roof in one sentence."""
+    """A statement about a roof in one sentence, such as a theorem or a margin."""
 
     def text(self, units: Units) -> str:
         """The sentence."""

@@ -85,7 +85,7 @@ def test_where_the_weight_leaves_no_tension():
     """An upright rope, whose weight acts along it, far below Π."""
     certificate = pcmc.certify(hanging(8).rebuilt(plane=pcmc.Plane((3.5, 0.0, 0.0), (1.0, 0.0, 0.0))))
     assert not certificate.certified
-    assert "a cable is under compression" in str(certificate)
+    assert "is under compression at" in str(certificate)
 
 
 def test_the_theorem_says_that_it_does_not_cover_it(rope):
@@ -141,3 +141,26 @@ def test_a_cut_and_its_mirror_image_keep_it():
     half = pcmc.cut(whole, pcmc.Plane((0, 0, 0), (1, 0, 0)))
     assert half.cables[0].weight == 1.0
     assert pcmc.mirrored(half).cables[0].weight == 1.0
+
+
+def heavy_rope():
+    """A flat sheet with a rope of 0.02 that weighs 0.01 along its middle, held 1 below Π."""
+    x, y = np.meshgrid(np.linspace(-1.0, 1.0, 9), np.linspace(-1.0, 1.0, 9), indexing="ij")
+    X = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
+    rope = dataclasses.replace(Cable.along("rope", 0.02, np.flatnonzero(X[:, 0] == 0.0)), weight=0.01)
+    faces, rim = grid_faces(8, 8), (np.abs(X[:, :2]) == 1.0).any(axis=1)
+    plane = pcmc.Plane((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    patches = [Patch("sheet", 1.0, 0.0)]
+    surface = Surface(X, faces, np.zeros(len(faces), int), patches, fixed=rim, cables=[rope], plane=plane)
+    return solve(surface).surface
+
+
+def test_a_margin_ends_where_a_cable_is_compressed():
+    found = pcmc.margin(heavy_rope(), "cable")
+    assert found.ends_by is pcmc.margins.MarginEnd.COMPRESSION
+    assert found.factor == pytest.approx(0.5, abs=0.003)  # τ λ + g z = 0 at z = -1, and the sag 0.0033
+
+
+def test_a_margin_of_all_weights_is_refused_where_a_cable_has_one():
+    with pytest.raises(OptionError, match="cable 'rope' has a weight of its own; name one patch"):
+        pcmc.margin(heavy_rope(), "weight")
