@@ -23,6 +23,7 @@ from .loads import Step
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
+THROUGH = 1e-3  # of the size: a roof that has sunk farther below Π hangs through
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
@@ -162,6 +163,14 @@ class Analysis:
         surface = self.model.surface
         return np.asarray(surface.vertices[surface.faces[face]].mean(axis=0))
 
+    def sunk(self, case: Case) -> float:
+        """How far a roof that stood above Π has come below it, length; 0 if it has not."""
+        surface, moved = self.model.surface, np.nan_to_num(case.results.displacements)
+        before, after = (surface.plane.height(surface.vertices + by) for by in (0.0, moved))
+        above = before > THROUGH * surface.size
+        depth = -float(after[above].min(initial=np.inf))
+        return depth if depth > THROUGH * surface.size else 0.0
+
     def answers(self, units: Units | None = None) -> list[str]:
         """A sentence for each case that is not carried, or has slack parts, and what helps."""
         units, lines = units or self.model.units, []
@@ -181,6 +190,11 @@ class Analysis:
                 lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
             elif row["slack_area"] > 0.0:
                 lines.append(f"{case.name}: carried, but {state}: there it wrinkles")
+            if (depth := self.sunk(case)) > 0.0:
+                below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
+                lines.append(
+                    f"{case.name}: {below}, as a bag that gathers water; its supports are above that"
+                )
         if self.remedy:
             factor = f"{self.remedy:.3g} times as large"
             lines.append(
