@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -183,15 +183,6 @@ def check_suffix(file: Path) -> None:
     suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
     if suffix not in known:
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
-
-
-def check_outputs(
-    file: Path, surfaces: Sequence[Path] = (), *, others: Sequence[Path] = (), picture: Path | None = None
-) -> None:
-    """Refuse files that cannot be written, or that are read; ``surfaces`` need the suffix of a format."""
-    projects.check_names(surfaces, picture)
-    outputs = [*surfaces, *others, *filter(None, [picture])]
-    projects.check_outputs(outputs, inputs=projects.files_of(file))
 
 
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:

@@ -22,7 +22,6 @@ from .arguments import (
     Input,
     MeshCheck,
     ViewName,
-    check_outputs,
     count,
     flag,
     number,
@@ -77,14 +76,13 @@ def panels_(
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    projects.check_picture([seen], "patches")
-    outputs: list[Path] = []
+    outputs = projects.Output(picture=picture, view=seen).paths
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
         outputs += projects.schedule_paths(path) if suffix == CSV else [path]
-    check_outputs(file, others=outputs, picture=picture)
+    projects.check_outputs(outputs, inputs=projects.files_of(file))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
     with working() as progress:
@@ -135,8 +133,7 @@ def draw_(
       pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
-    projects.Output(drawings=output)  # refuses what is no drawing
-    check_outputs(file, others=output)
+    projects.check_outputs(projects.Output(drawings=output).paths, inputs=projects.files_of(file))
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as progress:
@@ -169,8 +166,7 @@ def report_(
       pcmc report roof.toml -o roof.pdf
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
-    projects.Output(report=output)  # refuses what is no report
-    check_outputs(file, others=[output])
+    projects.check_outputs(projects.Output(report=output).paths, inputs=projects.files_of(file))
     anyway = build.allow_uncertified
     with working() as progress:
         project = arguments.load(file, units)
@@ -237,8 +233,7 @@ def structure(
     Example:
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
     """
-    projects.Output(structure=output)  # refuses what is no model
-    check_outputs(file, others=[output])
+    projects.check_outputs(projects.Output(structure=output).paths, inputs=projects.files_of(file))
     with working() as progress:
         project = arguments.load(file)
         start = projects.surface_of(project)

@@ -44,7 +44,7 @@ def convert(
       pcmc convert roof.toml roof.ifc
       pcmc convert roof.pcmc roof.glb --colour error
     """
-    arguments.check_outputs(file, [output])
+    projects.check_outputs(projects.Output(files=[output]).paths, inputs=projects.files_of(file))
     roof = _good(file, what, whole, units)
     if roof is None:
         return NOT_CERTIFIED
@@ -83,8 +83,8 @@ def plot(
       pcmc plot half.pcmc roof.png --whole
     """
     seen = arguments.view_of(view)
-    projects.check_picture([seen], colour)
-    arguments.check_outputs(file, picture=picture)
+    wanted = projects.Output(picture=picture, view=seen, colour=colour)
+    projects.check_outputs(wanted.paths, inputs=projects.files_of(file))
     roof = _good(file, what, whole)
     if roof is None:
         return NOT_CERTIFIED

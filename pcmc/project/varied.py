@@ -64,8 +64,9 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     (2, 9.0)
     """
     source = _Source.of(path)
-    start = start_of(source.project(values))
-    return start.project, source.loaded(start.surface, values)
+    project = source.project(values)
+    start = start_of(project)
+    return start.project or project, source.loaded(start.surface, values)
 
 
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
@@ -73,7 +74,7 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     source = _Source.of(path)
     project = source.project({})
     start = start_of(project) if project.mesh is not None else None
-    project = project if start is None else start.project
+    project = (start and start.project) or project
     found_by_search: dict[str, str] = {}  # with what each is
     for parameter in project.vary:
         cable, table = parameter.kind == "cable", "mesh" if project.plan is None else "plan"
