@@ -32,12 +32,12 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
 
 def real(metavar: str, meaning: str) -> Any:
     """An option with a number."""
-    return option(metavar, meaning, parser=number)
+    return option(metavar, meaning, parser=parsed_number)
 
 
 def count(meaning: str) -> Any:
     """An option with a whole number."""
-    return option("NUMBER", meaning, parser=integer)
+    return option("NUMBER", meaning, parser=parsed_integer)
 
 
 def by_part(meaning: str) -> Any:
@@ -50,7 +50,7 @@ def flag(name: str, meaning: str) -> Any:
     return typer.Option(name, help=meaning)
 
 
-def number(text: str | float) -> float:
+def parsed_number(text: str | float) -> float:
     """The number in an option. The error shows the text, which typer's own parser does not."""
     try:
         return validate.parsed(str(text))
@@ -58,8 +58,8 @@ def number(text: str | float) -> float:
         raise typer.BadParameter(f"expected a number, found {text!r}") from None
 
 
-def integer(text: str | int) -> int:
-    """The whole number in an option; see ``number``."""
+def parsed_integer(text: str | int) -> int:
+    """The whole number in an option; see ``parsed_number``."""
     try:
         validate.parsed(str(text))  # which refuses 1_000
         return int(text)
@@ -203,10 +203,10 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
     return values
 
 
-def values_of(text: str) -> tuple[str, list[Any]]:
+def named_values(text: str) -> tuple[str, list[Any]]:
     """A name and its values from NAME=V1,V2.
 
-    >>> values_of("alpha=2,4.5"), values_of("wall=upright")
+    >>> named_values("alpha=2,4.5"), named_values("wall=upright")
     (('alpha', [2, 4.5]), ('wall', ['upright']))
     """
     name, sign, values = text.partition("=")
@@ -226,7 +226,7 @@ def _value(text: str) -> Any:
     return number if isinstance(number, int | float) else text
 
 
-def view_of(text: str) -> Any:
+def parsed_view(text: str) -> Any:
     """The name of a view, or (azimuth, elevation)."""
     try:
         azimuth, elevation = map(validate.parsed, text.split(","))

@@ -24,8 +24,8 @@ from .arguments import (
     ViewName,
     count,
     flag,
-    number,
     option,
+    parsed_number,
     real,
 )
 from .progress import working
@@ -72,7 +72,7 @@ def panels_(
       pcmc panels roof.toml --tolerance 0.005 -o schedule.csv
       pcmc panels roof.pcmc --tolerance 0.005 --change 0.02 -o schedule.csv -o fewer.pcmc
     """
-    seen, files = arguments.view_of(view), output or []
+    seen, files = arguments.parsed_view(view), output or []
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
@@ -134,7 +134,7 @@ def draw_(
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
     projects.check_outputs(projects.Output(drawings=output).paths, inputs=projects.files_of(file))
-    heights = None if height is None else [number(text) for text in height]
+    heights = None if height is None else [parsed_number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)

@@ -19,9 +19,7 @@ in any file. A short one::
     files = ["roof.obj", "roof.glb"]
 """
 
-from .cache import cached_files
-from .cache import clear as clear_cache
-from .cache import folder as cache_folder
+from .cache import cache_folder, cached_files, clear_cache
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, load, project_of, read_data, with_rise
 from .keys import json_schema, reference, sections
@@ -31,9 +29,9 @@ from .running import (
     certified_files,
     check_outputs,
     designed,
+    draw_picture,
     model_job,
     opened,
-    paint,
     paint_families,
     run,
     run_project,
@@ -54,10 +52,10 @@ from .start import build, start_of, surface_of
 from .varied import check_varied, digest, varied, with_loads
 
 __all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing"]
-__all__ += ["Structure", "build", "cache_folder", "cached_files", "certified_files"]
-__all__ += ["check_names", "check_outputs", "check_varied", "clear_cache", "designed"]
-__all__ += ["digest", "drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load"]
-__all__ += ["model_job", "opened", "paint", "paint_families", "project_of", "project_text", "proposal_text"]
-__all__ += ["read_data", "reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
+__all__ += ["Structure", "build", "cache_folder", "cached_files", "certified_files", "check_names"]
+__all__ += ["check_outputs", "check_varied", "clear_cache", "designed", "digest", "draw_picture"]
+__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "model_job"]
+__all__ += ["opened", "paint_families", "project_of", "project_text", "proposal_text", "read_data"]
+__all__ += ["reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
 __all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "with_loads", "with_rise"]
 __all__ += ["write_all"]

@@ -173,7 +173,7 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
     """The project's files, each with the function that writes it; documents tell if it is not certified."""
     output, jobs = project.output, surface_files(outcome, project.output.files)
     if output.picture is not None:
-        painting = partial(paint, views=output.all_views, colour=output.colour, units=outcome.units)
+        painting = partial(draw_picture, views=output.all_views, colour=output.colour, units=outcome.units)
         jobs.append((Path(output.picture), partial(painting, outcome.shown.surface)))
     if not output.documents:
         return jobs
@@ -279,7 +279,7 @@ def paint_families(path: Path, schedule: Panels, view: Any) -> None:
     families(schedule, path, view=view)
 
 
-def paint(
+def draw_picture(
     surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
