@@ -26,6 +26,7 @@ from .keys import json_schema, reference, sections
 from .outcome import MOST_CHECKED, OnStep, Outcome
 from .planning import drawing_reference, project_text, proposal_text
 from .running import (
+    analysis_jobs,
     certified_files,
     check_outputs,
     designed,
@@ -52,10 +53,10 @@ from .start import build, start_of, surface_of
 from .varied import check_varied, digest, varied, with_loads
 
 __all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing"]
-__all__ += ["Structure", "build", "cache_folder", "cached_files", "certified_files", "check_names"]
-__all__ += ["check_outputs", "check_varied", "clear_cache", "designed", "digest", "draw_picture"]
-__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "model_job"]
-__all__ += ["opened", "paint_families", "project_of", "project_text", "proposal_text", "read_data"]
-__all__ += ["reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
+__all__ += ["Structure", "analysis_jobs", "build", "cache_folder", "cached_files", "certified_files"]
+__all__ += ["check_names", "check_outputs", "check_varied", "clear_cache", "designed", "digest"]
+__all__ += ["draw_picture", "drawing_reference", "files_of", "is_drawing", "is_project", "json_schema"]
+__all__ += ["load", "model_job", "opened", "paint_families", "project_of", "project_text", "proposal_text"]
+__all__ += ["read_data", "reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
 __all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "with_loads", "with_rise"]
 __all__ += ["write_all"]
