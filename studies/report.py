@@ -68,19 +68,40 @@ finds none, and returns the saddle under that name. Its worst triangle has quali
 {solvers.worst_quality_newton_minimum:.2g}."""
 
 CORNERS = """\
-The study `corners` solves the examples on meshes that get finer only near the ends of their junctions. Where
-the solver fails on a level, that level is solved anew from the initial shape. Then, and where the solver
-spreads vertices to keep triangles sound, they come to lie elsewhere along the same shape, and the energy of
-flat triangles depends on where they lie. `corners/jumps.csv` has, for each example and support, the largest
-step of the energy that is larger than the one before it: between the meshes of the two levels, and with
-every triangle of both cut into four.
+The study `corners` solves the examples on meshes that get finer only near the ends of their junctions, from
+level to level. The energy should change less at each level. `corners/jumps.csv` has, for each example and
+support, the largest step that is larger than the one before it, and what shows its cause.
 
-In Example 1 with a wall of 1 and held bottoms the energy steps by {corners.example1-1_held_jump_step:.2g}
-at level {corners.example1-1_held_jump_level}, after steps of less and less. That level is solved anew,
-and the junction comes down on its bottom. Its vertices are up to {corners.example1-1_held_jump_slid:.2g}
-from where they were. With every triangle cut into four the same two shapes differ by
-{corners.example1-1_held_jump_step_halved:.2g}. So the step is no other equilibrium; it is a part of the
-mesh's error: on this mesh the energy is wrong by {corners.example1-1_held_jump_mesh_error:.2g}."""
+In Example 1 vertices come to lie elsewhere along the same shape: where the solver fails on a level, that
+level is solved anew from the initial shape, and where triangles get thin, the solver spreads their vertices.
+The energy of flat triangles depends on where they lie. With a wall of 1 and held bottoms the energy steps by
+{corners.example1-1_held_jump_step:.2g} at level {corners.example1-1_held_jump_level}, after a step of
+{corners.example1-1_held_jump_step_before:.2g}. That level is solved anew, and the junction comes down on its
+bottom; vertices are up to {corners.example1-1_held_jump_slid:.2g} from where they were. With every triangle
+of both meshes cut into four the step is {corners.example1-1_held_jump_step_halved:.2g}. A step to another
+equilibrium would stay; the mesh's error gets four times smaller, and on this mesh it is
+{corners.example1-1_held_jump_mesh_error:.2g}. Cutting makes each of Example 1's steps smaller, {least} to
+{most} times.
+
+Example 3 and Fig. 4 are otherwise: no level is solved anew, and vertices move by
+{corners.example3_sliding_jump_slid:.2g} and {corners.fig4_sliding_jump_slid:.2g}. There the outline is a
+circle. Finer meshes put new vertices on it: the surface gets larger, which raises the energy, and its
+triangles get smaller, which lowers it. On one level these two nearly cancel, so the next step is larger: with
+sliding bottoms
+{corners.example3_sliding_jump_step_before:.2g} and then {corners.example3_sliding_jump_step:.2g} in Example
+3, {corners.fig4_sliding_jump_step_before:.2g} and then {corners.fig4_sliding_jump_step:.2g} in Fig. 4. If the
+outline stays the polygon of the first mesh, only the triangles change. Then the same two steps are
+{corners.example3_sliding_jump_polygon_step_before:.2g} and {corners.example3_sliding_jump_polygon_step:.2g},
+and {corners.fig4_sliding_jump_polygon_step_before:.2g} and {corners.fig4_sliding_jump_polygon_step:.2g}."""
+
+JUMPS = {  # columns of its table
+    "slid": "Vertices moved by",
+    "step_before": "Step before",
+    "step": "Step of E",
+    "step_halved": "Triangles cut into four",
+    "polygon_step_before": "On the polygon: step before",
+    "polygon_step": "On the polygon: step",
+}
 
 ACCURACY = """\
 The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. For
@@ -160,7 +181,11 @@ def report(results: Path) -> str:
         words = {"saddles": _saddles(results)}
         sections["Solvers"] = [fill(SOLVERS, measured, words), "", *solver_table(results)]
     if (results / "corners" / "jumps.csv").is_file():
-        sections["Ends of junctions"] = [fill(CORNERS, measured), "", *jump_table(results)]
+        sections["Ends of junctions"] = [
+            fill(CORNERS, measured, _cut_steps(results)),
+            "",
+            *jump_table(results),
+        ]
     if (results / "accuracy" / "savings.csv").is_file():
         above = {"above": measured["accuracy.most_over_estimate"] - 1.0}
         sections["Adaptive meshes"] = [fill(ACCURACY, measured | above, {"worse": _worse(results)})]
@@ -232,9 +257,16 @@ def _worse(results: Path) -> str:
     return listed(words or ["none"])
 
 
+def _cut_steps(results: Path) -> dict[str, str]:
+    """How much smaller Example 1's steps of the energy are with every triangle cut into four."""
+    jumps = Folder(results / "corners").read_table("jumps")
+    ratios = (jumps.step / jumps.step_halved)[jumps.case.str.startswith("example1")]
+    return {"least": f"{ratios.min():.1f}", "most": f"{ratios.max():.1f}"}
+
+
 def jump_table(results: Path) -> list[str]:
     """The steps of the energy that ``corners`` looks into."""
-    head = ["Example", "Bottoms", "Level", "Solved anew", "Vertices moved", "Step of E", "On halved meshes"]
+    head = ["Example", "Bottoms", "Level", "Solved anew", *JUMPS.values()]
     rows = Folder(results / "corners").read_table("jumps").to_dict("records")
     cells = [
         [
@@ -242,7 +274,7 @@ def jump_table(results: Path) -> list[str]:
             row["bottom"],
             row["level"],
             "yes" if row["anew"] else "no",
-            *(f"{row[key]:.2g}".replace("nan", "") for key in ("slid", "step", "step_halved")),
+            *(f"{row[key]:.2g}".replace("nan", "") for key in JUMPS),
         ]
         for row in rows
     ]
