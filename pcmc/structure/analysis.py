@@ -58,7 +58,7 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """What a roof does under each case and combination; see ``analyse``.
+    """What a roof does under each case and combination; see ``analyse``. ``print`` shows the main numbers.
 
     Attributes
     ----------
