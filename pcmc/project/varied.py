@@ -45,12 +45,12 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     path : of a project (``.toml``), or of a surface, which has no keys.
     values : by the dotted name of a number that the file has or may have, such as ``plan.edge_length``; by
         ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall,
-        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of
-        a divider, a hole, a support or a named point of the plan: all of it is shifted by the value, so 0
-        leaves it where it is drawn. Numbers of the file are replaced, and lines are shifted, before the plan
-        is meshed, the others afterwards. Where several things have one name, put what is meant before it:
-        ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider 1``, ``wall 1``,
-        ``hole 1``, ``support 1``, …
+        ``NAME.tension`` and ``NAME.weight`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``,
+        ``NAME.y`` and ``NAME.z`` of a divider, a hole, a support or a named point of the plan: all of it is
+        shifted by the value, so 0 leaves it where it is drawn. Numbers of the file are replaced, and lines
+        are shifted, before the plan is meshed, the others afterwards. Where several things have one name, put
+        what is meant before it: ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider
+        1``, ``wall 1``, ``hole 1``, ``support 1``, …
 
     Raises
     ------
@@ -138,7 +138,11 @@ class _Source(NamedTuple):
 
     def loaded(self, surface: Surface, values: Mapping[str, float]) -> Surface:
         """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
-        known = {f"{CABLE}{cable.name}.tension": ("cables", cable.name) for cable in surface.cables}
+        known = {
+            f"{CABLE}{cable.name}.{KINDS[kind][1]}": (kind, cable.name)
+            for kind in ("cables", "cable_weights")
+            for cable in surface.cables
+        }
         for kind, named in reversed(all_values(surface).items()):  # a patch comes after a cable of its name
             known |= {f"{name}.{KINDS[kind][1]}": (kind, name) for name in named}
         given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
