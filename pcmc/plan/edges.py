@@ -16,7 +16,7 @@ from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
 from ..surface.geometry import bounding_size
-from ..surface.pieces import point_text, to_local, to_space
+from ..surface.pieces import point_text, to_local, to_space, two_digits
 from .arrangement import Arrangement
 from .lines import EXACT, SNAP, Kind, LineTree, PlanLine
 from .parts import cable_label
@@ -158,7 +158,7 @@ def usual_cable(plan: Plan) -> float:
 
 def cable_for(outline: Curve, tension: float) -> float:
     """1.5 α × the size of the outline, two digits."""
-    return float(f"{1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max():.2g}")
+    return two_digits(1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max())
 
 
 def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:

@@ -1,4 +1,4 @@
-"""The weight of a cable in plans, projects, files of another unit, sweeps, commands, branches, on the page."""
+"""The weight of a cable in plans, projects, files in other units, sweeps, commands, branches, on the page."""
 
 from pathlib import Path
 
