@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
+from ..base.files import suffix_of
 from ..base.libraries import load_library
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate.certificate import warning_mark
 from ..drawings import DrawingSet, Sheet
 from ..drawings.drawing_set import DECIMALS
+from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import SheetLine, Text, add_frames, table_sheets
 from ..drawings.views import DrawnView, placed
 from .strips import CuttingPattern, Seam, Side, Strip
 
+SUFFIXES = (*DRAWINGS, ".csv")
 LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "rim": "PCMC-RIM"}
-PER_SHEET = 6  # strips drawn to scale on a sheet
+PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
@@ -77,6 +84,33 @@ def pattern_drawings(
     return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets)
 
 
+def table_paths(path: Path) -> list[Path]:
+    """The files that one of a pattern is: those of a .csv are the tables of strips and of seams."""
+    return (
+        [path, path.with_name(f"{path.stem}-seams{path.suffix}")] if path.suffix.lower() == ".csv" else [path]
+    )
+
+
+def pattern_files(
+    pattern: CuttingPattern,
+    paths: Iterable[str | os.PathLike[str]],
+    units: str | Units,
+    sheet: str = "A1",
+    name: str = "",
+) -> list[tuple[Path, Callable[[Path], Any]]]:
+    """Each file of a cutting pattern with the function that writes it; FileError for an unknown suffix."""
+    given = list(map(Path, paths))
+    drawn = [path for path in given if suffix_of(path, SUFFIXES, "a cutting pattern") != ".csv"]
+    jobs: list[tuple[Path, Callable[[Path], Any]]] = []
+    if drawn:
+        jobs += pattern_drawings(pattern, units, sheet=sheet, name=name).files(*drawn)
+    for path in given:
+        if path not in drawn:
+            tables = zip(table_paths(path), (pattern.table, pattern.seam_table), strict=True)
+            jobs += [(file, partial(table.to_csv, index=False)) for file, table in tables]
+    return jobs
+
+
 def _texts(table: pd.DataFrame, decimals: int, *lengths: str) -> pd.DataFrame:
     """A table whose lengths are texts with so many decimals."""
     return table.assign(**{key: [f"{x:.{decimals}f}" for x in table[key]] for key in lengths})
@@ -95,7 +129,7 @@ def _roof_view(pattern: CuttingPattern, curves: list[SheetLine], middles: list[F
 def _strip_view(pattern: CuttingPattern, strip: Strip) -> DrawnView:
     """A strip as it is cut, with its net length and width."""
     lines, labels = strip_lines(pattern, strip)
-    texts = [(label.at, label.text, 0.0 * label.inward) for label in labels]
+    texts = [(label.at, label.text, label.inward) for label in labels]
     texts.append((_inside(strip), f"{strip.number}", np.zeros(2)))
     title = f"strip {strip.number}, {strip.patch}"
     stations = np.array([0.0, strip.length]), np.array([0.0, strip.width])
