@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     act.set_defaults(act=_numbers)
     act = acts.add_parser("benchmark", help="how fast it is on this machine, evolver beside it")
     act.add_argument("--quick", action="store_true", help="small meshes; within a minute")
+    act.add_argument("--only", nargs="+", default=[], metavar="NAME", help='e.g. "to height": its rows anew')
     act.add_argument("--results", type=Path, help="where to write (default: results/)")
     act.set_defaults(act=_benchmark)
     act = acts.add_parser(
@@ -134,7 +135,7 @@ def _numbers(asked: argparse.Namespace) -> int:
 def _benchmark(asked: argparse.Namespace) -> int:
     from .benchmarks.run import main as benchmark
 
-    return benchmark(asked.results or HOME / "results", asked.quick)
+    return benchmark(asked.results or HOME / "results", asked.quick, asked.only)
 
 
 def _readme(asked: argparse.Namespace) -> int:

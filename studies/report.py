@@ -61,10 +61,10 @@ The study `solvers` runs each method from the same start on the paper's {solvers
 {solvers.meshes} meshes each, from coarse to fine. It uses the paper's tensions, except for a wall of
 {solvers.wall_of_example1} in Example 1, where {example1.alpha_aux_histories} is a saddle on fine meshes.
 Residuals and errors are relative. With `target="stationary"` the geometric solver comes to rest in
-{solvers.at_rest_newton} of {solvers.runs_newton} runs, with the default, `target="minimum"`, in
-{solvers.at_rest_newton_minimum} of {solvers.runs_newton_minimum}. {solvers.saddles_newton} and
-{solvers.saddles_newton_minimum} of these are saddles, {saddles}: there `"minimum"` looks for a minimum,
-finds none, and returns the saddle under that name. Its worst triangle has quality
+{solvers.at_rest_newton} of {solvers.runs_newton} runs, {solvers.saddles_newton} of them on saddles; with the
+default, `target="minimum"`, in {solvers.at_rest_newton_minimum} of {solvers.runs_newton_minimum},
+{solvers.saddles_newton_minimum} on saddles. These are {saddles}: there `"minimum"` looks for a minimum, finds
+none, and returns the saddle under that name. The worst triangle of its runs has quality
 {solvers.worst_quality_newton_minimum:.2g}."""
 
 CORNERS = """\
@@ -104,24 +104,23 @@ JUMPS = {  # columns of its table
 }
 
 ACCURACY = """\
-The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. For
-{accuracy.bars_worse} of them the adaptive meshes need more triangles: {worse}. The table
-`accuracy/savings.csv` has what equal shares of the error would save (`estimated`). It is no bound:
-{accuracy.above_estimate} of the {accuracy.bars_on_mesh} savings for a value on the mesh exceed it, by up
-to {above:.0%}."""
+The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. {worse} The table
+`accuracy/savings.csv` also estimates how many triangles one would save if each had an equal share of the
+error. This is no bound: {accuracy.above_estimate} of the {accuracy.bars_on_mesh} savings for a value on the
+mesh exceed it, by up to {above:.0%}."""
 
 CHECK = """\
 The study `mesh_check` checks {mesh_check.quantities} quantities of {mesh_check.closed_forms} surfaces
 with known values. {mesh_check.inside:.0%} of the bars of values on the mesh hold the true error; the
-median bar is {mesh_check.width_median:.2f} times as wide as that. {mesh_check.limit_inside:.0%} of the
+median bar is {mesh_check.width_median:.2f} times as wide as the error. {mesh_check.limit_inside:.0%} of the
 bars of limits hold theirs; the median bar is {mesh_check.limit_width_median:.2g} times as wide, 1 in 20
 more than {mesh_check.limit_width_95:.0f} times, and one {mesh_check.limit_width_largest:.0f} times: a
 limit may happen to be nearly exact."""
 
 PANELS = """\
 The study `panels` moves vertices of roofs at rest so that fewer different panels are needed. In
-{panels.same_verdict_after:.0%} of its runs the roof has the verdict that it had before; in
-{panels.stable_after:.0%} it is stable, in the others it was a saddle and stays one."""
+{panels.same_verdict_after:.0%} of its runs the roof keeps its verdict: in {panels.stable_after:.0%} it is
+stable, in the others a saddle."""
 
 SPEED = """\
 Surface Evolver solves the same mesh of Example 1, and the same cap, in the same run. `python -m studies
@@ -253,8 +252,10 @@ def _worse(results: Path) -> str:
     savings = Folder(results / "accuracy").read_table("savings")
     worse = savings[savings.saving < 1.0]
     rows = zip(worse.quantity, worse.family, worse.bar_of, 1.0 / worse.saving, strict=True)
-    words = [f"the {what} of `{of}`, {bar}, {times:.2f} times as many" for what, of, bar, times in rows]
-    return listed(words or ["none"])
+    words = [f"for the {what} in `{of}` ({bar}) {times:.2f} times as many" for what, of, bar, times in rows]
+    if not words:
+        return "For none of them do adaptive meshes need more triangles."
+    return f"For {len(words)} of them adaptive meshes need more triangles: {listed(words)}."
 
 
 def _cut_steps(results: Path) -> dict[str, str]:

@@ -140,3 +140,11 @@ def test_fair_pairs_compare_the_same_work(tmp_path):
 
 def test_fields_are_filled_and_a_missing_number_is_said():
     assert fill("{a.x:.1f} and {b.y}, {ours}", {"a.x": 1.25}, {"ours": "2"}) == f"1.2 and {MISSING}, 2"
+
+
+def test_the_comparison_is_that_of_what_is_measured(tmp_path):
+    """``python -m studies readme`` writes it."""
+    for name, frame in zip(("comparison", "figures"), compare(MEASURED), strict=True):
+        Folder(tmp_path).write_table(name, frame)
+        stored = (RESULTS / f"{name}.csv").read_text(encoding="utf-8")
+        assert (tmp_path / f"{name}.csv").read_text(encoding="utf-8") == stored
