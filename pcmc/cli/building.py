@@ -13,6 +13,8 @@ from ..base.errors import FileError, OptionError
 from ..base.units import Units
 from ..certificate.certificate import require_certified
 from ..io import FORMATS, write
+from ..structure import analyse
+from ..structure.calculix import expect_program
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -46,6 +48,7 @@ FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
 DATE = "Date to print; by default the project's. No clock is read."
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
 DENSITY = "Mass per volume; above 0, self-weight is a load."
+RUN = "Run CalculiX on each case and combination; by default as the project says."
 SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
 Tolerance = Annotated[float | None, real("LENGTH", TOLERANCE)]
@@ -227,15 +230,19 @@ def structure(
     file: Input,
     output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
     given: Model,
+    run: Annotated[bool | None, flag("--run/--no-run", RUN)] = None,
     build: Build,
 ) -> int:
-    """Write a structural model for CalculiX: prestressed membranes, supports, loads.
+    """Write a structural model for CalculiX: prestressed membranes, supports, loads; and run it.
 
-    A project is solved first; its [structure] has the values that no option gives.
+    A project is solved first; its [structure] has the values that no option gives. With --run each case and
+    combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv and
+    NAME-cases.png come beside the model. A case that is not carried as a whole ends with the code 1.
 
     \b
-    Example:
+    Examples:
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
+      pcmc structure roof.toml -o roof.inp --run
     """
     projects.Output(structure=output)  # refuses what is no model
     check_outputs(file, others=[output])
@@ -251,13 +258,22 @@ def structure(
         values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
         wanted = projects.Structure(**values)
         wanted.check(start)
+        if run := wanted.run if run is None else run:
+            expect_program()
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        projects.write_all([projects.model_job(output, model)], progress)
+        jobs = [projects.model_job(output, model)]
+        analysis = analyse(model, progress=progress) if run else None
+        jobs += projects.analysis_jobs(output, analysis) if analysis is not None else []
+        written = projects.write_all(jobs, progress)
     if model.note:
         print(model.note)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
-    print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-    return OK if roof.good else NOT_CERTIFIED
+    if analysis is None:
+        print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
+        return OK if roof.good else NOT_CERTIFIED
+    print(analysis)
+    print(f"written: {', '.join(map(str, written))}")
+    return OK if roof.good and analysis.carried else NOT_CERTIFIED

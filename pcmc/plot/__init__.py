@@ -4,6 +4,7 @@ With a path every function writes a picture; each returns it as an (h,w,3) array
 """
 
 from .curves import convergence, diagram, heatmap, histories, lines
+from .loads import under_load
 from .pictures import draw, families, panel, reactions, vectors
 
 __all__ = [
@@ -16,5 +17,6 @@ __all__ = [
     "lines",
     "panel",
     "reactions",
+    "under_load",
     "vectors",
 ]

@@ -28,6 +28,7 @@ from .keys import json_schema, reference, sections
 from .outcome import MOST_CHECKED, OnStep, Outcome
 from .planning import drawing_reference, project_text, proposal_text
 from .running import (
+    analysis_jobs,
     check_outputs,
     designed,
     model_job,
@@ -58,7 +59,16 @@ from .varied import check_varied, digest, varied, with_loads
 __all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing", "Start"]
 __all__ += ["Structure", "build", "cache_folder", "cached_files", "check_model", "check_names"]
 __all__ += ["check_outputs", "check_picture", "check_varied", "clear_cache", "designed", "digest"]
-__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "model_job"]
+__all__ += [
+    "analysis_jobs",
+    "drawing_reference",
+    "files_of",
+    "is_drawing",
+    "is_project",
+    "json_schema",
+    "load",
+    "model_job",
+]
 __all__ += ["opened", "paint", "paint_families", "project_of", "project_text", "proposal_text", "read_data"]
 __all__ += ["reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
 __all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "vertex_fields"]

@@ -20,7 +20,7 @@ from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..structure.model import Structure
+from ..structure.section import Structure
 from .checking import check_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of

@@ -16,7 +16,7 @@ from ..base.units import FORCES, LENGTHS
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.model import Structure
+from ..structure.section import PatchMaterial, Structure, Zone
 from ..surface import Plane
 from ..surface.curve_data import CURVES
 from .settings import PATCH_KEYS, AccuracyWanted, MeshFile, Output, Remeshing
@@ -192,6 +192,8 @@ def main_sections() -> tuple[Section, ...]:
         "cable": "A part of the outline or of a hole that is free and carries a cable.",
         "remesh": "Other triangles, before or after solving; [[remesh]] if there are several.",
         "structure": "The structural model that `pcmc structure` writes, in the units of the surface.",
+        "material": "The material of a patch, where it is another one; NAME is the patch's name.",
+        "zone": "Snow or wind on a part of the roof; those with the same case act together.",
         "output": "What to write: all of it, or nothing. Without it nothing is written.",
     }
     return (
@@ -207,6 +209,8 @@ def main_sections() -> tuple[Section, ...]:
         Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", tuple(mesh_patch)),
         Section("remesh", help_of["remesh"], _of_class(Remeshing)),
         Section("structure", help_of["structure"], _of_class(Structure)),
+        Section("structure.patches.NAME", help_of["material"], _of_class(PatchMaterial)),
+        Section("structure.zones", help_of["zone"], _of_class(Zone)),
         Section("output", help_of["output"], _of_class(Output)),
     )
 

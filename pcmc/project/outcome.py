@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from ..margins import Margin
     from ..panelling import FewerFamilies, Panels
     from ..report import RoofReport
-    from ..structure.model import StructuralModel, Structure
+    from ..structure import Analysis
+    from ..structure.model import StructuralModel
+    from ..structure.section import Structure
     from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
@@ -70,8 +72,8 @@ class Outcome:
     unfold : whether the whole roof is shown that ``surface`` is the part of between its mirror planes.
     data : all that the file of ``start`` holds, such as scalars; None without a file.
 
-    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh``, ``margin`` and ``model``
-    are computed when first asked for, and kept.
+    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh``, ``margin`` and
+    ``analysis`` are computed when first asked for, and kept.
     """
 
     result: Result | None
@@ -233,6 +235,7 @@ class Outcome:
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
             margins=self.margins,
+            analysis=self.analysis(anyway),
             theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
@@ -254,6 +257,15 @@ class Outcome:
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
+
+    def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:
+        """What is shown under load, found once by CalculiX; None where the project does not run it."""
+        structure = None if self.project is None else self.project.structure
+        if structure is None or not structure.run:
+            return None
+        from ..structure import analyse
+
+        return self._once("analysis", lambda: analyse(self.model(structure, anyway), progress=progress))
 
     @property
     def mesh_check(self) -> MeshCheck | None:

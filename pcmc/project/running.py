@@ -22,7 +22,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import StructuralModel, write_structure
+from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from . import cache
 from .checking import in_file
@@ -195,14 +195,20 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
             documents.append(model_job(Path(output.structure), model))
+        analysis = outcome.analysis(anyway, progress) if output.structure or output.report else None
+        loaded = FileJobs()
+        if output.structure is not None and analysis is not None:
+            loaded = analysis_jobs(Path(output.structure), analysis)
         if output.report is not None:
             listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
             listed[project.path.name] = "project"
             listed |= {path.name: "surface" for path, _ in jobs}
             listed |= {} if output.picture is None else {Path(output.picture).name: "picture"}
             listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
+            listed |= {path.name: "under load" for path, _ in loaded}
             report = outcome.report(output, files=listed, anyway=anyway)
             documents.append((Path(output.report), report.write))
+        documents += loaded
     return jobs + documents
 
 
@@ -273,6 +279,25 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
 def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:
     """The file of a structural model, with the function that writes it."""
     return path, partial(write_structure, model=model)
+
+
+def analysis_paths(path: Path) -> dict[str, Path]:
+    """The files of an analysis beside the structural model, by what they hold."""
+    names = {name: f"{path.stem}-{name}.csv" for name in ("cases", "patches", "supports", "cables")}
+    return {name: path.with_name(file) for name, file in names.items()} | {
+        "picture": path.with_name(f"{path.stem}-cases.png")
+    }
+
+
+def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
+    """The tables and the picture of an analysis beside the structural model."""
+    from ..plot import under_load  # needs the extra plot
+
+    paths = analysis_paths(path)
+    jobs: FileJobs = [
+        (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
+    ]
+    return [*jobs, (paths["picture"], partial(under_load, analysis))]
 
 
 def paint_families(path: Path, schedule: Panels, view: Any) -> None:

@@ -21,7 +21,7 @@ from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..plot.figure import SUFFIXES
 from ..plot.scene import VIEWS
 from ..report.document import SUFFIXES as REPORTS
-from ..structure.model import Structure
+from ..structure.section import Structure
 from ..surface import Surface
 
 PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of a mesh

@@ -17,6 +17,7 @@ from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
+from ..structure.calculix import expect_program
 from ..surface import Surface
 from .checking import in_file
 from .file import Project
@@ -65,8 +66,11 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
 def _check_wishes(project: Project, surface: Surface) -> None:
     """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
     with in_file(project.path):
-        if project.output.structure is not None and project.structure is not None:
-            project.structure.check(surface)
+        structure, output = project.structure, project.output
+        if structure is not None and (output.structure is not None or structure.run):
+            structure.check(surface)
+        if structure is not None and structure.run and (output.structure or output.report):
+            expect_program()
         if project.margin:
             from ..margins.varied import Varied  # takes long to import
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 
+WHOLE = 1e-6  # of a step: a time so near to its end is the end
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
 DAT_COLUMNS = {"displacements": (1, 3), "forces": (1, 3), "stresses": (2, 6)}  # keys and values of a row
@@ -43,7 +45,8 @@ class ResultBlock:
 
 
 def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
-    """The tables of each step, whose times are 1, 2, ...; of several in a step the last counts.
+    """The tables of each step, which end at the times 1, 2, ...; of several in a step the last counts, so
+    that of an analysis that stopped the last step's is what it reached.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
     >>> read(text, ".dat")[0]["displacements"].values.tolist()
@@ -51,10 +54,9 @@ def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
     """
     steps: list[dict[str, ResultBlock]] = []
     for block in (_of_dat if suffix == ".dat" else _of_frd)(text):
-        number = round(block.time)
-        if abs(block.time - number) <= 1e-6 and number >= 1:  # else a part of a step
-            steps += [{} for _ in range(number - len(steps))]
-            steps[number - 1][block.kind] = block
+        number = max(math.ceil(block.time - WHOLE), 1)
+        steps += [{} for _ in range(number - len(steps))]
+        steps[number - 1][block.kind] = block
     return steps
 
 

@@ -1,0 +1,124 @@
+"""Run CalculiX, the program ``ccx``, on input files and on structural models."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..base.errors import FileError, PcmcError
+from ..base.files import writing
+from .inp import text_of, write_structure
+from .loads import Step
+from .model import StructuralModel
+from .results import StepResults, read_results, read_steps
+
+PROGRAM = "ccx"
+MISSING = (
+    f"{PROGRAM} is not installed: the load cases need CalculiX "
+    "(Debian, Ubuntu: apt install calculix-ccx; else https://www.calculix.de), found as ccx on the path"
+)
+
+
+NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum")  # in what the program prints
+
+
+class CalculixError(PcmcError):
+    """The program is absent, took too long, or did not come to an end."""
+
+
+class NotConverged(CalculixError):
+    """The program found no equilibrium under all of the loads."""
+
+
+def available() -> bool:
+    """Whether the program is installed."""
+    return shutil.which(PROGRAM) is not None
+
+
+def expect_program() -> None:
+    """Refuse to go on without the program, in one line that says what to install."""
+    if not available():
+        raise CalculixError(MISSING, what=PROGRAM)
+
+
+def run(
+    model: StructuralModel, timeout: float | None = None, suffix: str = ".dat"
+) -> tuple[StepResults, ...]:
+    """The results of each step of a structural model, all in one analysis; an error where it stops.
+
+    ``pcmc.analyse`` answers what is overloaded, too.
+    """
+    with folder_for_input() as path:
+        write_structure(path, model)
+        run_file(path, timeout)
+        return read_results(path.with_suffix(suffix), model)
+
+
+def run_as_far(
+    model: StructuralModel, steps: Sequence[Step], timeout: float | None = None
+) -> tuple[StepResults, ...]:
+    """The results of these steps of a model, as far as the program finds equilibria; see ``read_steps``.
+
+    CalculixError where it finds none even for the first of them, the form-finding load.
+    """
+    with folder_for_input() as path:
+        with writing(path):
+            path.write_text(text_of(model, steps, every=True), encoding="utf-8", newline="\n")
+        try:
+            run_file(path, timeout)
+        except NotConverged:
+            pass
+        except CalculixError as error:
+            if not path.with_suffix(".dat").exists() or "within" in str(error):
+                raise
+        try:
+            found = read_steps(path.with_suffix(".dat"), model, steps)
+        except FileError as error:
+            text = str(error).removeprefix(f"{path.with_suffix('.dat')}: ")
+            raise CalculixError(f"{PROGRAM}: the results of step {steps[0].name!r}: {text}") from None
+    if not found or found[0].share < 1.0:
+        text = f"{PROGRAM} finds no equilibrium under the form-finding load alone; is the surface certified?"
+        raise CalculixError(text, what=steps[0].name)
+    return found
+
+
+@contextmanager
+def folder_for_input() -> Iterator[Path]:
+    """The path of an input file in a folder of its own, which goes when the block ends."""
+    with tempfile.TemporaryDirectory(prefix="pcmc-") as folder:
+        yield Path(folder) / "model.inp"
+
+
+def run_file(path: Path, timeout: float | None = None) -> str:
+    """What the program prints for an input file; its results go beside the file.
+
+    One thread: with several, sums of forces differ in their last digits from run to run. ``timeout`` is in
+    seconds. CalculixError, in one line with what the program says, where it stops.
+    """
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "NUMBER_OF_CPUS"), "1")
+    try:
+        done = subprocess.run(
+            [PROGRAM, path.stem],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=timeout,
+            cwd=path.parent,
+            env={**os.environ, **threads},
+            check=False,
+        )
+    except OSError:  # not there, or no program
+        raise CalculixError(MISSING, what=PROGRAM) from None
+    except subprocess.TimeoutExpired:
+        raise CalculixError(f"{PROGRAM} did not finish within {timeout:g} s") from None
+    if "Job finished" not in done.stdout:
+        errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
+        stopped = NotConverged if any(text in done.stdout for text in NOT_CONVERGED) else CalculixError
+        raise stopped(f"{PROGRAM}: {'; '.join(errors) or f'it stopped, code {done.returncode}'}")
+    return done.stdout
