@@ -6,8 +6,8 @@
 A fault is an operator, a comparison, a sign, a condition or a number exchanged, or a call left out, in one
 place of a copy of the checkout. In each file ``count`` places are drawn at random, the same ones in each run.
 The doctests of the file look for them and the tests that the table names for it, the quickest first, without
-the slow ones; all must pass without a fault. The table also lists faults that change nothing a user reads, and why. Exit code 1
-if another fault survives.
+the slow ones; all must pass without a fault. The table also lists faults that change nothing a user reads,
+and why. Exit code 1 if another fault survives.
 
 Where the file has compiled loops, all run as plain Python: those kept compiled would not have the fault.
 """
@@ -28,6 +28,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from copy import deepcopy
 from dataclasses import dataclass
+from multiprocessing import Queue
 from pathlib import Path
 
 PAIRS = [(ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.And, ast.Or), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE)]
@@ -103,11 +104,13 @@ def planted(source: str, fault: Fault) -> str:
     return ast.unparse(tree)
 
 
-def prepare(jobs: str) -> None:
+def prepare(jobs: Path, numbers: Queue) -> None:
     """Make this process ready for its files: in a copy of the checkout, with the libraries loaded."""
-    folder = Path(jobs, str(os.getpid()))
+    folder = jobs / str(numbers.get())
+    folder.mkdir(parents=True, exist_ok=True)
     for part in COPIED:
         if Path(part).is_dir():
+            shutil.rmtree(folder / part, ignore_errors=True)
             shutil.copytree(part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copy(part, folder)
@@ -144,7 +147,7 @@ def survivors(file: Path, tests: list[str], longest: float, chosen: list[Fault])
     """The faults of one file that its tests do not see, planted in turn; or how these fail without."""
     source, start = file.read_text(encoding="utf-8"), time.monotonic()
     plain = "compiled" in source or "inlined" in source
-    if not passed([str(file), *tests, "--durations=0", "-vv"], plain, None):
+    if not passed([str(file), *tests, "--durations=0", "--durations-min=0"], plain, None):
         return Path("output.txt").read_text(encoding="utf-8", errors="replace")[-3000:]
     needed: dict[str, float] = {}
     for seconds, test in TIMES.findall(Path("output.txt").read_text(encoding="utf-8", errors="replace")):
@@ -167,6 +170,8 @@ def main() -> int:
     parser.add_argument("--count", type=int, help="faults in a file; default: those of the table")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2, help="files at a time, each in a copy of its own")
+    parser.add_argument("--folder", type=Path, help="keep the copies here: the next run need not compile")
+    parser.add_argument("--longest", type=float, help="s that a test may take; default: that of the table")
     parser.add_argument("--tests", nargs="*", default=[], help="tests in addition to those of the table")
     asked = parser.parse_args()
     table = tomllib.loads(TABLE.read_text(encoding="utf-8"))
@@ -177,14 +182,17 @@ def main() -> int:
         chosen[file] = draw.sample(every, min(asked.count or table["count"], len(every)))
     total, missed, wrong = sum(map(len, chosen.values())), [], False
     fork = multiprocessing.get_context("fork")
+    numbers = fork.Queue()
+    for number in range(asked.jobs):
+        numbers.put(number)
     with (
-        tempfile.TemporaryDirectory() as jobs,
-        ProcessPoolExecutor(asked.jobs, fork, prepare, (jobs,)) as pool,
+        tempfile.TemporaryDirectory() as folder,
+        ProcessPoolExecutor(asked.jobs, fork, prepare, (asked.folder or Path(folder), numbers)) as pool,
     ):
         waiting = {}
         for file, of_file in chosen.items():
             tests = [*table["tests"].get(file.as_posix(), []), *asked.tests]
-            waiting[pool.submit(survivors, file, tests, table["longest"], of_file)] = file
+            waiting[pool.submit(survivors, file, tests, asked.longest or table["longest"], of_file)] = file
         for done in as_completed(waiting):
             file, found = waiting[done], done.result()
             if isinstance(found, str):
