@@ -24,11 +24,10 @@ from .arguments import (
     Input,
     MeshCheck,
     ViewName,
-    check_outputs,
     count,
     flag,
-    number,
     option,
+    parsed_number,
     real,
 )
 from .progress import working
@@ -76,18 +75,17 @@ def panels_(
       pcmc panels roof.toml --tolerance 0.005 -o schedule.csv
       pcmc panels roof.pcmc --tolerance 0.005 --change 0.02 -o schedule.csv -o fewer.pcmc
     """
-    seen, files = arguments.view_of(view), output or []
+    seen, files = arguments.parsed_view(view), output or []
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    projects.check_picture([seen], "patches")
-    outputs: list[Path] = []
+    outputs = projects.Output(picture=picture, view=seen).paths
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
         outputs += projects.schedule_paths(path) if suffix == CSV else [path]
-    check_outputs(file, others=outputs, picture=picture)
+    projects.check_outputs(outputs, inputs=projects.files_of(file))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
     with working() as progress:
@@ -138,9 +136,8 @@ def draw_(
       pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
-    projects.Output(drawings=output)  # refuses what is no drawing
-    check_outputs(file, others=output)
-    heights = None if height is None else [number(text) for text in height]
+    projects.check_outputs(projects.Output(drawings=output).paths, inputs=projects.files_of(file))
+    heights = None if height is None else [parsed_number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)
@@ -172,8 +169,7 @@ def report_(
       pcmc report roof.toml -o roof.pdf
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
-    projects.Output(report=output)  # refuses what is no report
-    check_outputs(file, others=[output])
+    projects.check_outputs(projects.Output(report=output).paths, inputs=projects.files_of(file))
     anyway = build.allow_uncertified
     with working() as progress:
         project = arguments.load(file, units)
@@ -244,8 +240,7 @@ def structure(
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
       pcmc structure roof.toml -o roof.inp --run
     """
-    projects.Output(structure=output)  # refuses what is no model
-    check_outputs(file, others=[output])
+    projects.check_outputs(projects.Output(structure=output).paths, inputs=projects.files_of(file))
     with working() as progress:
         project = arguments.load(file)
         start = projects.surface_of(project)

@@ -13,7 +13,7 @@ from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
 from ..project import check_names, check_outputs, files_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK
-from .arguments import DXF, TOML, count, flag, option, real, values_of
+from .arguments import DXF, TOML, count, flag, named_values, option, real
 from .progress import sweeping
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
     from ..sweep.projects import project_sweep
 
     given: dict[str, list[Any]] = {}
-    for name, listed in map(values_of, values):
+    for name, listed in map(named_values, values):
         if name in given:
             raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
         given[name] = listed

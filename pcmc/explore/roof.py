@@ -34,7 +34,7 @@ class ShownRoof:
         >>> ShownRoof.of(None, "halls/nave & apse").name, ShownRoof.of(None).name
         ('halls-nave & apse', 'surface')
         """
-        return cls(projects.Outcome(None, start=surface, units=units), title)
+        return cls(projects.Outcome.of(surface, units), title)
 
     @property
     def surface(self) -> Surface:

@@ -18,7 +18,8 @@ from ..base.errors import PlanError
 from ..base.units import conversion_note, size_note
 from ..surface.curves import Curve, polyline
 from ..surface.pieces import Piece, point_text, two_digits
-from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
+from ..surface.summary import listed
+from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out
 from .lines import EXACT, Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines

@@ -285,7 +285,7 @@ def patches_of(spec: Any) -> tuple[PatchSpec, ...]:
     return tuple(patches)
 
 
-def support_of(spec: Any, number: int) -> Any:
+def support_from(spec: Any, number: int) -> Any:
     """A point (2,) or (3,), or a Curve; ``number`` counts from 1."""
     if isinstance(spec, Sequence | np.ndarray) and len(spec) in (2, 3) and np.ndim(spec) == 1:
         point = np.array(spec, dtype=float)

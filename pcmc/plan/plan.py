@@ -118,7 +118,7 @@ class Plan:
         for key in parts.MOST:
             parts.check_count(key, len(getattr(self, key)), OptionError)
         parsed: dict[str, Any] = {"outline": parts.curve_of(self.outline, "outline", closed=True)}
-        makers = {"dividers": parts.divider_of, "holes": parts.hole_of, "supports": parts.support_of}
+        makers = {"dividers": parts.divider_of, "holes": parts.hole_of, "supports": parts.support_from}
         for key, maker in (makers | {"cables": parts.cable_of, "mirrors": parts.mirror_of}).items():
             parsed[key] = tuple(maker(spec, number) for number, spec in enumerate(getattr(self, key), 1))
         parsed |= {"patches": parts.patches_of(self.patches), "points": parts.points_of(self.points)}

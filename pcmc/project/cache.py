@@ -49,7 +49,7 @@ PARTS = [
 NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a result
 
 
-def folder() -> Path | None:
+def cache_folder() -> Path | None:
     """The folder of the cache, which may not exist yet; None if it is switched off."""
     given = os.environ.get(VARIABLE, "")
     if given.lower() == "off":
@@ -63,13 +63,13 @@ def folder() -> Path | None:
 
 def cached_files() -> list[Path]:
     """The files of the cache, the one used longest ago first."""
-    place = folder()
+    place = cache_folder()
     with suppress(OSError):
         return sorted(place.glob("*.pcmc"), key=lambda path: path.stat().st_mtime_ns) if place else []
     return []
 
 
-def clear() -> list[Path]:
+def clear_cache() -> list[Path]:
     """Remove all files of the cache; return those removed."""
     removed = []
     for path in cached_files():
@@ -129,7 +129,7 @@ def keep(project: Project, outcome: Outcome) -> None:
 
 def _path(project: Project) -> Path | None:
     """The file for a project; None for one that is not kept."""
-    place = folder()
+    place = cache_folder()
     if place is None or not (project.plan is not None or project.has_file):
         return None
     sha = hashlib.sha256(_program().encode())

@@ -21,7 +21,7 @@ from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..structure.section import Structure
-from .checking import check_keys, in_file
+from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
 
@@ -160,7 +160,7 @@ def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
                 problem += "; put names with letters beyond a-z in quotes"
     else:
         with in_file(path, FileError):
-            check_keys(text, data)
+            check_project_keys(text, data)
         return text, data
     raise FileError(f"{path}: {problem}", what=str(path), where=where)
 

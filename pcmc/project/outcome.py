@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
@@ -89,6 +89,18 @@ class Outcome:
     unfold: bool = False
     data: MeshData | None = None
     _known: dict[Any, Any] = field(default_factory=dict, repr=False)  # copies of an outcome share it
+
+    @classmethod
+    def of(
+        cls, surface: Surface, units: Units, project: Project | None = None, data: MeshData | None = None
+    ) -> Outcome:
+        """A surface that is shown as it is, such as the start shape of a project."""
+        unfold = project is not None and project.output.whole
+        return cls(None, units=units, project=project, start=surface, unfold=unfold, data=data)
+
+    def changed(self, change: Callable[[Surface], Surface] | None) -> Outcome:
+        """The same with another surface, which has nothing of what the file holds besides the first one."""
+        return self if change is None else replace(self, start=change(self.surface), data=None, _known={})
 
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""

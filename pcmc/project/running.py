@@ -58,12 +58,7 @@ def opened(
     project = path if isinstance(path, Project) else load(path, units=units)
     if (project.has_file or project.plan is not None) and not start:
         return designed(project, progress, changed=changed, use_cache=use_cache)
-    first = start_of(project)
-    surface, data = first.surface, first.data
-    if changed is not None:
-        surface, data = changed(surface), None
-    unfold = project.output.whole
-    return Outcome(None, units=first.units, project=first.project, start=surface, unfold=unfold, data=data)
+    return start_of(project).changed(changed)
 
 
 def designed(
@@ -178,7 +173,7 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
     """The project's files, each with the function that writes it; documents tell if it is not certified."""
     output, jobs = project.output, surface_files(outcome, project.output.files)
     if output.picture is not None:
-        painting = partial(paint, views=output.all_views, colour=output.colour, units=outcome.units)
+        painting = partial(draw_picture, views=output.all_views, colour=output.colour, units=outcome.units)
         jobs.append((Path(output.picture), partial(painting, outcome.shown.surface)))
     if not output.documents:
         return jobs
@@ -212,36 +207,38 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
     return jobs + documents
 
 
-def vertex_fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
-    """Values (n,) by vertex: mean curvature (1/length), its relative error, and the size of the
-    reaction at supports (force)."""
-    return {
-        "mean curvature": mean_curvature(surface),
-        "error": curvature_error(surface),
-        "reaction": np.linalg.norm(certificate.reactions, axis=1),
-    }
-
-
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
     """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
 
     Scalars of a surface that was not solved are those of its file.
     """
-    surface, certificate, data = *outcome.shown, outcome.data
-    about: dict[str, Any] = {"units": outcome.units, "colour": colour}
-    if outcome.result is None:
-        about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
-        if outcome.unfold:
-            unfold, half = unfolded(outcome.surface), outcome.surface
-            place = {half.m: unfold.face, half.n: unfold.vertex}
-            carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
-            about |= {"scalars": carried, "certificate": None}
-        return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
+    if outcome.result is not None:
+        return certified_files(*outcome.shown, files, outcome.units, colour)
+    data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
+    about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
+    if outcome.unfold:
+        unfold, half = unfolded(outcome.surface), outcome.surface
+        place = {half.m: unfold.face, half.n: unfold.vertex}
+        carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
+        about |= {"scalars": carried, "certificate": None}
+    return [(Path(file), partial(io.write, surface=outcome.shown.surface, **about)) for file in files]
+
+
+def certified_files(
+    surface: Surface, certificate: Certificate, files: Iterable[PathLike], units: Units, colour: str = ""
+) -> FileJobs:
+    """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
+    relative curvature error, and size of the reactions at supports (force)."""
+    scalars: dict[str, Floats] = {
+        "mean curvature": mean_curvature(surface),
+        "error": curvature_error(surface),
+        "reaction": np.linalg.norm(certificate.reactions, axis=1),
+    }
     jobs: FileJobs = []
-    scalars = vertex_fields(surface, certificate)
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]
         coloured = {name: values for name, values in scalars.items() if name == colour}
+        about: dict[str, Any] = {"units": units, "colour": colour}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
         jobs.append((file, partial(io.write, surface=surface, **about)))
@@ -307,7 +304,7 @@ def paint_families(path: Path, schedule: Panels, view: Any) -> None:
     families(schedule, path, view=view)
 
 
-def paint(
+def draw_picture(
     surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""

@@ -180,7 +180,7 @@ class Output:
         if self.panels is not None:
             suffix_of(self.panels, (CSV,), "a schedule of panels")
         if self.structure is not None:
-            check_model(self.structure)
+            suffix_of(self.structure, (INP,), "a structural model")
         if self.report is not None:
             suffix_of(self.report, REPORTS, "a report")
         for name in ("panels", "panel_sheets"):
@@ -227,11 +227,6 @@ class Output:
         if self.structure is not None and structure is None:
             text = "a structural model needs material and thickness; add [structure] with young and thickness"
             raise OptionError(text, what="structure", expected="a table")
-
-
-def check_model(path: PathLike) -> None:
-    """Refuse the name of a structural model that does not end with .inp."""
-    suffix_of(path, (INP,), "a structural model")
 
 
 def schedule_paths(path: Path) -> list[Path]:

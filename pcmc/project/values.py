@@ -29,7 +29,7 @@ USUAL = {"tension": 0.0, "pressure": 1.0, "weight": 0.0}  # of a patch where its
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
-def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
+def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
     """The values of a surface that can be changed, by kind and name; points are [x, y, z].
 
     Not those that follow from others: pressures around rooms of given volume and of walls, snow of walls.
@@ -81,12 +81,12 @@ def _by_name(surface: Surface) -> dict[Name, float]:
         for name, value in named.items()
         if kind != "pressures" or name not in computed
     }
-    for name, place in values_of(surface)["points"].items():
+    for name, place in changeable_values(surface)["points"].items():
         values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
     return values
 
 
-def with_values(
+def data_with_values(
     path: Path, given: Mapping[str, Any], asked: Surface, left: Collection[Name] = ()
 ) -> tuple[dict[str, Any], Project, Surface]:
     """The data of a project with the values of the surface ``asked``, the project, and its start shape.
@@ -98,7 +98,7 @@ def with_values(
     >>> from .file import read_data
     >>> data = read_data(path)[1]
     >>> asked = surface_of(project_of(path, data)).retensioned({"corner": 9.0})
-    >>> with_values(path, data, asked)[0]["plan"]["patches"]["corner"]["tension"]
+    >>> data_with_values(path, data, asked)[0]["plan"]["patches"]["corner"]["tension"]
     9.0
     """
     data: dict[str, Any] = deepcopy(dict(given))
@@ -193,7 +193,7 @@ class _Writer(NamedTuple):
     def write_points(self, names: Collection[str]) -> None:
         """Points that hold the roof, in all lines through them."""
         for name in names:
-            places = (values_of(surface)["points"][name] for surface in (self.start, self.asked))
+            places = (changeable_values(surface)["points"][name] for surface in (self.start, self.asked))
             old, new = (self.asked.plane.to_local(np.array([place]))[0] for place in places)
             for key in LINES & self.plan.keys():
                 self.plan[key] = _with_point(self.plan[key], old, [_number(x) for x in new.tolist()], key)

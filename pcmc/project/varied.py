@@ -64,8 +64,9 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     (2, 9.0)
     """
     source = _Source.of(path)
-    start = start_of(source.project(values))
-    return start.project, source.loaded(start.surface, values)
+    project = source.project(values)
+    start = start_of(project)
+    return start.project or project, source.loaded(start.surface, values)
 
 
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
@@ -73,7 +74,7 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     source = _Source.of(path)
     project = source.project({})
     start = start_of(project) if project.mesh is not None else None
-    project = project if start is None else start.project
+    project = (start and start.project) or project
     found_by_search: dict[str, str] = {}  # with what each is
     for parameter in project.vary:
         cable, table = parameter.kind == "cable", "mesh" if project.plan is None else "plan"
@@ -112,7 +113,7 @@ class _Source(NamedTuple):
     def of(cls, path: PathLike) -> _Source:
         path = as_path(path)
         text, data = read_data(path) if is_project(path) else ("", {})
-        return cls(path, text, data, numbers(data) if data else {})
+        return cls(path, text, data, numbers_by_name(data) if data else {})
 
     def is_load(self, name: str) -> bool:
         """Whether a name is neither a number of the file nor a shift of a line of its plan."""
@@ -161,12 +162,12 @@ def with_loads(surface: Surface, given: Mapping[str, Mapping[str, float]]) -> Su
     return surface.retensioned(**given)
 
 
-def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
+def numbers_by_name(data: Mapping[str, Any]) -> dict[str, KeyPath]:
     """The numbers of a project: the dotted name of each, and its path in the data; then those it may have.
 
     Entries of a list are named by their key "name" if they have one, otherwise by their number from 1.
 
-    >>> list(numbers({"plan": {"edge": "free", "holes": [{"name": "yard", "cable": 2.0}, [3]]}}))[:3]
+    >>> list(numbers_by_name({"plan": {"edge": "free", "holes": [{"name": "yard", "cable": 2.0}, [3]]}}))[:3]
     ['plan.holes.yard.cable', 'plan.holes.2.1', 'plan.gap']
     """
     items: list[Item] = list(_items({**data, "solve": data.get("solve", {})}, (), ()))

@@ -23,6 +23,8 @@ from .loads import Step
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
+THROUGH = 1e-3  # of the size: a roof that has sunk farther below Π hangs through
+NOWHERE = 1e-9  # of the size: a smaller coordinate is 0
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
@@ -162,11 +164,21 @@ class Analysis:
         surface = self.model.surface
         return np.asarray(surface.vertices[surface.faces[face]].mean(axis=0))
 
+    def sunk(self, case: Case) -> float:
+        """How far a roof that stood above Π has come below it, length; 0 if it has not."""
+        surface, moved = self.model.surface, np.nan_to_num(case.results.displacements)
+        before, after = (surface.plane.height(surface.vertices + by) for by in (0.0, moved))
+        above = before > THROUGH * surface.size
+        depth = -float(after[above].min(initial=np.inf))
+        return depth if depth > THROUGH * surface.size else 0.0
+
     def answers(self, units: Units | None = None) -> list[str]:
         """A sentence for each case that is not carried, or has slack parts, and what helps."""
         units, lines = units or self.model.units, []
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
-            x, y, z = (f"{row[f'least_{axis}']:.3g}" for axis in "xyz")
+            smallest = NOWHERE * self.model.surface.size
+            at = [0.0 if abs(row[f"least_{c}"]) < smallest else row[f"least_{c}"] for c in "xyz"]
+            x, y, z = (f"{value:.3g}" for value in at)
             face = int(np.nanargmin(case.results.principal_forces[:, 0]))
             patch = self.model.surface.patches[self.model.surface.patch_of_face[face]].name
             place = f"around ({x}, {y}, {z}) of {patch!r}"
@@ -181,6 +193,9 @@ class Analysis:
                 lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
             elif row["slack_area"] > 0.0:
                 lines.append(f"{case.name}: carried, but {state}: there it wrinkles")
+            if (depth := self.sunk(case)) > 0.0:
+                below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
+                lines.append(f"{case.name}: {below}, as a bag that gathers water")
         if self.remedy:
             factor = f"{self.remedy:.3g} times as large"
             lines.append(

@@ -17,7 +17,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning, LostWarning, OptionError
 from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor, size_note
-from pcmc.io.mesh_data import scaled, scaled_surface
+from pcmc.io.mesh_data import in_new_unit, scaled_surface
 from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
 from pcmc.surface import Room
@@ -204,7 +204,7 @@ def test_all_parts_of_a_surface_are_scaled():
         pcmc.Circle((1, 2, 3), (0, 0, 1), 4.0),
         Room("r", {"a": 1}, 7.0),
     )
-    patch, plane, line, circle, room = scaled(parts, 2.0)
+    patch, plane, line, circle, room = in_new_unit(parts, 2.0)
     assert (patch.tension, patch.pressure, patch.weight) == (1.0, 0.75, 1.25)
     assert plane == pcmc.Plane((2, 4, 6), (0, 0, 1))
     assert line == pcmc.Line((2, 4, 6), (1, 0, 0))
