@@ -6,6 +6,16 @@ the subpackages below it.
 
 from .pattern import cutting_pattern, pattern_of
 from .settings import Pattern
+from .sheets import pattern_drawings
 from .strips import CuttingPattern, Seam, Side, Strip
 
-__all__ = ["CuttingPattern", "Pattern", "Seam", "Side", "Strip", "cutting_pattern", "pattern_of"]
+__all__ = [
+    "CuttingPattern",
+    "Pattern",
+    "Seam",
+    "Side",
+    "Strip",
+    "cutting_pattern",
+    "pattern_drawings",
+    "pattern_of",
+]

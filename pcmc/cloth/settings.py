@@ -118,7 +118,7 @@ class Pattern:
         for key in ("strips", "direction"):
             given = getattr(self, key)
             for name in given if isinstance(given, Mapping) else ():
-                validate.choice(f"{key}", name, names)
+                validate.choice(f"patch in {key}", name, names)
 
     def of_patch(self, key: str, name: str) -> Any:
         """The number of strips or the direction for a patch; None where there is none."""

@@ -34,6 +34,7 @@ from .running import (
     model_job,
     opened,
     paint_families,
+    paint_strain,
     run,
     run_project,
     schedule_jobs,
@@ -56,7 +57,16 @@ __all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Pro
 __all__ += ["Structure", "analysis_jobs", "build", "cache_folder", "cached_files", "certified_files"]
 __all__ += ["check_names", "check_outputs", "check_varied", "clear_cache", "designed", "digest"]
 __all__ += ["draw_picture", "drawing_reference", "files_of", "is_drawing", "is_project", "json_schema"]
-__all__ += ["load", "model_job", "opened", "paint_families", "project_of", "project_text", "proposal_text"]
+__all__ += [
+    "load",
+    "model_job",
+    "opened",
+    "paint_families",
+    "paint_strain",
+    "project_of",
+    "project_text",
+    "proposal_text",
+]
 __all__ += ["read_data", "reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
 __all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "with_loads", "with_rise"]
 __all__ += ["write_all"]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..certificate.quantities import Figure
     from ..certificate.theorem import Theorem
+    from ..cloth import CuttingPattern, Pattern
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
@@ -269,6 +270,13 @@ class Outcome:
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
+
+    def cutting_pattern(self, wanted: Pattern, anyway: bool = False) -> CuttingPattern:
+        """The cutting pattern of what is shown."""
+        from ..cloth import pattern_of
+
+        surface, certificate = self.shown
+        return pattern_of(surface, wanted, anyway, certificate)
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:
         """What is shown under load, found once by CalculiX; None where the project does not run it."""

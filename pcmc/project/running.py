@@ -20,6 +20,8 @@ from ..base.files import folder as output_folder
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
+from ..cloth import CuttingPattern
+from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
 from ..structure import Analysis, StructuralModel, write_structure
@@ -56,7 +58,7 @@ def opened(
     (True, False)
     """
     project = path if isinstance(path, Project) else load(path, units=units)
-    if (project.has_file or project.plan is not None) and not start:
+    if project.specified and not start:
         return designed(project, progress, changed=changed, use_cache=use_cache)
     return start_of(project).changed(changed)
 
@@ -190,6 +192,11 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
             documents.append(model_job(Path(output.structure), model))
+        cloth = FileJobs()
+        if output.pattern and project.pattern is not None:
+            progress("cutting strips")
+            pattern = outcome.cutting_pattern(project.pattern, anyway)
+            cloth = pattern_files(pattern, output.pattern, outcome.units, output.sheet, outcome.name)
         analysis = outcome.analysis(anyway, progress) if output.structure or output.report else None
         loaded = FileJobs()
         if output.structure is not None and analysis is not None:
@@ -201,9 +208,10 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
             listed |= {} if output.picture is None else {Path(output.picture).name: "picture"}
             listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
             listed |= {path.name: "under load" for path, _ in loaded}
+            listed |= {path.name: "cutting pattern" for path, _ in cloth}
             report = outcome.report(output, files=listed, anyway=anyway)
             documents.append((Path(output.report), report.write))
-        documents += loaded
+        documents += [*loaded, *cloth]
     return jobs + documents
 
 
@@ -302,6 +310,13 @@ def paint_families(path: Path, schedule: Panels, view: Any) -> None:
     from ..plot import families  # needs the extra plot
 
     families(schedule, path, view=view)
+
+
+def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
+    """Draw the strips on the roof, coloured by the strain of the cloth."""
+    from ..plot import strains  # needs the extra plot
+
+    strains(pattern, path, view=view)
 
 
 def draw_picture(

@@ -71,6 +71,8 @@ def _check_wishes(project: Project, surface: Surface) -> None:
             structure.check(surface)
         if structure is not None and structure.run and (output.structure or output.report):
             expect_program()
+        if project.pattern is not None and output.pattern:
+            project.pattern.check(surface)
         if project.margin:
             from ..margins.varied import Varied  # takes long to import
 
