@@ -18,6 +18,7 @@ from .questions import (
     margins,
     mesh_check,
     panel_families,
+    programs,
     refinement,
     solvers,
     stability,
@@ -49,6 +50,7 @@ MODULES = (
     surfaces,
     checks,
     structure,
+    programs,
     verify,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
