@@ -74,6 +74,7 @@ def test_walls_put_under_a_mesh_carry_the_difference_too():
     ).surface()
     found = certify(bare)
     assert "the pressures do not cancel: 0.2 is left over" in found.detail
+    assert "edges that nothing holds (west | east near [6.0, " in found.detail
     wall = add_walls(bare).patches[-1]
     assert wall.pressure == pytest.approx(0.2)
     assert "point of Π" not in certify(add_walls(bare)).detail
