@@ -166,6 +166,21 @@ def test_along_a_free_edge_the_cable_balances_the_sheet():
     assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2.0, abs=0.35)
 
 
+def test_a_cable_where_nothing_else_acts_is_named():
+    X = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
+    faces, patches = (
+        [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]],
+        [Patch("a", 1.0, 0.0), Patch("off", 0.0, 0.0)],
+    )
+    rope = Cable("rope", 2.0, [[1, 2], [4, 5]])
+    surface = Surface(X, faces, [0, 0, 1, 1], patches, fixed=[0, 3, 4], cables=[rope])
+    for use in (solve, pcmc.certify):
+        with refused(SurfaceError, what="cables", where=(4, 5)):
+            use(surface)
+    kept = dataclasses.replace(surface, cables=[Cable("rope", 2.0, [[0, 1], [1, 2]])])
+    assert len(pcmc.certify(kept).cables) == 1
+
+
 def test_a_cable_around_a_disc_has_a_row_without_ends():
     """τ κ = 3/2 along a polygon on a circle of radius 2, where the sheet pulls with α = 1."""
     angle = 2.0 * np.pi * np.arange(12) / 12
