@@ -1,7 +1,7 @@
 """The mesh of a file and its data, as every reader returns them, before they become a Surface.
 
-In a unit f times smaller, lengths become f times as large, tensions 1/f, pressures, weights and snow 1/f²,
-volumes f³. Forces stay, so the shape at rest stays the same.
+In a unit f times smaller, lengths become f times as large, tensions and cables' weights 1/f,
+pressures, weights and snow 1/f², volumes f³. Forces stay, so the shape at rest stays the same.
 """
 
 from __future__ import annotations
@@ -230,6 +230,8 @@ def in_new_unit(value: Any, factor: float) -> Any:
         case Patch():
             per_area = {key: getattr(value, key) / factor**2 for key in ("pressure", "weight", "snow")}
             return replace(value, tension=value.tension / factor, **per_area)
+        case Cable():
+            return replace(value, weight=value.weight / factor)
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():

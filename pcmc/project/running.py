@@ -58,7 +58,7 @@ def opened(
     (True, False)
     """
     project = path if isinstance(path, Project) else load(path, units=units)
-    if (project.has_file or project.plan is not None) and not start:
+    if project.specified and not start:
         return designed(project, progress, changed=changed, use_cache=use_cache)
     return start_of(project).changed(changed)
 

@@ -67,12 +67,12 @@ def test_the_mesh_check_of_the_roof(roof, capsys):
 def test_the_accuracy_of_the_roof_on_the_mesh_and_in_the_limit(roof, capsys):
     path = roof(1.2)
     page = (HOME / "docs" / "how-to" / "accuracy.md").read_text(encoding="utf-8")
-    assert f"`edge_length = 1.2`, {pcmc.project.build(path).m} triangles" in page
+    assert f"from {pcmc.project.build(path).m} triangles with `edge_length = 1.2`" in page
     assert main(["solve", path, "--accuracy", "height=1e-2"]) == 0
     assert is_printed(shown("how-to/accuracy.md"), capsys.readouterr().out)
     assert main(["solve", path, "--accuracy", "height=1e-3", "--accuracy-of", "limit"]) == 0
     triangles = re.search(r"\d+(?= triangles)", capsys.readouterr().out)[0]
-    assert f"within 0.001 take\n  {triangles}." in page
+    assert f"within\n  0.001 it takes {triangles}." in page
 
 
 @pytest.mark.nightly
