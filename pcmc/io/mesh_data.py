@@ -247,9 +247,8 @@ def in_new_unit(value: Any, factor: float) -> Any:
 
 
 def _times(value: float, factor: float, power: int) -> float:
-    return (
-        value * factor**power if power > 0 else value / factor**-power
-    )  # a factor 1/f would be rounded first
+    """The value times factor^power, rounded once."""
+    return value * factor**power if power > 0 else value / factor**-power
 
 
 def _point(point: Vector, factor: float) -> Vector:
