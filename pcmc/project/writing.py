@@ -50,10 +50,9 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         outcome.check_mesh(progress)
     progress("drawing, sorting panels, modelling")
     with in_file(project.path):
-        for sheets in (
-            outcome.drawing_set(output, anyway=anyway).files(*output.drawings) if output.drawings else ()
-        ):
-            add("drawing" if sheets[0].suffix.lower() == ".svg" else "drawings", [sheets])
+        if output.drawings:
+            for sheets in outcome.drawing_set(output, anyway=anyway).files(*output.drawings):
+                add("drawing" if sheets[0].suffix.lower() == ".svg" else "drawings", [sheets])
         if output.panels is not None and output.tolerance is not None:
             add("panels", schedule_jobs(Path(output.panels), outcome.panels(output.tolerance, anyway=anyway)))
         if output.structure is not None and project.structure is not None:
