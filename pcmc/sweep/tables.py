@@ -57,6 +57,16 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     Floats are written with the digits that give the same float back. In Parquet, which has one type per
     column, a column of mixed types is written as text. FileError for another suffix, or a file that cannot be
     written; MissingExtra for ``.parquet`` without pyarrow.
+
+    >>> import tempfile
+    >>> import pandas as pd
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_table(folder + "/walls.csv", pd.DataFrame({"wall": [1.0, 2.0], "rise": [1.5, 1.25]}))
+    ...     print(Path(folder, "walls.csv").read_text(encoding="utf-8"))
+    ,wall,rise
+    0,1.0,1.5
+    1,2.0,1.25
+    <BLANKLINE>
     """
     path = Path(path)
     suffix = suffix_of(path, TABLES, "a table")
