@@ -78,9 +78,10 @@ def faulty(node: ast.AST) -> bool:
 
 
 def about_code(tree: ast.AST) -> Iterator[ast.AST]:
-    """Annotations and decorators, in which a fault changes no number."""
+    """Annotations, decorators and ``strict=`` of zip, in which a fault changes no number."""
     for node in ast.walk(tree):
         kept = [getattr(node, "annotation", None), getattr(node, "returns", None)]
+        kept += [node.value] if isinstance(node, ast.keyword) and node.arg == "strict" else []
         for part in filter(None, (*kept, *getattr(node, "decorator_list", []))):
             yield from ast.walk(part)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import MissingExtra, OptionError
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units
+from ..surface.values import KINDS
 from .case_script import WORDS
 from .store import Record
 
@@ -26,7 +27,7 @@ GOOD = ("stable", "neutral")
 DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
 # of numbers of a project that are no quantities of a roof
 DIMENSIONS |= {"wall": "tension", "cable_weight": "tension"}
-OF_CABLES = {"tension": "force", "weight": "tension"}
+OF_CABLES = {kind.field: kind.dimension for kind in KINDS.values() if kind.parts == "cables"}
 
 
 def table(records: Iterable[Record]) -> pd.DataFrame:
