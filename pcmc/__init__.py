@@ -47,7 +47,17 @@ if TYPE_CHECKING:
     from .io.repairing import Repaired, repair
     from .margins import Margin, margin
     from .panelling import FewerFamilies, Panels, fewer_families, panels
-    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
+    from .structure import (
+        Gas,
+        Material,
+        SelfWeight,
+        Snow,
+        StructuralModel,
+        Wind,
+        analyse,
+        read_results,
+        write_structure,
+    )
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
@@ -59,6 +69,7 @@ __all__ = [
     "Design",
     "Direction",
     "FewerFamilies",
+    "Gas",
     "Line",
     "Margin",
     "Material",
@@ -78,6 +89,7 @@ __all__ = [
     "Theorem",
     "Verdict",
     "Wind",
+    "analyse",
     "certify",
     "check_mesh",
     "curvature_error",
@@ -125,11 +137,13 @@ _NAMES = {
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (
+        "Gas",
         "Material",
         "SelfWeight",
         "Snow",
         "StructuralModel",
         "Wind",
+        "analyse",
         "read_results",
         "write_structure",
     ),

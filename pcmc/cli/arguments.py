@@ -99,6 +99,7 @@ class Loads:
     weight: Annotated[list[str] | None, by_part(f"Weight of a patch per area. {EVERY}.")] = None
     snow: Annotated[list[str] | None, by_part(f"Snow on a patch, per area of the plan. {LOADED}.")] = None
     cable: Annotated[list[str] | None, by_part("Tension of a cable. A bare VALUE applies to all.")] = None
+    cable_weight: Annotated[list[str] | None, by_part("Weight of a cable per length.")] = None
     volume: Annotated[list[str] | None, by_part("Volume of a room that has one already.")] = None
 
     @property
@@ -111,9 +112,10 @@ class Loads:
         sheets = [patch.name for patch in surface.patches if not patch.wall]
         loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
         names = {"tension": loaded, "pressure": loaded, "weight": sheets, "snow": loaded}
-        names |= {"cable": [cable.name for cable in surface.cables]}
+        names |= {key: [cable.name for cable in surface.cables] for key in ("cable", "cable_weight")}
         names |= {"volume": [room.name for room in surface.rooms]}
-        given = {f"{key}s": by_name(own, getattr(self, key), f"--{key}") for key, own in names.items()}
+        flags = {key: f"--{key.replace('_', '-')}" for key in names}
+        given = {f"{key}s": by_name(own, getattr(self, key), flags[key]) for key, own in names.items()}
         return projects.with_loads(surface, given)
 
 

@@ -100,7 +100,7 @@ def solve_(
         verify=verify or project.verify,
         output=own,
     )
-    if projects.is_drawing(file) and project.drawing is not None:
+    if project.specified and not project.has_file:  # a drawing alone
         print(projects.proposal_text(project))
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}

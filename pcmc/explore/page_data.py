@@ -79,8 +79,10 @@ def _controls(surface: Surface) -> list[dict[str, Any]]:
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
-    for kind in ("cables", "volumes", "points"):
-        groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
+    for first, *others in (("cables", "cable_weights"), ("volumes",), ("points",)):
+        for name in values[first]:
+            kinds = [first, *(kind for kind in others if name in values[kind])]
+            groups.append({"name": name, "patch": None, "wall": False, "kinds": kinds})
     return groups
 
 

@@ -45,7 +45,7 @@ class ShownRoof:
     def project(self) -> projects.Project | None:
         """The project behind it, also of a drawing; None for any other file, and a surface from a program."""
         project = self.outcome.project
-        return project if project is not None and projects.is_project(project.path) else None
+        return project if project is not None and project.specified else None
 
     @property
     def path(self) -> Path | None:

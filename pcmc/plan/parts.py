@@ -36,6 +36,13 @@ class Divider:
 
     Only its course in plan counts: the height is that of the surface.
 
+    >>> from pcmc.plan import Plan
+    >>> bays = [PatchSpec("west", 5.0, at=[1, 1]), PatchSpec("east", 4.0, at=[3, 1])]
+    >>> line = Divider([[2, 0], [2, 2]], wall=2.0, name="ridge wall")
+    >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [line], patches=bays).surface()
+    >>> [(patch.name, patch.tension) for patch in hall.patches]
+    [('west', 5.0), ('east', 4.0), ('ridge wall', 2.0)]
+
     Attributes
     ----------
     curve : the line. Each end is on the outline, a hole or another divider; parts outside the outline
@@ -54,6 +61,7 @@ class Divider:
     cable : tension of a cable along the line, force; None for no cable. Without a wall the cable has the
         name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch, give
         the parts on both sides to that patch with ``at``.
+    cable_weight : of that cable, force per length, against Π's normal; ``cable`` is its tension at Π then.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
@@ -62,11 +70,18 @@ class Divider:
     bottom: str = field(default="held", metadata={"kind": BOTTOMS})
     cable: float | None = None
     upright: bool = False
+    cable_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Hole:
     """An opening in the plan.
+
+    >>> from pcmc.plan import Plan
+    >>> ring = Hole({"circle": {"centre": [3, 3, 1], "radius": 1}}, name="oculus")
+    >>> roof = Plan([[0, 0], [6, 0], [6, 6], [0, 6]], holes=[ring], tension=3.0).surface()
+    >>> float(roof.vertices[roof.fixed, 2].max())  # its edge is held at the height 1
+    1.0
 
     Attributes
     ----------
@@ -75,17 +90,25 @@ class Hole:
         free, with a cable along it.
     name : for messages.
     cable : tension of that cable, force.
+    cable_weight : of that cable, force per length; ``cable`` is its tension at Π then.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
     edge: str = field(default="fixed", metadata={"kind": EDGES})
     name: str = ""
     cable: float | None = None
+    cable_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class CableLine:
     """A part of the outline or of a hole that is free and carries a cable, whatever ``edge`` is elsewhere.
+
+    >>> from pcmc.plan import Plan
+    >>> front = CableLine([[0, 0], [6, 0]], tension=9.0, name="front")
+    >>> sail = Plan([[0, 0], [6, 0], [6, 6], [0, 6]], cables=[front], tension=1.0, pressure=0.0).surface()
+    >>> [(cable.name, cable.tension) for cable in sail.cables]
+    [('front', 9.0)]
 
     Attributes
     ----------
@@ -94,11 +117,14 @@ class CableLine:
         radius tension / α.
     name : of the cable; by default "cable 1", "cable 2", … in order. A cable ends where the edge is held;
         several of one name are numbered: "east-1", "east-2".
+    weight : of the cable, force per length, against Π's normal: it pulls with tension + weight · z at the
+        height z over Π.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
     tension: float
     name: str = ""
+    weight: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -118,6 +144,11 @@ class RoomData:
 @dataclass(frozen=True)
 class PatchSpec:
     """A patch of the plan.
+
+    >>> from pcmc.plan import Plan
+    >>> roof = PatchSpec("roof", 3.0, pressure=1.0, weight=0.1)
+    >>> Plan([[0, 0], [4, 0], [4, 4], [0, 4]], patches=[roof]).surface().weights.tolist()
+    [0.1]
 
     Attributes
     ----------
@@ -173,9 +204,9 @@ def divider_of(spec: Any, number: int) -> Divider:
         validate.choice(f"wall of {what}", part.wall, (BALANCED,))
     if not isinstance(part.upright, bool):
         validate.refuse("upright", part.upright, "True or False", what)
-    line, cable = curve_of(part.curve, what), _tension(part.cable, what)
+    line, cable = curve_of(part.curve, what), _cable(part, what)
     wall, kind = (None, "divider") if part.wall is None or part.wall is False else (part.wall, "wall")
-    return replace(part, curve=line, cable=cable, wall=wall, name=part.name or f"{kind} {number}")
+    return replace(part, curve=line, wall=wall, name=part.name or f"{kind} {number}", **cable)
 
 
 def hole_of(spec: Any, number: int) -> Hole:
@@ -184,8 +215,8 @@ def hole_of(spec: Any, number: int) -> Hole:
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
     name = hole_label(checked_name(f"{what}.name", part.name, empty=True)) if part.name else what
-    cable = edge_cable(part.edge, part.cable, name)
-    return Hole(curve_of(part.curve, what, closed=True), part.edge, name, cable)
+    curve = curve_of(part.curve, what, closed=True)
+    return replace(part, curve=curve, name=name, **edge_cable(part, name))
 
 
 def hole_label(name: str) -> str:
@@ -197,8 +228,9 @@ def hole_label(name: str) -> str:
     return name if name.startswith("hole ") else f"hole {name!r}"
 
 
-def edge_cable(edge: str, cable: Any, what: str) -> float | None:
-    """The tension of the cable along an edge; refused without ``edge = "cable"``, and missing with it."""
+def edge_cable(part: Any, what: str) -> dict[str, Any]:
+    """The cable along the edge of a plan or a hole; refused without ``edge = "cable"``, missing with it."""
+    edge, cable = part.edge, part.cable
     if edge == "cable" and cable is None:
         message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
         message += ", and patches with pressure = 0.0"
@@ -206,11 +238,17 @@ def edge_cable(edge: str, cable: Any, what: str) -> float | None:
     if edge != "cable" and cable is not None:
         message = f'{what}: cable = {cable!r} needs edge = "cable", found "{edge}"'
         raise OptionError(message, what="edge", where=what, found=edge, expected="cable")
-    return _tension(cable, what)
+    return _cable(part, what)
 
 
-def _tension(cable: Any, what: str) -> float | None:
-    return None if cable is None else validate.number("cable", cable, least=0.0, where=what)
+def _cable(part: Any, what: str) -> dict[str, Any]:
+    """The tension and the weight of the cable along a line, checked."""
+    given, weight = part.cable, validate.number("cable_weight", part.cable_weight, where=what)
+    cable = None if given is None else validate.number("cable", given, least=0.0, where=what)
+    if weight and not cable:
+        message = f"{what}: cable_weight = {weight:g} needs a cable that pulls; give its tension, cable ="
+        raise OptionError(message, what="cable_weight", where=what, found=weight)
+    return {"cable": cable, "cable_weight": weight}
 
 
 def cable_of(spec: Any, number: int) -> CableLine:
@@ -222,7 +260,8 @@ def cable_of(spec: Any, number: int) -> CableLine:
     if not isinstance(spec, CableLine):
         raise OptionError(f"{what}: expected a curve with a tension, found {spec!r}", what=what, found=spec)
     tension = validate.number("tension", spec.tension, least=0.0, where=spec.name or what)
-    return CableLine(curve_of(spec.curve, cable_label(spec, number)), tension, spec.name)
+    weight = validate.number("weight", spec.weight, where=spec.name or what)
+    return CableLine(curve_of(spec.curve, cable_label(spec, number)), tension, spec.name, weight)
 
 
 def cable_label(cable: CableLine, number: int) -> str:

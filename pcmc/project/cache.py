@@ -121,7 +121,7 @@ def keep(project: Project, outcome: Outcome) -> None:
         with atomic_write(path) as temporary:
             io.write(temporary, surface, certificate=values)
             back = to_surface(io.load(temporary))
-            if any(_bytes(getattr(surface, f)) != _bytes(getattr(back, f)) for f in FIELDS):
+            if any(plain_bytes(getattr(surface, f)) != plain_bytes(getattr(back, f)) for f in FIELDS):
                 raise FileError("the file does not hold all of the surface")
         for old in cached_files()[:-MOST]:
             old.unlink(missing_ok=True)
@@ -130,11 +130,11 @@ def keep(project: Project, outcome: Outcome) -> None:
 def _path(project: Project) -> Path | None:
     """The file for a project; None for one that is not kept."""
     place = cache_folder()
-    if place is None or not (project.plan is not None or project.has_file):
+    if place is None or not project.specified:
         return None
     sha = hashlib.sha256(_program().encode())
     try:
-        sha.update(_bytes([getattr(project, name) for name in PARTS]))
+        sha.update(plain_bytes([getattr(project, name) for name in PARTS]))
         if project.mesh is not None:
             sha.update(read_bytes(project.path.parent / project.mesh.file))
             sha.update(repr(project.units).encode())
@@ -150,7 +150,7 @@ def _program() -> str:
     return f"pcmc {version('pcmc-surfaces')} {newest}\n"
 
 
-def _bytes(value: Any) -> bytes:
+def plain_bytes(value: Any) -> bytes:
     """The same for equal values and others for others; TypeError for a value of unknown kind."""
     return json.dumps(value, default=_plain, sort_keys=True).encode()
 

@@ -73,9 +73,14 @@ class Project:
         return [self.path, *drawing, *([] if self.mesh is None else [self.path.parent / self.mesh.file])]
 
     @property
+    def specified(self) -> bool:
+        """Whether it is a project file or a drawing: a mesh alone does not say what roof is wanted."""
+        return bool(self.data)
+
+    @property
     def has_file(self) -> bool:
         """Whether it is a project file: a drawing or a mesh alone says nothing about solving it."""
-        return bool(self.data) and self.path.suffix.lower() == TOML
+        return self.specified and self.path.suffix.lower() == TOML
 
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
@@ -103,6 +108,16 @@ def load(path: PathLike, *, units: str = "") -> Project:
     -----
     FileWarning : for what was changed and left out of a drawing, a plan whose size is unlikely in its unit,
         and a roof held at single points inside.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> text = 'units = "mm"\\n[plan]\\noutline = [[0, 0], [6000, 0], [6000, 4000]]\\ntension = 3.0'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "hall.toml").write_text(text, encoding="utf-8")
+    ...     project = load(Path(folder, "hall.toml"))
+    >>> project.units.length, project.output.files
+    ('mm', ())
     """
     path = as_path(path)
     if not is_project(path):
@@ -131,9 +146,10 @@ def is_project(path: PathLike) -> bool:
 
 
 def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
-    """The text of a project file and its data, all keys checked; a drawing's data refer to it."""
+    """The text of a project file and its data, all keys checked; those of any other file, a drawing, refer
+    to it."""
     check_regular(path)
-    if is_drawing(path):
+    if path.suffix.lower() != TOML:
         return "", {"plan": {"drawing": path.name}} | ({"units": units} if units else {})
     where: int | None = None
     try:

@@ -145,6 +145,8 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     table, force = certificate.cables, units.force or "force"
     if len(table):
         columns: Columns = {f"force, {force}": column(table["tension"])}
+        if "weight" in table:
+            columns |= columns_of(table, ["weight"], units.tension)
         columns |= columns_of(table, ["length", *MIDDLE], units.length)
         yield text_table("Cables", {"cable": table["cable"]}, columns)
     table = certificate.cable_ends

@@ -18,7 +18,8 @@ ABOUT = (
     "Each case starts from the form-finding load and self-weight; combinations have the factors of the "
     "project. Deflections are along the normal of the plane. Forces of the membrane are principal stresses "
     "times the thickness; where the least of them is not above 0 the membrane is slack and wrinkles. A share "
-    "below 100 % is the part of the loads up to which CalculiX finds an equilibrium."
+    "below 100 % is the part of the loads up to which CalculiX finds an equilibrium, taut that up to which "
+    "nothing is slack."
 )
 
 
@@ -28,7 +29,7 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield Heading("Under load", new_page=True)
     yield ABOUT
     table = analysis.table
-    columns: Columns = {"share, %": [f"{100.0 * share:.0f}" for share in table["share"]]}
+    columns: Columns = {f"{key}, %": [f"{100.0 * v:.0f}" for v in table[key]] for key in ("share", "taut")}
     columns |= columns_of(table, ["down", "up", "moved"], units.length)
     columns |= columns_of(table, ["least_force", "largest_force"], units.tension)
     columns |= columns_of(table, ["slack_area"], units.area)

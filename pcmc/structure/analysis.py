@@ -55,22 +55,27 @@ class Case:
         """Whether all of the load is carried."""
         return self.share >= 1.0
 
+    @property
+    def taut(self) -> float:
+        """The share of its loads up to which no part of the membrane is slack."""
+        return min(self.results.taut, self.share)
+
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """What a roof does under each case and combination; see ``analyse``.
+    """What a roof does under each case and combination; see ``analyse``. ``print`` shows the main numbers.
 
     Attributes
     ----------
     model : the model.
     cases : the form-finding load first, then the loads and combinations.
     remedy : a factor on all tensions and pressures, tried: with it the same shape carries all cases; 0 where
-        none was needed, or none of those tried helps.
+        none of those tried is enough, None where none was tried.
     """
 
     model: StructuralModel
     cases: tuple[Case, ...]
-    remedy: float = 0.0
+    remedy: float | None = None
 
     @property
     def carried(self) -> bool:
@@ -85,7 +90,8 @@ class Analysis:
     def table(self) -> pd.DataFrame:
         """A row per case and combination.
 
-        Columns: ``case``; ``share`` of its loads that is reached; ``down`` and ``up``, the largest
+        Columns: ``case``; ``share`` of its loads that is reached; ``taut``, the share up to which nothing is
+        slack; ``down`` and ``up``, the largest
         deflections along Π's normal; ``moved``, the largest displacement, at ``x``, ``y``, ``z``;
         ``least_force`` and ``largest_force`` of the principal membrane forces, force/length, the least at
         ``least_x``, …;
@@ -99,7 +105,7 @@ class Analysis:
             far, forces = int(np.nanargmax(size)), found.principal_forces
             place = self.place_of_least(case)
             area = self._areas[found.slack].sum()
-            row = {"case": case.name, "share": case.share}
+            row = {"case": case.name, "share": case.share, "taut": case.taut}
             row |= {
                 "down": max(0.0, -np.nanmin(found.deflections)),
                 "up": max(0.0, np.nanmax(found.deflections)),
@@ -183,7 +189,8 @@ class Analysis:
             patch = self.model.surface.patches[self.model.surface.patch_of_face[face]].name
             place = f"around ({x}, {y}, {z}) of {patch!r}"
             least = f"the least force {row['least_force']:.3g}{units.behind('tension')} {place}"
-            area = f"slack over {row['slack_area']:.3g}{units.behind('area')}"
+            area = f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}"
+            area += units.behind("area")
             if row["slack_area"] > 0.0:
                 state = f"{area}, {least}"
             else:
@@ -201,23 +208,20 @@ class Analysis:
             lines.append(
                 f"tried: with tensions, cables and pressures {factor} the same shape carries all cases"
             )
+        elif self.remedy is not None:
+            lines.append("tried: larger tensions and pressures in the same ratio; they are not enough")
         elif not self.carried:
-            lines.append(f"what helps: {self._unproven}")
+            lines.append("what may help: larger tensions and pressures, or less load (not tried)")
         return lines
-
-    @property
-    def _unproven(self) -> str:
-        if _has_weight(self.model):
-            return "higher tensions and pressures, a lower weight, or less load"
-        return "less load; higher tensions and pressures in the same ratio were tried and do not suffice"
 
     def __str__(self) -> str:
         """The main columns of the table, and the answers."""
-        shown = ["case", "share", "down", "up", "least_force", "largest_force", "slack_area"]
+        shown = ["case", "share", "taut", "down", "up", "least_force", "largest_force", "slack_area"]
         shown += ["pressure"] if self.model.gas is not None else []
         table = self.table[shown].rename(columns={"least_force": "least force", "largest_force": "largest"})
         table = table.rename(columns={"slack_area": "slack area"})
-        table["share"] = [f"{100 * share:.0f} %" for share in table["share"]]
+        for name in ("share", "taut"):
+            table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         return "\n".join([table.to_string(index=False, float_format=lambda v: f"{v:.4g}"), *self.answers()])
 
     @cached_property

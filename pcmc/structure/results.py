@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ class StepResults:
     stresses: Floats  # (m,3,3) tensors in the axes of space, force/area, the mean over the thickness
     cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force; from a .dat alone
     share: float = 1.0  # of the step's loads, besides those of the step before: 1 but where it stopped
+    taut: float = 1.0  # the part of that share up to which no face is slack, between increments by a line
 
     @cached_array
     def deflections(self) -> Floats:
@@ -47,14 +49,8 @@ class StepResults:
         """(m,2) the two principal membrane stresses in each face's plane, ascending, force/area."""
         shown = np.flatnonzero(np.isfinite(self.stresses).all(axis=(1, 2)))
         surface = self.model.surface
-        P = surface.vertices[surface.faces[shown]]
-        first = P[:, 1] - P[:, 0]
-        first /= np.linalg.norm(first, axis=1)[:, None]
-        normal = area_vectors(P)
-        second = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], first)
-        plane = np.stack([first, second], axis=1)
         values = np.full((surface.m, 2), np.nan)
-        values[shown] = np.linalg.eigvalsh(plane @ self.stresses[shown] @ plane.transpose(0, 2, 1))
+        values[shown] = _in_planes(surface.vertices[surface.faces[shown]], self.stresses[shown])
         return values
 
     @cached_array
@@ -110,13 +106,14 @@ def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tup
         raise FileError(message, what=str(path), where=error.start) from None
     except FileError as error:
         raise error.in_file(path, what=str(path)) from None
-    return tuple(_results(model, steps, k, blocks) for k, blocks in enumerate(tables))
+    return tuple(_results(model, steps, k, tables) for k in range(len(tables)))
 
 
 def _results(
-    model: StructuralModel, steps: Sequence[Step], k: int, blocks: dict[str, ResultBlock]
+    model: StructuralModel, steps: Sequence[Step], k: int, tables: list[dict[str, ResultBlock]]
 ) -> StepResults:
     """The arrays of step k on the surface's vertices and faces; only the standing faces are elements."""
+    blocks = tables[k]
     step, surface, stress = steps[k], model.standing, blocks["stresses"]
     share = blocks["displacements"].time - k
     if share < 1.0 - WHOLE:
@@ -142,7 +139,36 @@ def _results(
         mine = blocks["cables"].means(numbers)[:, TENSOR]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
     done = 1.0 if share >= 1.0 - WHOLE else share
-    return StepResults(step.name, model, displacements, reactions, stresses, tensions, done)
+    taut = min(_taut(model, stress, k, tables[k - 1]["stresses"] if k else None), done)
+    return StepResults(step.name, model, displacements, reactions, stresses, tensions, done, taut)
+
+
+def _taut(model: StructuralModel, last: ResultBlock, k: int, start: ResultBlock | None) -> float:
+    """The time in step k at which the first face gets slack, by lines through the least principal stress at
+    the increments and at the ``start``; 1 if none does."""
+    if last.by_node:
+        return 1.0
+    P, blocks = model.surface.vertices[model.surface.faces[model.faces]], [last]
+    while (earlier := blocks[0].before) is not None:
+        blocks.insert(0, earlier)
+    least = [(0.0, float(model.prestress.min()))] if start is None else []
+    for block in blocks if start is None else [start, *blocks]:
+        stresses = block.means(model.faces + 1)[:, TENSOR]
+        least.append((block.time - k, float(_in_planes(P, stresses).min())))
+    for (time, before), (end, after) in pairwise(least):
+        if after <= 0.0:
+            return time + (end - time) * before / (before - after) if before > 0.0 else time
+    return 1.0
+
+
+def _in_planes(P: Floats, stresses: Floats) -> Floats:
+    """(k,2) the principal values, ascending, of tensors (k,3,3) in the planes of triangles (k,3,3)."""
+    first = P[:, 1] - P[:, 0]
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    normal = area_vectors(P)
+    second = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], first)
+    plane = np.stack([first, second], axis=1)
+    return np.asarray(np.linalg.eigvalsh(plane @ stresses @ plane.transpose(0, 2, 1)))
 
 
 def _check(tables: list[dict[str, ResultBlock]], model: StructuralModel, steps: Sequence[Step]) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -35,6 +35,7 @@ class ResultBlock:
     values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
     by_node: bool  # whether the numbers are those of nodes
     places: Floats | None = None  # (k,3) where the nodes are, if the file has it
+    before: ResultBlock | None = None  # the same at the increment before, in the same step
 
     def means(self, elements: Ints) -> Floats:
         """(k,c) the mean over the integration points of each of the elements (k,), ascending numbers."""
@@ -46,7 +47,7 @@ class ResultBlock:
 
 def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
     """The tables of each step, which end at the times 1, 2, ...; of several in a step the last counts, so
-    that of an analysis that stopped the last step's is what it reached.
+    that of an analysis that stopped the last step's is what it reached. Each has the one ``before`` it.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
     >>> read(text, ".dat")[0]["displacements"].values.tolist()
@@ -56,7 +57,8 @@ def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
     for block in (_of_dat if suffix == ".dat" else _of_frd)(text):
         number = max(math.ceil(block.time - WHOLE), 1)
         steps += [{} for _ in range(number - len(steps))]
-        steps[number - 1][block.kind] = block
+        earlier = steps[number - 1].get(block.kind)
+        steps[number - 1][block.kind] = replace(block, before=earlier)
     return steps
 
 

@@ -7,22 +7,37 @@ of the snow over them, and its tension must balance theirs.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.errors import SurfaceError
 from ..base.tolerances import SAME_PRESSURE
 
+
+class Kind(NamedTuple):
+    """A kind of values: the parts of a surface that have one each, their field, and its dimension."""
+
+    parts: str
+    field: str
+    dimension: str  # a key of ``POWERS``
+
+
 KINDS = {
-    **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
-    "cables": ("cables", "tension"),
-    "volumes": ("rooms", "volume"),
+    "tensions": Kind("patches", "tension", "tension"),
+    "pressures": Kind("patches", "pressure", "pressure"),
+    "snows": Kind("patches", "snow", "pressure"),
+    "weights": Kind("patches", "weight", "pressure"),
+    "cables": Kind("cables", "tension", "force"),
+    "cable_weights": Kind("cables", "weight", "tension"),
+    "volumes": Kind("rooms", "volume", "volume"),
 }
-"""The kinds of values, as ``Surface.retensioned`` takes them: the parts of the surface, and their field."""
+"""The kinds of values, as ``Surface.retensioned`` takes them."""
+POWERS = {"force": 0, "tension": -1, "pressure": -2, "volume": 3}  # of a length, beside one of a force
 PARTS = {"patches": "patch", "cables": "cable", "rooms": "room"}
 SHARE = 0.3  # of the smaller tension: the wall's tension above the difference of its neighbours'
 
@@ -31,13 +46,13 @@ def all_values(surface: Any) -> dict[str, dict[str, float]]:
     """The values of a Surface by kind and name, as ``Surface.retensioned`` takes them."""
     return {
         kind: {part.name: getattr(part, field) for part in getattr(surface, parts)}
-        for kind, (parts, field) in KINDS.items()
+        for kind, (parts, field, _) in KINDS.items()
     }
 
 
 def part_values(surface: Any, kind: str) -> Floats:
     """The values of one kind, in the order of the patches, cables or rooms."""
-    parts, field = KINDS[kind]
+    parts, field, _ = KINDS[kind]
     return np.array([getattr(part, field) for part in getattr(surface, parts)], dtype=float)
 
 
@@ -49,14 +64,38 @@ def part_index(surface: Any, kind: str, name: str) -> int:
 
 
 def with_values(
+    surface: Any, given: Mapping[str, Mapping[str, float] | None], walls: Iterable[str]
+) -> dict[str, tuple[Any, ...]]:
+    """The patches, cables and rooms of a Surface with other values; see ``Surface.retensioned``."""
+    changes: dict[str, dict[str, dict[str, Any]]] = {parts: {} for parts in PARTS}
+    for kind, values in given.items():
+        if not isinstance(values or {}, Mapping):
+            validate.refuse(kind, values, "a mapping from names to numbers", error=SurfaceError)
+        parts, field, _ = KINDS[kind]
+        changes[parts][field] = dict(values or {})
+    if isinstance(walls, str) or not isinstance(walls, Iterable):
+        validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
+    of_patches = changes["patches"]
+    of_patches["wall"] = dict.fromkeys(walls, True)
+    changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
+    following: dict[str, dict[str, Any]] = {}
+    for field in ("pressure", "snow"):
+        old, new = (
+            np.array([getattr(p, field) for p in patches])
+            for patches in (surface.patches, changed["patches"])
+        )
+        change = wall_changes(surface, new - old, {surface.patch_index(name) for name in of_patches[field]})
+        following[field] = {
+            surface.patches[k].name: float(old[k] + change[k]) for k in np.flatnonzero(change)
+        }
+    following["wall"] = dict.fromkeys((*following["pressure"], *following["snow"]), True)
+    return changed | {"patches": _replaced(changed["patches"], "patch", following)}
+
+
+def _replaced(
     parts: tuple[Any, ...], part: str, by_field: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Any, ...]:
-    """The parts with other values of their fields; OptionError for an unknown name.
-
-    >>> from pcmc import Patch
-    >>> with_values((Patch("roof", 1.0),), "patch", {"tension": {"roof": 2.0}, "pressure": {"roof": 3.0}})
-    (Patch(name='roof', tension=2.0, pressure=3.0),)
-    """
+    """The parts with other values of their fields; OptionError for an unknown name."""
     changes: dict[str, dict[str, Any]] = {part.name: {} for part in parts}
     for field, by_name in by_field.items():
         for name, value in by_name.items():

@@ -1,6 +1,7 @@
 """Units of length and force, and files that carry them."""
 
 import warnings
+from contextlib import nullcontext
 
 import ezdxf
 import ezdxf.units
@@ -123,6 +124,31 @@ def test_a_rhino_file_in_millimetres_keeps_its_size(tmp_path):
     size, unit = size_in_rhino(tmp_path / "back.3dm")
     np.testing.assert_allclose(size, [12000.0, 12000.0, 3000.0], rtol=1e-12)
     assert unit == rhino3dm.UnitSystem.Millimeters
+
+
+RHINO = {"Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 0.01, "Decimeters": 0.1, "Meters": 1.0}
+RHINO |= {"Kilometers": 1e3, "Inches": 0.0254, "Feet": 0.3048, "Yards": 0.9144, "Miles": 1609.344}
+
+
+@pytest.mark.parametrize("system", RHINO)
+def test_a_rhino_file_in_any_unit_has_the_size_that_its_unit_says(tmp_path, system):
+    path = in_millimetres(tmp_path / "a.3dm")
+    model = rhino3dm.File3dm.Read(str(path))
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, system)
+    model.Write(str(path), 7)
+    with pytest.warns(FileWarning) if system != "Meters" else nullcontext():
+        roof = pcmc.read(path, units="m")
+    size = RHINO[system] * np.array([12000.0, 12000.0, 3000.0])
+    np.testing.assert_allclose(np.ptp(roof.vertices, axis=0), size, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("units", "system"),
+    [("m", "Meters"), ("mm", "Millimeters"), ("cm", "Centimeters"), ("ft", "Feet"), ("in", "Inches")],
+)
+def test_a_rhino_file_names_the_unit_that_it_is_written_in(tmp_path, roof, units, system):
+    pcmc.write(tmp_path / "a.3dm", roof, units=units)
+    assert size_in_rhino(tmp_path / "a.3dm")[1] == getattr(rhino3dm.UnitSystem, system)
 
 
 def test_the_command_keeps_the_unit_of_a_file(tmp_path, monkeypatch, capsys):

@@ -1,6 +1,7 @@
 """Cases and combinations under CalculiX, against closed forms; what is overloaded is answered."""
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -151,6 +152,11 @@ def test_what_is_too_much_is_answered():
     assert 0.5 < found["snow"].share < 0.95
     assert found.remedy > 1.0
     assert analyse(analysis.prestressed(heavy, found.remedy)).carried
+    assert found["light"].taut == 1.0
+    taut = found["snow"].taut
+    assert 0.0 < taut < found["snow"].share
+    at_taut = analyse(replace(heavy, loads=[Snow(taut * 1.4)]))["snow"].results.principal_forces
+    assert abs(np.nanmin(at_taut)) < 0.03 * ALPHA
     first, last = found.answers()
     assert first.startswith(f"snow: {100 * found['snow'].share:.0f} % of its loads carried")
     assert "'cap'" in first
