@@ -22,7 +22,7 @@ from .start import surface_of
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written
-KEYS = {kind: field for kind, (parts, field) in KINDS.items() if parts == "patches"}
+KEYS = {kind: field for kind, (parts, field, _) in KINDS.items() if parts == "patches"}
 LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
 NO_POINTS = ("axes", "weights", "radius")  # of a curve
 WEIGHT_KEYS = {"cable": "cable_weight", "tension": "weight"}  # of a cable, by the key of its tension
