@@ -106,6 +106,18 @@ def run(
     Warns
     -----
     BalanceWarning : before solving, if the tensions at a junction cannot balance.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> plan = "[plan]\\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\\ntension = 3.0\\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "hall.toml")
+    ...     _ = path.write_text(plan + '[output]\\nfiles = ["hall.pcmc"]', encoding="utf-8")
+    ...     outcome = run(path)
+    >>> outcome.good, outcome.certificate.verdict.name, [file.name for file in outcome.files]
+    (True, 'STABLE', ['hall.pcmc'])
     """
     project = load(path)
     project = project if out_dir is None else project.in_folder(out_dir)

@@ -256,7 +256,6 @@ class _Writer(NamedTuple):
                 raise OptionError(text, what="cable", where=name)
             curve = [[float(f"{x:.9g}") for x in point] for point in tips.tolist()]
             line = {"name": name, "curve": curve, "tension": _number(values["cables", name])}
-            line |= {"weight": _number(w)} if (w := values["cable_weights", name]) else {}
             self.plan.setdefault("cables", []).append(line)
 
     def line(self, source: Source) -> dict[str, Any]:

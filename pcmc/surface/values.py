@@ -19,7 +19,7 @@ from ..base.errors import SurfaceError
 from ..base.tolerances import SAME_PRESSURE
 
 
-class Kind(NamedTuple):
+class ValueKind(NamedTuple):
     """A kind of values: the parts of a surface that have one each, their field, and its dimension."""
 
     parts: str
@@ -28,13 +28,13 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "tensions": Kind("patches", "tension", "tension"),
-    "pressures": Kind("patches", "pressure", "pressure"),
-    "snows": Kind("patches", "snow", "pressure"),
-    "weights": Kind("patches", "weight", "pressure"),
-    "cables": Kind("cables", "tension", "force"),
-    "cable_weights": Kind("cables", "weight", "tension"),
-    "volumes": Kind("rooms", "volume", "volume"),
+    "tensions": ValueKind("patches", "tension", "tension"),
+    "pressures": ValueKind("patches", "pressure", "pressure"),
+    "snows": ValueKind("patches", "snow", "pressure"),
+    "weights": ValueKind("patches", "weight", "pressure"),
+    "cables": ValueKind("cables", "tension", "force"),
+    "cable_weights": ValueKind("cables", "weight", "tension"),
+    "volumes": ValueKind("rooms", "volume", "volume"),
 }
 """The kinds of values, as ``Surface.retensioned`` takes them."""
 POWERS = {"force": 0, "tension": -1, "pressure": -2, "volume": 3}  # of a length, beside one of a force
