@@ -14,6 +14,7 @@ from .forces import checks
 from .gallery import surfaces
 from .questions import (
     accuracy,
+    cloth,
     existence,
     margins,
     mesh_check,
@@ -47,6 +48,7 @@ MODULES = (
     margins,
     accuracy,
     panel_families,
+    cloth,
     surfaces,
     checks,
     structure,
