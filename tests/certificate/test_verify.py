@@ -65,7 +65,7 @@ def parts(surface: Surface):
     part = standing_part(surface)
     space = motion_space(part.surface, part.classes, part.surface.vertices)
     pattern = hessian_pattern(part.classes, space)
-    return part, space, pattern, enclosures.elements(part.surface, part.classes, pattern)
+    return part, space, pattern, enclosures.mesh_arrays(part.surface, part.classes, pattern)
 
 
 @pytest.mark.parametrize(
