@@ -25,7 +25,7 @@ WIDTH = 110  # columns of a line of text
 HEADER = """\
 # The paper beside this package
 
-`python -m studies reproduce` writes this file. Do not edit it.
+<!-- `python -m studies reproduce` writes this file: do not edit it. -->
 
 {headline}
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import json
-import math
 import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+
+from pcmc.base.arrays import Floats
 
 from .code import code_of
-from .paper import read_measured
 from .study import Study, git, perform
 
-SAME = 1e-6  # relative: other processors and libraries round sums otherwise
-NOTHING = 1e-9  # a difference between numbers about 0 that is rounding
+# two runs give the same number if it differs by less than
+SAME = 1e-6  # of its size: other processors and libraries round sums otherwise
+NOTHING = 1e-9  # or this, about 0, where all is rounding
+SECONDS = "times.csv"  # how the names of tables of seconds end
 SHOWN = 4  # parts of the code named in a line
 
 
@@ -71,25 +78,86 @@ def differing(stored: Mapping[str, str], now: Mapping[str, str]) -> tuple[str, .
 
 
 def check(study: Study, results: Path) -> list[str]:
-    """Run a study anew, elsewhere; a line for each of its numbers that is not as stored in ``results``."""
-    with tempfile.TemporaryDirectory() as scratch:
-        perform(study, Path(scratch), steps=("data", "table"))
-        return differences(read_measured(results), read_measured(Path(scratch)), study.name)
+    """Run a study anew, elsewhere; a line for each column of its tables that is not as stored in ``results``.
 
-
-def differences(stored: Mapping[str, float], anew: Mapping[str, float], study: str) -> list[str]:
-    """A line for each number of a study that is not the same in both.
-
-    >>> differences({"a.x": 1.0, "a.y": 2.0, "b.x": 9.0}, {"a.x": 1.0 + 1e-9, "a.y": 2.1}, "a")
-    ['a.y: stored 2, now 2.1']
+    What it reads of other studies is what is stored.
     """
-    keys = sorted(key for key in {*stored, *anew} if key.startswith(f"{study}."))
-    pairs = ((key, stored.get(key, math.nan), anew.get(key, math.nan)) for key in keys)
-    return [f"{key}: stored {old:.9g}, now {new:.9g}" for key, old, new in pairs if not _same(old, new)]
+    with tempfile.TemporaryDirectory() as scratch:
+        anew = Path(scratch)
+        for other in (path for path in results.iterdir() if path.is_dir() and path.name != study.name):
+            (anew / other.name).symlink_to(other.resolve(), target_is_directory=True)
+        perform(study, anew, steps=("data", "table"))
+        return differences(results / study.name, anew / study.name)
 
 
-def _same(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=SAME, abs_tol=NOTHING) or (one != one and other != other)
+def differences(stored: Path, anew: Path) -> list[str]:
+    """A line for each table of two folders that only one has, and for each column that differs.
+
+    Tables of seconds are left out: they are never the same.
+    """
+    lines = []
+    for name in sorted({path.name for folder in (stored, anew) for path in folder.glob("*.csv")}):
+        if name.endswith(SECONDS):
+            continue
+        if not (stored / name).is_file() or not (anew / name).is_file():
+            lines.append(f"{stored.name}/{name}: only {'stored' if (stored / name).is_file() else 'now'}")
+        else:
+            found = between(pd.read_csv(stored / name), pd.read_csv(anew / name))
+            lines += [f"{stored.name}/{name}: {line}" for line in found]
+    return lines
+
+
+def between(stored: pd.DataFrame, anew: pd.DataFrame) -> list[str]:
+    """A line for each column that is not the same in two tables, with the cell that differs most.
+
+    Rows of ``measured``, which have keys, are put side by side by these.
+
+    >>> old = pd.DataFrame({"case": ["a", "b"], "x": [1.0, 2.0]})
+    >>> between(old, old.assign(x=[1.0 + 1e-9, 2.1]))
+    ['x, 1 of 2 rows, most in row 3 (b): stored 2, now 2.1']
+    """
+    if "key" in stored and "key" in anew:
+        keys = sorted({*stored.key, *anew.key})
+        stored, anew = (frame.set_index("key").reindex(keys).reset_index() for frame in (stored, anew))
+    lines = [
+        f"{column}: only {'stored' if column in stored else 'now'}"
+        for column in dict.fromkeys([*stored, *anew])
+        if not (column in stored and column in anew)
+    ]
+    if len(stored) != len(anew):
+        return [*lines, f"stored {len(stored)} rows, now {len(anew)}"]
+    for column in (column for column in stored if column in anew):
+        old, new = stored[column], anew[column]
+        by = _apart(old, new)
+        if by.any():
+            row = int(by.argmax())
+            whose = "" if column == stored.columns[0] else f" ({stored.iloc[row, 0]!s})"
+            lines.append(
+                f"{column}, {np.count_nonzero(by)} of {len(by)} rows, most in row {row + 2}{whose}:"
+                f" stored {_shown(old.iloc[row])}, now {_shown(new.iloc[row])}"
+            )
+    return lines
+
+
+def _apart(old: pd.Series[Any], new: pd.Series[Any]) -> Floats:
+    """(k,) By how much cells differ, 0 within the tolerances, infinite for words and for empty ones."""
+    if not (is_numeric_dtype(old) and is_numeric_dtype(new)):
+        words = np.array(
+            [
+                one != other and not (one != one and other != other)
+                for one, other in zip(old, new, strict=True)
+            ]
+        )
+        return np.where(words, np.inf, 0.0)
+    one, other = old.to_numpy(float), new.to_numpy(float)
+    same = np.isclose(one, other, rtol=SAME, atol=NOTHING, equal_nan=True)
+    with np.errstate(invalid="ignore"):
+        size = np.abs(one - other) / np.maximum(np.maximum(np.abs(one), np.abs(other)), NOTHING)
+    return np.where(same, 0.0, np.nan_to_num(size, nan=np.inf, posinf=np.inf))
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else f"{value!s}"
 
 
 def ages(studies: Iterable[Study], results: Path) -> dict[str, Age | None]:

@@ -28,6 +28,7 @@ from .cases import BOTTOMS, CASES, DRAWN, ROUND, Case
 from .figures import figure
 from .ladder import (
     JUMP,
+    JUMP_NUMBERS,
     LOST,
     NONE,
     PERSISTS,
@@ -42,6 +43,7 @@ from .ladder import (
     label,
     loss,
     opening,
+    polygon_steps,
     rise,
 )
 
@@ -66,7 +68,10 @@ def data(folder: Folder, short: bool) -> None:
             whose = {"case": case.name, "bottom": bottom}
             rows += [whose | row for row in found]
             at_ends += [whose | row for row in _ends(initial, reached[-1], found, levels, bottom)]
-            jumps += [whose | row for row in halved(found, reached, bottom, case.project)]
+            for row in halved(found, reached, bottom, case.project):
+                if case.project:
+                    row |= polygon_steps(initial, row["level"], REACH * initial.size, bottom)
+                jumps.append(whose | row)
             if case.name == DRAWN and bottom == "held":
                 folder.write_mesh(DRAWN, {"at rest": reached[-1]})
     folder.write_table("ladder", pd.DataFrame(rows))
@@ -213,7 +218,7 @@ def table(folder: Folder) -> dict[str, float]:
         for row in counts.to_dict("records")
     }
     for row in folder.read_table("jumps").to_dict("records"):
-        found |= {f"{row['case']}_{row['bottom']}_jump_{key}": float(row[key]) for key in JUMP[:-2]}
+        found |= {f"{row['case']}_{row['bottom']}_jump_{key}": float(row[key]) for key in JUMP_NUMBERS}
     for row in labels.to_dict("records"):
         found[f"{row['case']}_{row['bottom']}_levels"] = float(row["levels"])
         found[f"{row['case']}_{row['bottom']}_limit"] = float(row["limit"])

@@ -49,9 +49,11 @@ PERSISTS, SADDLE, TURNS, LOST, SINKS, NONE = CATEGORIES = (
 )
 SUNK = 1e-3  # quality of a wall's triangles at which its junction has come down on its bottom
 JUMP = (  # columns of ``halved``
-    "level", "anew", "slid", "energy_before", "energy", "energy_before_halved", "energy_halved", "step",
-    "step_halved", "mesh_error", "status_before_halved", "status_halved",
+    "level", "anew", "slid", "energy_before", "energy", "energy_before_halved", "energy_halved",
+    "step_before", "step", "step_halved", "mesh_error", "polygon_step_before", "polygon_step",
+    "status_before_halved", "status_halved",
 )  # fmt: skip
+JUMP_NUMBERS = tuple(column for column in JUMP if not column.startswith("status"))
 LEAST_FIT = 4  # levels
 NEAR_REST = 0.2  # of log(1/h): closer to where the junction rests the law has no use
 LEAST_STEP = 1e-6  # of the energy: a smaller step is not looked into
@@ -207,6 +209,7 @@ def halved(
             "energy": energy[1],
             "energy_before_halved": finer[0],
             "energy_halved": finer[1],
+            "step_before": energies[level - 1] - energies[level - 2],
             "step": energy[1] - energy[0],
             "step_halved": finer[1] - finer[0],
             "mesh_error": (energy[1] - finer[1]) * 4.0 / 3.0,
@@ -214,6 +217,18 @@ def halved(
             "status_halved": fine[1][1],
         }
     ]
+
+
+def polygon_steps(surface: Surface, level: int, radius: float, support: str) -> dict[str, float]:
+    """The step of the energy to a level, and the one before, with the outline left as the polygon it is.
+
+    Where new vertices go on a round outline the surface gets larger, and its energy with it or against it;
+    here it does not. NaN where a level is not reached.
+    """
+    rows, _ = climb(surface, level, radius, support)
+    energies = [row["energy"] if row["status"] == "converged" else math.nan for row in rows]
+    before, step = np.diff(energies + [math.nan] * (level + 1 - len(energies)))[-2:]
+    return {"polygon_step_before": float(before), "polygon_step": float(step)}
 
 
 def _solved_finer(surface: Surface, support: str, project: Projection | None) -> tuple[float, str]:

@@ -21,11 +21,10 @@ from pcmc import Material, Snow, StructuralModel, Surface, certify, project, sol
 from pcmc.base.arrays import Floats
 from pcmc.certificate.forces import Forces
 from pcmc.certificate.supports import boundary_view, support_table
-from pcmc.structure import StepResults
+from pcmc.structure import StepResults, calculix
 from pcmc.surface.geometry import face_areas
 
 from ..folder import Folder
-from ..reference import calculix
 from ..study import Study
 
 Row = dict[str, float | str]
@@ -55,8 +54,7 @@ MESHES = ("coarse", "middle", "fine")
 
 def data(folder: Folder, short: bool) -> None:
     """``records``, ``patches`` and ``supports``; the middle meshes with their deflection under snow."""
-    if not calculix.available():
-        raise calculix.CalculixError(f"{calculix.PROGRAM} is not installed (Debian: calculix-ccx)")
+    calculix.expect_program()
     records: list[Row] = []
     patches: list[Row] = []
     supports: list[Row] = []

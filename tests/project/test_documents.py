@@ -15,7 +15,7 @@ from refusals import refused
 import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError
-from studies.reference import calculix
+from pcmc.structure import calculix
 
 ROOF = Path(__file__).resolve().parents[2] / "notebooks" / "roof.toml"
 UNITS = 'units = "m"\nforce = "kN"\n'

@@ -88,3 +88,18 @@ def test_links_to_files_of_the_checkout_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
         if not target.startswith("http") and not (page != "README.md" and target.endswith(generated)):
             assert ((HOME / page).parent / target).exists(), target
+
+
+def test_the_bibliography_has_what_is_cited_and_no_more():
+    """Cited as "Name 1977", "Name and Name 1977" or "Name and others 1977"."""
+    text = (DOCS / "bibliography.md").read_text(encoding="utf-8")
+    entries = re.findall(r"^([A-Z][^\n]*) ((?:18|19|20)\d\d)$", text, re.M)
+    files = [*HOME.glob("pcmc/**/*.py"), *(HOME / page for page in PAGES)]
+    files = [path for path in files if path.stem not in ("bibliography", "history")]
+    code = "".join(path.read_text(encoding="utf-8") for path in files)
+    last = r"([A-Z][\w-]+)(?: and others| et al\.)?,?\s\(?((?:18|19|20)\d\d)\b"
+    cited = {found for found in re.findall(last, code) if found[0] != "May"}  # a date
+    assert {
+        one for one in cited if not any(one[0] in names and one[1] == year for names, year in entries)
+    } == set()
+    assert [(n, y) for n, y in entries if not any(name in n and year == y for name, year in cited)] == []

@@ -12,10 +12,10 @@ from structures import FABRIC, model_of, pyramid, square
 import pcmc
 from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, Wind
 from pcmc.certificate.forces import load, reactions
+from pcmc.structure import calculix
+from pcmc.structure.calculix import CalculixError
 from pcmc.surface.geometry import face_areas
 from studies.questions import structure
-from studies.reference import calculix
-from studies.reference.calculix import CalculixError
 from tests.surface.test_circles import roofs
 from tests.surface.test_lines import squares
 

@@ -14,7 +14,7 @@ from studies.__main__ import main
 from studies.code import code_of, files_of
 from studies.folder import Folder, write_json
 from studies.registry import STUDIES
-from studies.stored import age, check, differences
+from studies.stored import age, between, check, differences
 
 RESULTS = Path(__file__).parents[2] / "results"
 EQUILIBRIA = STUDIES["equilibria"]
@@ -101,20 +101,86 @@ def test_the_command_names_what_to_run_again(tmp_path, capsys):
     assert "python -m studies run example1 example2" in said
 
 
-def test_a_new_run_is_compared_number_by_number(tmp_path, capsys, monkeypatch):
-    def table(folder):
-        return {"x": 1.0, "y": 2.0}
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    """A study of two numbers and a table of two rows; ``store`` stores other values, and checks."""
+    records = pd.DataFrame({"case": ["a", "b"], "energy": [1.0, 2.0], "verdict": ["stable", "saddle"]})
 
-    study = replace(EQUILIBRIA, data=lambda folder, short: None, table=table)
-    rows = pd.DataFrame({"key": ["equilibria.x", "equilibria.y"], "value": [1.0, 2.0]})
+    def data(folder, short):
+        folder.write_table("records", records)
+        folder.write_table("times", pd.DataFrame({"seconds": [1.0]}))
+
+    study = replace(EQUILIBRIA, data=data, table=lambda folder: {"x": 1.0, "y": 2.0})
     monkeypatch.setitem(STUDIES, "equilibria", study)
     monkeypatch.setattr("studies.study.provenance", lambda *_: {})
-    Folder(tmp_path / "equilibria").write_table("measured", rows)
-    assert main(["check", "equilibria", "--results", str(tmp_path)]) == 0
-    Folder(tmp_path / "equilibria").write_table("measured", rows.assign(value=[1.0, 2.00001]))
-    assert main(["check", "equilibria", "--results", str(tmp_path)]) == 1
-    assert "equilibria.y: stored 2.00001, now 2" in capsys.readouterr().out
-    assert differences({"a.x": 1.0}, {}, "a") == ["a.x: stored 1, now nan"]
+    folder = Folder(tmp_path / "equilibria")
+
+    def store(y=2.0, **columns):
+        keys = ["equilibria.x", "equilibria.y"]
+        folder.write_table("measured", pd.DataFrame({"key": keys, "value": [1.0, y]}))
+        folder.write_table("records", records.assign(**columns))
+        folder.write_table("times", pd.DataFrame({"seconds": [2.0]}))
+        return main(["check", "equilibria", "--results", str(tmp_path)])
+
+    return store
+
+
+@pytest.mark.parametrize(
+    ("stored", "line"),
+    [
+        (
+            {"y": 2.00001},
+            "measured.csv: value, 1 of 2 rows, most in row 3 (equilibria.y): stored 2.00001, now 2",
+        ),
+        (
+            {"energy": [1.0, 2.1]},
+            "records.csv: energy, 1 of 2 rows, most in row 3 (b): stored 2.1, now 2",
+        ),
+        (
+            {"verdict": ["saddle", "saddle"]},
+            "records.csv: verdict, 1 of 2 rows, most in row 2 (a): stored saddle, now stable",
+        ),
+        ({"more": [1, 2]}, "records.csv: more: only stored"),
+    ],
+)
+def test_a_new_run_is_compared_cell_by_cell(stored, line, small, capsys):
+    assert small() == 0
+    assert capsys.readouterr().out == "equilibria: every number is as stored\n"
+    assert small(**stored) == 1
+    assert capsys.readouterr().out == f"equilibria/{line}\n"
+
+
+def test_tables_rows_and_keys_that_only_one_run_has_are_said(tmp_path):
+    old, new = Folder(tmp_path / "old"), Folder(tmp_path / "new")
+    rows = pd.DataFrame({"key": ["a.x", "a.y"], "value": [1.0, 2.0]})
+    old.write_table("measured", rows)
+    new.write_table("measured", rows[1:])
+    old.write_table("gone", rows)
+    old.write_table("rows", rows[["value"]])
+    new.write_table("rows", rows[["value"]][1:])
+    assert differences(old.path, new.path) == [
+        "old/gone.csv: only stored",
+        "old/measured.csv: value, 1 of 2 rows, most in row 2 (a.x): stored 1, now nan",
+        "old/rows.csv: stored 2 rows, now 1",
+    ]
+
+
+@pytest.mark.parametrize(("stored", "same"), [(1.0 + 0.9e-6, True), (1.0 + 1.1e-6, False)])
+def test_rounding_is_no_difference_and_more_is(stored, same):
+    assert (between(pd.DataFrame({"x": [stored]}), pd.DataFrame({"x": [1.0]})) == []) is same
+    assert between(pd.DataFrame({"x": [0.9e-9]}), pd.DataFrame({"x": [-0.05e-9]})) == []
+
+
+def test_a_check_finds_what_the_study_reads_of_others(tmp_path, monkeypatch):
+    seen = []
+    study = replace(
+        EQUILIBRIA,
+        data=lambda folder, short: seen.append((folder.path.parent / "corners" / "grid.csv").is_file()),
+        table=lambda folder: {},
+    )
+    monkeypatch.setattr("studies.study.provenance", lambda *_: {})
+    check(study, RESULTS)
+    assert seen == [True]
 
 
 def test_continuous_integration_computes_a_stored_result_again():
