@@ -56,6 +56,8 @@ GALLERY = (  # scripts in ``pictures`` that the gallery shows, in this order
     "fold",
     "sweep",
     "load_case",
+    "under_load",
+    "slack",
     "drawings",
     "report",
 )

@@ -16,7 +16,8 @@ margins                    how far a roof is from the edge of its stability
 design                     tensions that meet targets
 compas                     meshes of COMPAS, and a server for them
 panelling structure        families of panels; structural models
-drawings plot report       sheets, pictures, and pages for those who build
+drawings cloth             sheets for those who build; cutting patterns of cloth
+plot report                pictures, and pages for those who build
 advice                     first tensions for a rise, and what to type where a roof fails
 project                    a whole design in one file
 sweep explore cli          many cases; the page; the command
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
     from .certificate.theorem import Theorem, verify
+    from .cloth import CuttingPattern, cutting_pattern
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .existence import solve
@@ -45,7 +47,17 @@ if TYPE_CHECKING:
     from .io.repairing import Repaired, repair
     from .margins import Margin, margin
     from .panelling import FewerFamilies, Panels, fewer_families, panels
-    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
+    from .structure import (
+        Gas,
+        Material,
+        SelfWeight,
+        Snow,
+        StructuralModel,
+        Wind,
+        analyse,
+        read_results,
+        write_structure,
+    )
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
@@ -53,9 +65,11 @@ __all__ = [
     "Cable",
     "Certificate",
     "Circle",
+    "CuttingPattern",
     "Design",
     "Direction",
     "FewerFamilies",
+    "Gas",
     "Line",
     "Margin",
     "Material",
@@ -75,10 +89,12 @@ __all__ = [
     "Theorem",
     "Verdict",
     "Wind",
+    "analyse",
     "certify",
     "check_mesh",
     "curvature_error",
     "cut",
+    "cutting_pattern",
     "energy",
     "errors",
     "explore",
@@ -110,6 +126,7 @@ __all__ = [
 _NAMES = {
     "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
+    "cloth": ("CuttingPattern", "cutting_pattern"),
     "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "forces.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
@@ -120,11 +137,13 @@ _NAMES = {
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (
+        "Gas",
         "Material",
         "SelfWeight",
         "Snow",
         "StructuralModel",
         "Wind",
+        "analyse",
         "read_results",
         "write_structure",
     ),

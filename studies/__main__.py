@@ -1,4 +1,5 @@
-"""``python -m studies list | run NAME ... | reproduce | stale | check NAME ... | benchmark | readme``."""
+"""``python -m studies list | run NAME ... | reproduce | stale | check NAME ... | numbers | benchmark |
+readme``."""
 
 from __future__ import annotations
 
@@ -51,8 +52,11 @@ def _parser() -> argparse.ArgumentParser:
     act.add_argument("names", nargs="+", metavar="NAME")
     act.add_argument("--results", type=Path, help="where they are (default: results/)")
     act.set_defaults(act=_check)
+    act = acts.add_parser("numbers", help="the numbers of README, documentation and report with their keys")
+    act.set_defaults(act=_numbers)
     act = acts.add_parser("benchmark", help="how fast it is on this machine, evolver beside it")
     act.add_argument("--quick", action="store_true", help="small meshes; within a minute")
+    act.add_argument("--only", nargs="+", default=[], metavar="NAME", help='e.g. "to height": its rows anew')
     act.add_argument("--results", type=Path, help="where to write (default: results/)")
     act.set_defaults(act=_benchmark)
     act = acts.add_parser(
@@ -119,10 +123,19 @@ def _check(asked: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
+def _numbers(asked: argparse.Namespace) -> int:
+    from .stated import listed_numbers
+
+    rows = list(listed_numbers())
+    page, number = (max(len(row[k]) for row in rows) for k in (0, 1))
+    print("\n".join(f"{row[0]:{page}}  {row[1]:>{number}}  {row[2]}" for row in rows))
+    return 0
+
+
 def _benchmark(asked: argparse.Namespace) -> int:
     from .benchmarks.run import main as benchmark
 
-    return benchmark(asked.results or HOME / "results", asked.quick)
+    return benchmark(asked.results or HOME / "results", asked.quick, asked.only)
 
 
 def _readme(asked: argparse.Namespace) -> int:

@@ -9,14 +9,14 @@ from pathlib import Path
 from pcmc.base.errors import FileError
 
 from .folder import Folder, write_bytes
-from .report import headline, write_report
+from .report import headline, write_comparison
 
 WIDTH = 120  # of a line of the README
 
 
 def write_readme(readme: Path, results: Path) -> None:
-    """Bring the README's summary and ``REPORT.md`` up to date with the tables in ``results``."""
-    write_report(results)
+    """Bring the README's summary, ``REPORT.md`` and the comparison up to date with ``results``."""
+    write_comparison(results)
     text = up_to_date(readme.read_text(encoding="utf-8"), results)
     write_bytes(readme, text.encode())
 

@@ -61,46 +61,66 @@ The study `solvers` runs each method from the same start on the paper's {solvers
 {solvers.meshes} meshes each, from coarse to fine. It uses the paper's tensions, except for a wall of
 {solvers.wall_of_example1} in Example 1, where {example1.alpha_aux_histories} is a saddle on fine meshes.
 Residuals and errors are relative. With `target="stationary"` the geometric solver comes to rest in
-{solvers.at_rest_newton} of {solvers.runs_newton} runs, with the default, `target="minimum"`, in
-{solvers.at_rest_newton_minimum} of {solvers.runs_newton_minimum}. {solvers.saddles_newton} and
-{solvers.saddles_newton_minimum} of these are saddles, {saddles}: there `"minimum"` looks for a minimum,
-finds none, and returns the saddle under that name. Its worst triangle has quality
+{solvers.at_rest_newton} of {solvers.runs_newton} runs, {solvers.saddles_newton} of them on saddles; with the
+default, `target="minimum"`, in {solvers.at_rest_newton_minimum} of {solvers.runs_newton_minimum},
+{solvers.saddles_newton_minimum} on saddles. These are {saddles}: there `"minimum"` looks for a minimum, finds
+none, and returns the saddle under that name. The worst triangle of its runs has quality
 {solvers.worst_quality_newton_minimum:.2g}."""
 
 CORNERS = """\
-The study `corners` solves the examples on meshes that get finer only near the ends of their junctions. Where
-the solver fails on a level, that level is solved anew from the initial shape. Then, and where the solver
-spreads vertices to keep triangles sound, they come to lie elsewhere along the same shape, and the energy of
-flat triangles depends on where they lie. `corners/jumps.csv` has, for each example and support, the largest
-step of the energy that is larger than the one before it: between the meshes of the two levels, and with
-every triangle of both cut into four.
+The study `corners` solves the examples on meshes that get finer only near the ends of their junctions, from
+level to level. The energy should change less at each level. `corners/jumps.csv` has, for each example and
+support, the largest step that is larger than the one before it, and what shows its cause.
 
-In Example 1 with a wall of 1 and held bottoms the energy steps by {corners.example1-1_held_jump_step:.2g}
-at level {corners.example1-1_held_jump_level}, after steps of less and less. That level is solved anew,
-and the junction comes down on its bottom. Its vertices are up to {corners.example1-1_held_jump_slid:.2g}
-from where they were. With every triangle cut into four the same two shapes differ by
-{corners.example1-1_held_jump_step_halved:.2g}. So the step is no other equilibrium; it is a part of the
-mesh's error: on this mesh the energy is wrong by {corners.example1-1_held_jump_mesh_error:.2g}."""
+In Example 1 vertices come to lie elsewhere along the same shape: where the solver fails on a level, that
+level is solved anew from the initial shape, and where triangles get thin, the solver spreads their vertices.
+The energy of flat triangles depends on where they lie. With a wall of 1 and held bottoms the energy steps by
+{corners.example1-1_held_jump_step:.2g} at level {corners.example1-1_held_jump_level}, after a step of
+{corners.example1-1_held_jump_step_before:.2g}. That level is solved anew, and the junction comes down on its
+bottom; vertices are up to {corners.example1-1_held_jump_slid:.2g} from where they were. With every triangle
+of both meshes cut into four the step is {corners.example1-1_held_jump_step_halved:.2g}. A step to another
+equilibrium would stay; the mesh's error gets four times smaller, and on this mesh it is
+{corners.example1-1_held_jump_mesh_error:.2g}. Cutting makes each of Example 1's steps smaller, {least} to
+{most} times.
+
+Example 3 and Fig. 4 are otherwise: no level is solved anew, and vertices move by
+{corners.example3_sliding_jump_slid:.2g} and {corners.fig4_sliding_jump_slid:.2g}. There the outline is a
+circle. Finer meshes put new vertices on it: the surface gets larger, which raises the energy, and its
+triangles get smaller, which lowers it. On one level these two nearly cancel, so the next step is larger: with
+sliding bottoms
+{corners.example3_sliding_jump_step_before:.2g} and then {corners.example3_sliding_jump_step:.2g} in Example
+3, {corners.fig4_sliding_jump_step_before:.2g} and then {corners.fig4_sliding_jump_step:.2g} in Fig. 4. If the
+outline stays the polygon of the first mesh, only the triangles change. Then the same two steps are
+{corners.example3_sliding_jump_polygon_step_before:.2g} and {corners.example3_sliding_jump_polygon_step:.2g},
+and {corners.fig4_sliding_jump_polygon_step_before:.2g} and {corners.fig4_sliding_jump_polygon_step:.2g}."""
+
+JUMPS = {  # columns of its table
+    "slid": "Vertices moved by",
+    "step_before": "Step before",
+    "step": "Step of E",
+    "step_halved": "Triangles cut into four",
+    "polygon_step_before": "On the polygon: step before",
+    "polygon_step": "On the polygon: step",
+}
 
 ACCURACY = """\
-The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. For
-{accuracy.bars_worse} of them the adaptive meshes need more triangles: {worse}. The table
-`accuracy/savings.csv` has what equal shares of the error would save (`estimated`). It is no bound:
-{accuracy.above_estimate} of the {accuracy.bars_on_mesh} savings for a value on the mesh exceed it, by up
-to {above:.0%}."""
+The study `accuracy` compares {accuracy.bars} error bars on uniform and on adaptive meshes. {worse} The table
+`accuracy/savings.csv` also estimates how many triangles one would save if each had an equal share of the
+error. This is no bound: {accuracy.above_estimate} of the {accuracy.bars_on_mesh} savings for a value on the
+mesh exceed it, by up to {above:.0%}."""
 
 CHECK = """\
 The study `mesh_check` checks {mesh_check.quantities} quantities of {mesh_check.closed_forms} surfaces
 with known values. {mesh_check.inside:.0%} of the bars of values on the mesh hold the true error; the
-median bar is {mesh_check.width_median:.2f} times as wide as that. {mesh_check.limit_inside:.0%} of the
+median bar is {mesh_check.width_median:.2f} times as wide as the error. {mesh_check.limit_inside:.0%} of the
 bars of limits hold theirs; the median bar is {mesh_check.limit_width_median:.2g} times as wide, 1 in 20
 more than {mesh_check.limit_width_95:.0f} times, and one {mesh_check.limit_width_largest:.0f} times: a
 limit may happen to be nearly exact."""
 
 PANELS = """\
 The study `panels` moves vertices of roofs at rest so that fewer different panels are needed. In
-{panels.same_verdict_after:.0%} of its runs the roof has the verdict that it had before; in
-{panels.stable_after:.0%} it is stable, in the others it was a saddle and stays one."""
+{panels.same_verdict_after:.0%} of its runs the roof keeps its verdict: in {panels.stable_after:.0%} it is
+stable, in the others a saddle."""
 
 SPEED = """\
 Surface Evolver solves the same mesh of Example 1, and the same cap, in the same run. `python -m studies
@@ -160,7 +180,11 @@ def report(results: Path) -> str:
         words = {"saddles": _saddles(results)}
         sections["Solvers"] = [fill(SOLVERS, measured, words), "", *solver_table(results)]
     if (results / "corners" / "jumps.csv").is_file():
-        sections["Ends of junctions"] = [fill(CORNERS, measured), "", *jump_table(results)]
+        sections["Ends of junctions"] = [
+            fill(CORNERS, measured, _cut_steps(results)),
+            "",
+            *jump_table(results),
+        ]
     if (results / "accuracy" / "savings.csv").is_file():
         above = {"above": measured["accuracy.most_over_estimate"] - 1.0}
         sections["Adaptive meshes"] = [fill(ACCURACY, measured | above, {"worse": _worse(results)})]
@@ -228,13 +252,22 @@ def _worse(results: Path) -> str:
     savings = Folder(results / "accuracy").read_table("savings")
     worse = savings[savings.saving < 1.0]
     rows = zip(worse.quantity, worse.family, worse.bar_of, 1.0 / worse.saving, strict=True)
-    words = [f"the {what} of `{of}`, {bar}, {times:.2f} times as many" for what, of, bar, times in rows]
-    return listed(words or ["none"])
+    words = [f"for the {what} in `{of}` ({bar}) {times:.2f} times as many" for what, of, bar, times in rows]
+    if not words:
+        return "For none of them do adaptive meshes need more triangles."
+    return f"For {len(words)} of them adaptive meshes need more triangles: {listed(words)}."
+
+
+def _cut_steps(results: Path) -> dict[str, str]:
+    """How much smaller Example 1's steps of the energy are with every triangle cut into four."""
+    jumps = Folder(results / "corners").read_table("jumps")
+    ratios = (jumps.step / jumps.step_halved)[jumps.case.str.startswith("example1")]
+    return {"least": f"{ratios.min():.1f}", "most": f"{ratios.max():.1f}"}
 
 
 def jump_table(results: Path) -> list[str]:
     """The steps of the energy that ``corners`` looks into."""
-    head = ["Example", "Bottoms", "Level", "Solved anew", "Vertices moved", "Step of E", "On halved meshes"]
+    head = ["Example", "Bottoms", "Level", "Solved anew", *JUMPS.values()]
     rows = Folder(results / "corners").read_table("jumps").to_dict("records")
     cells = [
         [
@@ -242,7 +275,7 @@ def jump_table(results: Path) -> list[str]:
             row["bottom"],
             row["level"],
             "yes" if row["anew"] else "no",
-            *(f"{row[key]:.2g}".replace("nan", "") for key in ("slid", "step", "step_halved")),
+            *(f"{row[key]:.2g}".replace("nan", "") for key in JUMPS),
         ]
         for row in rows
     ]

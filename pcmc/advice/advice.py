@@ -22,6 +22,7 @@ from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
 from ..solvers.result import Result, Status
 from ..surface import Surface
+from ..surface.pieces import two_digits
 from .rises import Rise, net_pressures
 from .supports import SHARES, as_sail, point_masts, ring_lines, with_rings
 
@@ -271,7 +272,7 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
     def higher(tension: float) -> float:
-        return float(f"{max(least, factor * tension, tension):.2g}")
+        return two_digits(max(least, factor * tension, tension))
 
     if plan.tension is not None:
         return replace(plan, tension=higher(plan.tension))

@@ -18,6 +18,7 @@ from ..plan import Divider, Hole, Plan
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
 from ..surface.curves import Curve
+from ..surface.pieces import two_digits
 from .rises import Rise
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried
@@ -38,7 +39,7 @@ class Mast:
 
     def radius(self, share: float) -> float:
         """The radius of a ring around it."""
-        return float(f"{share * self.clearance:.2g}")
+        return two_digits(share * self.clearance)
 
 
 def point_masts(plan: Plan) -> list[Mast]:

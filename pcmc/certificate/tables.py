@@ -90,12 +90,12 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
     their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in
     the mean over a cable's edges up to what the mesh leaves.
 
-    Columns: ``cable``, ``tension`` (its force, the largest where a weight g lets it vary) and ``length``; the
-    middle of the part; ``sheet_pull``, the mean of |Σ α n|, with the weight across the cable, and
-    ``cable_pull``, that of (τ + g z) |κ|, force/length; ``force_left`` per length in the motion space, of
-    ``left`` (n,3).
+    Columns: ``cable``, ``tension`` (its force, the largest where a weight g lets it vary), ``weight`` (g, if
+    any cable has one) and ``length``; the middle of the part; ``sheet_pull``, the mean of |Σ α n|, with the
+    weight across the cable, and ``cable_pull``, that of (τ + g z) |κ|, force/length; ``force_left`` per
+    length in the motion space, of ``left`` (n,3).
     """
-    rows = []
+    rows, heavy = [], surface.cable_edges.weight.any()
     for cable, curve in cable_parts(surface):
         t, closed = directions(surface.vertices, curve.pairs)[0], curve.closed
         inner = curve.vertices if closed else curve.vertices[1:-1]
@@ -109,7 +109,8 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
             "force_left": along.pop("force_left"),
         }
         tension = float(pull_along(surface, cable, curve.vertices).max())
-        rows.append({"cable": cable.name, "tension": tension, **along, **pulls})
+        own = {"cable": cable.name, "tension": tension, **({"weight": cable.weight} if heavy else {})}
+        rows.append(own | along | pulls)
     return pd.DataFrame(rows)
 
 

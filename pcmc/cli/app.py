@@ -9,6 +9,7 @@ import typer
 
 from .arguments import with_groups
 from .building import draw_, panels_, report_, structure
+from .cutting import pattern
 from .preparing import cache_, plan, repair_, schema
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
@@ -54,6 +55,7 @@ for name, command, summary in (
     ("plan", plan, "Write the project file for a drawing."),
     ("schema", schema, "Print the JSON Schema of project files, for editors."),
     ("structure", structure, "Write a structural model for CalculiX."),
+    ("pattern", pattern, "Cut a roof into strips of cloth; write sheets and tables."),
     ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
     ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("report", report_, "Write a report with pictures, plan, verdict, forces and panels."),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -32,12 +32,12 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
 
 def real(metavar: str, meaning: str) -> Any:
     """An option with a number."""
-    return option(metavar, meaning, parser=number)
+    return option(metavar, meaning, parser=parsed_number)
 
 
 def count(meaning: str) -> Any:
     """An option with a whole number."""
-    return option("NUMBER", meaning, parser=integer)
+    return option("NUMBER", meaning, parser=parsed_integer)
 
 
 def by_part(meaning: str) -> Any:
@@ -50,7 +50,7 @@ def flag(name: str, meaning: str) -> Any:
     return typer.Option(name, help=meaning)
 
 
-def number(text: str | float) -> float:
+def parsed_number(text: str | float) -> float:
     """The number in an option. The error shows the text, which typer's own parser does not."""
     try:
         return validate.parsed(str(text))
@@ -58,8 +58,8 @@ def number(text: str | float) -> float:
         raise typer.BadParameter(f"expected a number, found {text!r}") from None
 
 
-def integer(text: str | int) -> int:
-    """The whole number in an option; see ``number``."""
+def parsed_integer(text: str | int) -> int:
+    """The whole number in an option; see ``parsed_number``."""
     try:
         validate.parsed(str(text))  # which refuses 1_000
         return int(text)
@@ -99,6 +99,7 @@ class Loads:
     weight: Annotated[list[str] | None, by_part(f"Weight of a patch per area. {EVERY}.")] = None
     snow: Annotated[list[str] | None, by_part(f"Snow on a patch, per area of the plan. {LOADED}.")] = None
     cable: Annotated[list[str] | None, by_part("Tension of a cable. A bare VALUE applies to all.")] = None
+    cable_weight: Annotated[list[str] | None, by_part("Weight of a cable per length.")] = None
     volume: Annotated[list[str] | None, by_part("Volume of a room that has one already.")] = None
 
     @property
@@ -111,9 +112,10 @@ class Loads:
         sheets = [patch.name for patch in surface.patches if not patch.wall]
         loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
         names = {"tension": loaded, "pressure": loaded, "weight": sheets, "snow": loaded}
-        names |= {"cable": [cable.name for cable in surface.cables]}
+        names |= {key: [cable.name for cable in surface.cables] for key in ("cable", "cable_weight")}
         names |= {"volume": [room.name for room in surface.rooms]}
-        given = {f"{key}s": by_name(own, getattr(self, key), f"--{key}") for key, own in names.items()}
+        flags = {key: f"--{key.replace('_', '-')}" for key in names}
+        given = {f"{key}s": by_name(own, getattr(self, key), flags[key]) for key, own in names.items()}
         return projects.with_loads(surface, given)
 
 
@@ -185,15 +187,6 @@ def check_suffix(file: Path) -> None:
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 
 
-def check_outputs(
-    file: Path, surfaces: Sequence[Path] = (), *, others: Sequence[Path] = (), picture: Path | None = None
-) -> None:
-    """Refuse files that cannot be written, or that are read; ``surfaces`` need the suffix of a format."""
-    projects.check_names(surfaces, picture)
-    outputs = [*surfaces, *others, *filter(None, [picture])]
-    projects.check_outputs(outputs, inputs=projects.files_of(file))
-
-
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
     """Value by name, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
     values: dict[str, float] = {}
@@ -212,10 +205,10 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
     return values
 
 
-def values_of(text: str) -> tuple[str, list[Any]]:
+def named_values(text: str) -> tuple[str, list[Any]]:
     """A name and its values from NAME=V1,V2.
 
-    >>> values_of("alpha=2,4.5"), values_of("wall=upright")
+    >>> named_values("alpha=2,4.5"), named_values("wall=upright")
     (('alpha', [2, 4.5]), ('wall', ['upright']))
     """
     name, sign, values = text.partition("=")
@@ -235,7 +228,7 @@ def _value(text: str) -> Any:
     return number if isinstance(number, int | float) else text
 
 
-def view_of(text: str) -> Any:
+def parsed_view(text: str) -> Any:
     """The name of a view, or (azimuth, elevation)."""
     try:
         azimuth, elevation = map(validate.parsed, text.split(","))

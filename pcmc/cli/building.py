@@ -13,6 +13,8 @@ from ..base.errors import FileError, OptionError
 from ..base.units import Units
 from ..certificate.certificate import require_certified
 from ..io import FORMATS, write
+from ..structure import analyse
+from ..structure.calculix import expect_program
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -22,11 +24,10 @@ from .arguments import (
     Input,
     MeshCheck,
     ViewName,
-    check_outputs,
     count,
     flag,
-    number,
     option,
+    parsed_number,
     real,
 )
 from .progress import working
@@ -46,6 +47,7 @@ FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
 DATE = "Date to print; by default the project's. No clock is read."
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
 DENSITY = "Mass per volume; above 0, self-weight is a load."
+RUN = "Run CalculiX on each case and combination; by default as the project says."
 SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
 Tolerance = Annotated[float | None, real("LENGTH", TOLERANCE)]
@@ -73,18 +75,17 @@ def panels_(
       pcmc panels roof.toml --tolerance 0.005 -o schedule.csv
       pcmc panels roof.pcmc --tolerance 0.005 --change 0.02 -o schedule.csv -o fewer.pcmc
     """
-    seen, files = arguments.view_of(view), output or []
+    seen, files = arguments.parsed_view(view), output or []
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    projects.check_picture([seen], "patches")
-    outputs: list[Path] = []
+    outputs = projects.Output(picture=picture, view=seen).paths
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
         outputs += projects.schedule_paths(path) if suffix == CSV else [path]
-    check_outputs(file, others=outputs, picture=picture)
+    projects.check_outputs(outputs, inputs=projects.files_of(file))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
     with working() as progress:
@@ -135,9 +136,8 @@ def draw_(
       pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
-    projects.Output(drawings=output)  # refuses what is no drawing
-    check_outputs(file, others=output)
-    heights = None if height is None else [number(text) for text in height]
+    projects.check_outputs(projects.Output(drawings=output).paths, inputs=projects.files_of(file))
+    heights = None if height is None else [parsed_number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)
@@ -169,8 +169,7 @@ def report_(
       pcmc report roof.toml -o roof.pdf
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
-    projects.Output(report=output)  # refuses what is no report
-    check_outputs(file, others=[output])
+    projects.check_outputs(projects.Output(report=output).paths, inputs=projects.files_of(file))
     anyway = build.allow_uncertified
     with working() as progress:
         project = arguments.load(file, units)
@@ -227,18 +226,21 @@ def structure(
     file: Input,
     output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
     given: Model,
+    run: Annotated[bool | None, flag("--run/--no-run", RUN)] = None,
     build: Build,
 ) -> int:
-    """Write a structural model for CalculiX: prestressed membranes, supports, loads.
+    """Write a structural model for CalculiX: prestressed membranes, supports, loads; and run it.
 
-    A project is solved first; its [structure] has the values that no option gives.
+    A project is solved first; its [structure] has the values that no option gives. With --run each case and
+    combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv and
+    NAME-cases.png come beside the model. A case that is not carried as a whole ends with the code 1.
 
     \b
-    Example:
+    Examples:
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
+      pcmc structure roof.toml -o roof.inp --run
     """
-    projects.Output(structure=output)  # refuses what is no model
-    check_outputs(file, others=[output])
+    projects.check_outputs(projects.Output(structure=output).paths, inputs=projects.files_of(file))
     with working() as progress:
         project = arguments.load(file)
         start = projects.surface_of(project)
@@ -251,13 +253,22 @@ def structure(
         values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
         wanted = projects.Structure(**values)
         wanted.check(start)
+        if run := wanted.run if run is None else run:
+            expect_program()
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        projects.write_all([projects.model_job(output, model)], progress)
+        jobs = [projects.model_job(output, model)]
+        analysis = analyse(model, progress=progress) if run else None
+        jobs += projects.analysis_jobs(output, analysis) if analysis is not None else []
+        written = projects.write_all(jobs, progress)
     if model.note:
         print(model.note)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
-    print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-    return OK if roof.good else NOT_CERTIFIED
+    if analysis is None:
+        print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
+        return OK if roof.good else NOT_CERTIFIED
+    print(analysis)
+    print(f"written: {', '.join(map(str, written))}")
+    return OK if roof.good and analysis.carried else NOT_CERTIFIED

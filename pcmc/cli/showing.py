@@ -44,7 +44,7 @@ def convert(
       pcmc convert roof.toml roof.ifc
       pcmc convert roof.pcmc roof.glb --colour error
     """
-    arguments.check_outputs(file, [output])
+    projects.check_outputs(projects.Output(files=[output]).paths, inputs=projects.files_of(file))
     roof = _good(file, what, whole, units)
     if roof is None:
         return NOT_CERTIFIED
@@ -82,13 +82,15 @@ def plot(
       pcmc plot roof.toml start.png --start
       pcmc plot half.pcmc roof.png --whole
     """
-    seen = arguments.view_of(view)
-    projects.check_picture([seen], colour)
-    arguments.check_outputs(file, picture=picture)
+    seen = arguments.parsed_view(view)
+    wanted = projects.Output(picture=picture, view=seen, colour=colour)
+    projects.check_outputs(wanted.paths, inputs=projects.files_of(file))
     roof = _good(file, what, whole)
     if roof is None:
         return NOT_CERTIFIED
-    painting = partial(projects.paint, roof.shown.surface, views=[seen], colour=colour, units=roof.units)
+    painting = partial(
+        projects.draw_picture, roof.shown.surface, views=[seen], colour=colour, units=roof.units
+    )
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK
@@ -128,7 +130,7 @@ def explore(
             read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
             roof, again = read(progress=progress, report=report), read if watch else None
         else:
-            values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
+            values = {name: listed[0] for name, listed in map(arguments.named_values, parameter or ())}
             roof = ShownRoof.of(_example(str(example), values), str(example))
         progress("solving")
         explorer = start_roof(roof, host, port, again)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +11,6 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..io import write
 from . import NOT_CERTIFIED, OK, reports
 from .arguments import (
     MANY_FILES,
@@ -24,7 +22,6 @@ from .arguments import (
     MeshCheck,
     Shown,
     Whole,
-    check_outputs,
     count,
     flag,
     load,
@@ -103,7 +100,7 @@ def solve_(
         verify=verify or project.verify,
         output=own,
     )
-    if projects.is_drawing(file) and project.drawing is not None:
+    if project.specified and not project.has_file:  # a drawing alone
         print(projects.proposal_text(project))
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
@@ -175,19 +172,18 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
-    check_outputs(file, output)
+    written = projects.Output(files=output)
+    projects.check_outputs(written.paths, inputs=projects.files_of(file))
     with working() as progress:
-        project = load(file, units)
+        project = replace(load(file, units), output=written)
         if solve:
-            written = projects.Output(files=output)
-            project = replace(project.in_folder(file.parent), remeshing=(stage,), output=written)
+            project = replace(project, folder=file.parent, remeshing=(stage,))
             outcome = projects.run_project(project, progress)
         else:
             progress("remeshing")
-            roof = projects.opened(project, progress, start=True)
+            roof = projects.start_of(project)
             surface, note = stage.remeshed(roof.surface)
-            writing = partial(write, surface=surface, units=roof.units)
-            projects.write_all([(path, writing) for path in output], progress)
+            projects.write_all(projects.surface_files(roof.changed(lambda _: surface), output), progress)
     if not solve:
         if note:
             print(note)

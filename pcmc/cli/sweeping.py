@@ -13,7 +13,7 @@ from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
 from ..project import check_names, check_outputs, files_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK
-from .arguments import DXF, TOML, count, flag, option, real, values_of
+from .arguments import DXF, TOML, count, flag, named_values, option, real
 from .progress import sweeping
 
 if TYPE_CHECKING:
@@ -47,11 +47,11 @@ def sweep(
     """Solve every combination of the values; exit code 0 if all are certified.
 
     For a project or a surface, NAME is PATCH.tension, PATCH.pressure, PATCH.weight or PATCH.snow of a patch
-    or wall, CABLE.tension of a cable, or ROOM.volume of a room that has one. For a project it may also be the
-    keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of the third
-    corner); or the shift of a whole divider, hole, support or named point along x, y or z: "wall 1.x". For a
-    generator it is one of its parameters, or an option of the method. With a store, values may be added
-    later: only new cases are run. If the project file has changed, name a new store.
+    or wall, CABLE.tension or CABLE.weight of a cable, or ROOM.volume of a room that has one. For a project it
+    may also be the keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of
+    the third corner); or the shift of a whole divider, hole, support or named point along x, y or z: "wall
+    1.x". For a generator it is one of its parameters, or an option of the method. With a store, values may be
+    added later: only new cases are run. If the project file has changed, name a new store.
     The table has the parameters, the verdict, the apex of each patch, the rise, the area, and the largest
     reaction per length, or what --show names; with --all it has every number of the certificate, too. Cells
     are empty where nothing is at rest.
@@ -120,7 +120,7 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
     from ..sweep.projects import project_sweep
 
     given: dict[str, list[Any]] = {}
-    for name, listed in map(values_of, values):
+    for name, listed in map(named_values, values):
         if name in given:
             raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
         given[name] = listed

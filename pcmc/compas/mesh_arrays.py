@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra, SurfaceError
 from ..io.mesh_data import FIXED, FREE, SLIDING, coincident, given_values
-from ..io.polygons import triangulate
+from ..io.polygons import cut_polygons
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room
 
 HELD = ("is_support", "is_anchor", "is_fixed")  # names that COMPAS packages use for a held vertex
@@ -185,7 +185,7 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
     mesh_of_face = np.array([number for _, number, _ in faces])
     corners = np.array(list(chain.from_iterable(face for _, _, face in faces)), dtype=np.int64)
     try:
-        F, source, notes = triangulate(X, corners, np.array([len(face) for _, _, face in faces]))
+        F, source, notes = cut_polygons(X, corners, np.array([len(face) for _, _, face in faces]))
     except FileError as error:
         at = int(str(error.where))
         text = str(error).replace(f"face {at}", f"face {faces[at][0]}", 1)

@@ -2,7 +2,7 @@
 
     α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ,    V̄_r(λ) = c_r + v_r λ
 
-and in the same way weights, snow and the tensions of cables.
+and in the same way weights, snow, and the tensions and weights of cables.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..surface import Surface
 from ..surface.supports import apply_supports
 from ..surface.values import KINDS, part_index, part_values, rates_of
 
-VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
+VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables", "cable_weights")
 
 
 @runtime_checkable
@@ -48,7 +48,7 @@ class Direction:
     pressures : weight u_i by patch name. The pressure of a wall that is not named changes with the
         difference between its rooms, as in ``Surface.retensioned``. Snow stays.
     weights, snows : rates of the self-weight and of the snow by patch name; walls under snow follow, too.
-    cables : rate of the tension by the cable's name.
+    cables, cable_weights : rates of the tension and of the weight per length by the cable's name.
     volumes : weight v_r by the name of a room of prescribed volume, whose pressure is a result.
     relative : False: α_i = w_i λ, so that with ``{"roof": 1.0}`` λ is the tension of "roof" itself.
         True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for all others.
@@ -68,6 +68,7 @@ class Direction:
     weights: Mapping[str, float] = field(default_factory=dict)
     snows: Mapping[str, float] = field(default_factory=dict)
     cables: Mapping[str, float] = field(default_factory=dict)
+    cable_weights: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for kind in VARIED:
@@ -115,7 +116,10 @@ class Direction:
     def _common_value(self, surface: Surface) -> float:
         """λ of the surface; everything that is named must agree on it."""
         given = [
-            (f"{kind[:-1]} of {part.name!r}", getattr(part, KINDS[kind][1]) / weights[part.name])
+            (
+                f"{kind[:-1].replace('_', ' ')} of {part.name!r}",
+                getattr(part, KINDS[kind][1]) / weights[part.name],
+            )
             for kind, weights in self.named.items()
             for part in getattr(surface, KINDS[kind][0])
             if part.name in weights
@@ -189,7 +193,11 @@ class ParameterLine:
     def columns(self, surface: Surface, value: float) -> dict[str, float]:
         """The values that vary, at λ, as columns of a table."""
         named = self.named(surface, value)
-        return {f"{kind[:-1]} {name}": x for kind, by_name in named.items() for name, x in by_name.items()}
+        return {
+            f"{kind[:-1].replace('_', ' ')} {name}": x
+            for kind, by_name in named.items()
+            for name, x in by_name.items()
+        }
 
     @property
     def volume_rates(self) -> Floats | float:

@@ -45,8 +45,11 @@ LAYERS = {
     "PCMC-DIM": SheetLayer(7, 18, "dimensions and levels"),
     "PCMC-TEXT": SheetLayer(7, 18, "texts, numbers and tables"),
     "PCMC-FRAME": SheetLayer(7, 35, "frames of sheets"),
-    "PCMC-CUT": SheetLayer(7, 25, "outlines of panels at true size"),
-    "PCMC-LABEL": SheetLayer(5, 13, "labels of panels' edges"),
+    "PCMC-CUT": SheetLayer(7, 25, "outlines of panels at true size, and of strips with allowances"),
+    "PCMC-SEAM": SheetLayer(5, 25, "seams of cloth"),
+    "PCMC-NOTCH": SheetLayer(1, 25, "notches along seams"),
+    "PCMC-WARP": SheetLayer(3, 25, "arrows of the warp"),
+    "PCMC-LABEL": SheetLayer(5, 13, "labels of edges of panels and strips"),
     "PCMC-MARK": SheetLayer(1, 35, "what must not be overlooked"),
 }
 

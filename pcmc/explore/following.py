@@ -18,7 +18,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, PcmcError
 from ..certificate import Certificate, Verdict
-from ..project.values import single_points, values_of, with_values
+from ..project.values import changeable_values, data_with_values, single_points
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Surface
@@ -103,10 +103,10 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
 
 
 def wanted(surface: Surface, values: Values) -> Surface:
-    """The surface with other values, kinds as in ``values_of``; walls follow the pressures of their rooms."""
+    """The surface with other values, by kind and name; walls follow the pressures of their rooms."""
     given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
     changed, points = surface.retensioned(**given), values.get("points") or {}
-    known = dict(zip(values_of(surface)["points"], single_points(surface).tolist(), strict=True))
+    known = dict(zip(changeable_values(surface)["points"], single_points(surface).tolist(), strict=True))
     X = surface.vertices.copy()
     for name, place in points.items():
         X[known[validate.choice("point", name, tuple(known))]] = place
@@ -177,10 +177,10 @@ class ProjectFallback:
         """The project with the values of a surface, and its start shape.
 
         Walls have the tensions that the project gives them beside the new tensions of its patches; those in
-        ``moved`` have the surface's. Errors as ``with_values``.
+        ``moved`` have the surface's. Errors as ``data_with_values``.
         """
         left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}
-        return with_values(self.path, self.data, asked, left)[1:]
+        return data_with_values(self.path, self.data, asked, left)[1:]
 
 
 def _walls(surface: Surface) -> frozenset[tuple[str, float]]:

@@ -21,7 +21,7 @@ from ..forces.curvature import curvature_error, mean_curvature
 from ..margins.varied import named
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
-from ..project.values import values_of
+from ..project.values import changeable_values
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
@@ -75,12 +75,14 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
 
 def _controls(surface: Surface) -> list[dict[str, Any]]:
     """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
-    groups, values = [], values_of(surface)
+    groups, values = [], changeable_values(surface)
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
-    for kind in ("cables", "volumes", "points"):
-        groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
+    for first, *others in (("cables", "cable_weights"), ("volumes",), ("points",)):
+        for name in values[first]:
+            kinds = [first, *(kind for kind in others if name in values[kind])]
+            groups.append({"name": name, "patch": None, "wall": False, "kinds": kinds})
     return groups
 
 
@@ -120,7 +122,7 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
     names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
     return {
         "mesh": crc32(surface.faces.tobytes() + origin.tobytes() + names.encode()),  # that ``outline`` has
-        "values": {"asked": values_of(state.wanted), "shown": values_of(surface)},
+        "values": {"asked": changeable_values(state.wanted), "shown": changeable_values(surface)},
         "verdict": _verdict(state.failure or certificate),
         "at_rest": state.failure is None,
         "findings": _findings(certificate, moving),

@@ -34,7 +34,7 @@ class ShownRoof:
         >>> ShownRoof.of(None, "halls/nave & apse").name, ShownRoof.of(None).name
         ('halls-nave & apse', 'surface')
         """
-        return cls(projects.Outcome(None, start=surface, units=units), title)
+        return cls(projects.Outcome.of(surface, units), title)
 
     @property
     def surface(self) -> Surface:
@@ -45,7 +45,7 @@ class ShownRoof:
     def project(self) -> projects.Project | None:
         """The project behind it, also of a drawing; None for any other file, and a surface from a program."""
         project = self.outcome.project
-        return project if project is not None and projects.is_project(project.path) else None
+        return project if project is not None and project.specified else None
 
     @property
     def path(self) -> Path | None:

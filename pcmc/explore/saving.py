@@ -15,7 +15,7 @@ from ..design.targets import measure
 from ..project import Project, read_data, surface_of
 from ..project.file import project_of
 from ..project.planning import project_text
-from ..project.values import differences, with_values
+from ..project.values import data_with_values, differences
 from ..surface import Surface
 from .roof import ShownRoof
 
@@ -126,7 +126,7 @@ def project_with(
             note = f"with tensions instead of heights that the surface saved does not have ({labels})"
     sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
     left = sought - differences(roof.surface, surface).keys() if kept == roof.aims else set()
-    data = with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
+    data = data_with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
     old = project.path.stem
     if stem and stem != old:
         output = data.get("output", {})

@@ -14,10 +14,9 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from ..base.arrays import plain
 from ..base.errors import FileWarning, SurfaceError, unknown
-from ..io import FORMATS, write
-from ..project import load, vertex_fields
+from ..io import FORMATS
+from ..project import certified_files, load
 from ..surface import Surface
 from . import page_data, saving
 from .following import ProjectFallback, Stop
@@ -185,10 +184,9 @@ class Explorer:
         # the page lists what formats carry; a rule for this module alone, as threads share the rules
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"surface{suffix}"
-            scalars = vertex_fields(state.surface, state.certificate)
-            numbers = plain(state.certificate.numbers())
-            write(path, state.surface, scalars=scalars, certificate=numbers, units=roof.outcome.units)
+            files, units = [Path(folder) / f"surface{suffix}"], roof.outcome.units
+            for path, write in certified_files(state.surface, state.certificate, files, units):
+                write(path)
             return f"{roof.name}{suffix}", path.read_bytes()
 
     def wait(self) -> None:

@@ -25,7 +25,7 @@ from ..certificate.theorem import Theorem, verify
 from ..design import Parameter, Target, meet
 from ..margins import Margin, margin
 from ..meshing.remeshing import remesh
-from ..project.values import values_of
+from ..project.values import changeable_values
 from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
@@ -86,7 +86,7 @@ class SessionState:
     def unsaved(self) -> bool:
         """Whether values or surface differ from the newest step."""
         step = self.steps[self.place]
-        return self.surface is not step or values_of(self.wanted) != values_of(step)
+        return self.surface is not step or changeable_values(self.wanted) != changeable_values(step)
 
     @property
     def undo(self) -> int:
@@ -259,7 +259,7 @@ class Session:
     @act(moves=True)
     def remesh(self, state: SessionState, stop: Stop) -> SessionState:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
-        asked, end = values_of(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
+        asked, end = changeable_values(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
         mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
         result = solve_until(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
         if stop():
@@ -267,7 +267,7 @@ class Session:
         if result.certificate.verdict not in AT_REST:
             return replace(state, failure=result.certificate)
         state = state.showing(result.surface).stepped().asking(asked)
-        if values_of(state.surface) != asked:
+        if changeable_values(state.surface) != asked:
             way = reach(state.surface, state.wanted, until(stop, end), **SETTLE)
             state = state.following(way, None).stepped()
         return state

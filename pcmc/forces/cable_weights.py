@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..surface import Surface
 from .cables import ENDS, PAIRS, across, directions, inverse
 from .elements import Elements
@@ -32,8 +32,12 @@ def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
     ([7.5], [1.2, -0.9, 1.25])
     """
     ends, _, weight = surface.cable_edges
-    if not weight.any():
-        return
+    if weight.any():
+        yield moments(surface, X, ends, weight)
+
+
+def moments(surface: Surface, X: Floats, ends: Ints, weight: Floats) -> Elements:
+    """Σ g ℓ z̄ over edges (c,2) of weights (c,) at X (n,3)."""
     n, (t, length) = np.array(surface.plane.normal), directions(X, ends)
     z = surface.plane.height(X)[ends].mean(axis=1)
 
@@ -49,4 +53,4 @@ def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
     def stiffness() -> Floats:
         return np.asarray((np.where(weight * z > 0.0, z, 0.0) * inverse(length))[:, None, None] * PAIRS)
 
-    yield Elements(ends, length * z, gradient, hessian, stiffness).times(weight)
+    return Elements(ends, length * z, gradient, hessian, stiffness).times(weight)

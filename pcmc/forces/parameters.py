@@ -1,6 +1,6 @@
 """The derivatives of E and ∇E by the numbers that E is linear in, whatever their values are.
 
-    ∂E/∂λ = Σ α̇ A - Σ (ṗ - ṡ) V + Σ ẇ ∫ z dA + Σ τ̇ L
+    ∂E/∂λ = Σ α̇ A - Σ (ṗ - ṡ) V + Σ ẇ ∫ z dA + Σ τ̇ L + Σ ġ ∫ z ds
 
 Rates are given by kind, as in ``pcmc.surface.values.KINDS``: one for each patch or cable. A prescribed volume
 is a condition beside E, and no part of it.
@@ -14,8 +14,9 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface
+from .cable_weights import moments as moments_of_cables
 from .cables import lengths
-from .elements import add_values
+from .elements import Elements, add_values
 from .functional import weighted
 from .triangles import moments
 
@@ -47,6 +48,11 @@ def gradient_by(surface: Surface, rates: Rates, X: Floats | None = None) -> Floa
 
 
 def _cables_by(surface: Surface, rates: Rates, X: Floats, gradient: Floats | None = None) -> float:
-    """Σ τ̇ L at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
-    of = [(rate, cable.edges) for rate, cable in zip(rates.get("cables", ()), surface.cables, strict=False)]
-    return add_values((lengths(X, ends).times(np.full(len(ends), rate)) for rate, ends in of), gradient)
+    """Σ τ̇ L + Σ ġ ∫ z ds at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
+    none, elements = np.zeros(len(surface.cables)), list[Elements]()
+    pulls, weights = rates.get("cables", none), rates.get("cable_weights", none)
+    for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):
+        each = np.ones(len(cable.edges))
+        elements += [lengths(X, cable.edges).times(pull * each)] if pull else []
+        elements += [moments_of_cables(surface, X, cable.edges, weight * each)] if weight else []
+    return add_values(elements, gradient)

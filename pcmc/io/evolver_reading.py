@@ -20,8 +20,8 @@ from ..base.errors import FileError
 from ..base.validate import names_from_file
 from ..surface import Cable, Patch, Plane, Room
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
-from .polygons import triangulate
-from .text import TextSection, constant, kinds_of, line_ends, linear
+from .polygons import cut_polygons
+from .text import TextSection, constant, kinds_of, line_ends, linear_expression
 
 WRITTEN = "written by pcmc"
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
@@ -41,7 +41,7 @@ def read(path: Path) -> MeshData:
     edge_ids, *joined = map(edges.integers, columns)
     ends = np.stack([edges.places(vertex_ids, end, "vertex") for end in joined], axis=1)
     face_ids, corners, counts, face_rest = _faces(faces, edge_ids, ends)
-    F, source, notes = triangulate(X, corners, counts)
+    F, source, notes = cut_polygons(X, corners, counts)
     pressure, prescribed, more = _pressures(file, face_ids)
     patch_of_face, patches = _patches(file, face_rest, (pressure, *prescribed.values()))
     plane, planes, origin = _planes(file, constraints, support)
@@ -245,7 +245,7 @@ def _plane(top: TextSection, number: int, origin: Floats, needed: bool) -> Plane
     def fail(problem: str) -> FileError:
         return top.error(f"constraint {number} is not a plane: {problem}", offset=hit.start(1))
 
-    formula = linear(left, top.known, fail) - linear(right or "0", top.known, fail)
+    formula = linear_expression(left, top.known, fail) - linear_expression(right or "0", top.known, fail)
     normal = formula[1:]
     if not normal.any():
         raise fail(f"{hit[1].strip()!r} names no coordinate")

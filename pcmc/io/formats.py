@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
@@ -28,7 +28,7 @@ class Format:
     separate: bool = False  # whether it has a mesh per patch, which cannot have triangles without area
     own: tuple[str, ...] = ()  # the parts that it holds in its own way; others are among the metadata
     bare: bool = False  # whether it holds nothing but triangles and names
-    loses: tuple[str, ...] = ()  # the parts of ``LOST`` that it does not hold
+    loses: tuple[str, ...] = ()  # the ``PARTS`` that it does not hold
     reads: bool = True  # whether pcmc reads it, too
     unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
 
@@ -43,8 +43,8 @@ class Format:
 
     def lost(self, surface: Surface, units: Units) -> list[str]:
         """What of a surface the format does not hold, in words."""
-        parts = [LOST[part] for part in self.loses]
-        return [words.format(unit=units.length) for words, there in parts if there(surface, units)]
+        parts = [PARTS[part] for part in self.loses]
+        return [part.words.format(unit=units.length) for part in parts if part.there(surface, units)]
 
 
 @dataclass(frozen=True)
@@ -61,19 +61,30 @@ class Content:
 
 
 PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"
+ROOMS = "volumes of rooms (it has the pressures reached)"
 LINES = "lines or circles that vertices slide along (they are fixed in it)"
-LOST: dict[str, tuple[str, Callable[[Surface, Units], object]]] = {
-    "weights": ("weights", lambda surface, _: surface.weights.any()),
-    "snow": ("snow", lambda surface, _: surface.snows.any()),
-    "lines": (LINES, lambda surface, _: surface.given_supports.on_line),
-    "cables": ("cables", lambda surface, _: surface.cables),
-    "cable weights": ("weights of cables", lambda surface, _: surface.cable_edges.weight.any()),
-    "rooms": ("volumes of rooms (it has the pressures reached)", lambda surface, _: surface.rooms),
-    "planes": (PLANES, lambda surface, _: surface.on_planes),
-    "unit": ("its unit {unit}", lambda _, units: units),
-}
-"""The parts of a surface that a format may lose, in words, and whether a surface has them."""
 
+
+class FormatPart(NamedTuple):
+    """A part that not every surface has, and not every format holds."""
+
+    words: str  # that tell of its loss; empty where a program can do without
+    since: int  # version of .pcmc
+    there: Callable[[Surface, Units], object]  # whether a surface, or its file, has it
+
+
+PARTS = {
+    "weights": FormatPart("weights", 4, lambda surface, _: surface.weights.any()),
+    "snow": FormatPart("snow", 5, lambda surface, _: surface.snows.any()),
+    "lines": FormatPart(LINES, 6, lambda surface, _: surface.given_supports.on_line),
+    "cables": FormatPart("cables", 6, lambda surface, _: surface.cables),
+    "cable weights": FormatPart("weights of cables", 8, lambda surface, _: surface.cable_edges.weight.any()),
+    "rooms": FormatPart(ROOMS, 6, lambda surface, _: surface.rooms),
+    "planes": FormatPart(PLANES, 6, lambda surface, _: surface.on_planes),
+    "curves": FormatPart("", 7, lambda surface, _: surface.held_curves),
+    "unit": FormatPart("its unit {unit}", 1, lambda _, units: units),
+}
+TOLD = tuple(name for name, part in PARTS.items() if part.words)
 OURS = ("support", "patch")
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
@@ -81,7 +92,9 @@ FORMATS = {
     ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices")),
-    ".stl": Format("stl", separate=True, bare=True, loses=tuple(LOST)),
+    ".stl": Format(
+        "stl", separate=True, bare=True, loses=tuple(name for name, part in PARTS.items() if part.words)
+    ),
     ".vtp": Format("vtk", scalars="both", reserved=OURS),
     ".vtu": Format("vtk", scalars="both", reserved=OURS),
     ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),

@@ -1,7 +1,7 @@
 """The mesh of a file and its data, as every reader returns them, before they become a Surface.
 
-In a unit f times smaller, lengths become f times as large, tensions 1/f, pressures, weights and snow 1/f²,
-volumes f³. Forces stay, so the shape at rest stays the same.
+In a unit f times smaller, lengths become f times as large, tensions and cables' weights 1/f,
+pressures, weights and snow 1/f², volumes f³. Forces stay, so the shape at rest stays the same.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class MeshData:
     curves: tuple[HeldCurve, ...] = ()
 
 
-def checked(data: MeshData) -> MeshData:
+def checked_data(data: MeshData) -> MeshData:
     """The same with arrays of the right type, shape and range; FileError where a library let others pass."""
     X = checks.positions(numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64))
     n, m, support, scalars = len(X), len(data.faces), data.support, dict(data.scalars)
@@ -218,18 +218,20 @@ def given_values(kind: str, names: Collection[str], **values: Any) -> dict[str, 
     return given
 
 
-def scaled(value: Any, factor: float) -> Any:
+def in_new_unit(value: Any, factor: float) -> Any:
     """A part of a surface, or a tuple of parts, in a new unit; ``factor`` new units are one old unit.
 
-    >>> scaled(Patch("roof", tension=2.0, pressure=3.0), 10.0)
+    >>> in_new_unit(Patch("roof", tension=2.0, pressure=3.0), 10.0)
     Patch(name='roof', tension=0.2, pressure=0.03)
     """
     match value:
         case tuple():
-            return tuple(scaled(part, factor) for part in value)
+            return tuple(in_new_unit(part, factor) for part in value)
         case Patch():
             per_area = {key: getattr(value, key) / factor**2 for key in ("pressure", "weight", "snow")}
             return replace(value, tension=value.tension / factor, **per_area)
+        case Cable():
+            return replace(value, weight=value.weight / factor)
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():
@@ -250,9 +252,9 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
     """The surface in a new unit; ``factor`` new units are one old unit."""
     if factor == 1.0:
         return surface
-    parts = {f.name: scaled(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
-    supports = {name: scaled(part, factor) for name, part in surface.given_supports._asdict().items()}
-    moved = {"vertices": factor * surface.vertices, "curves": scaled(surface.held_curves, factor)}
+    parts = {f.name: in_new_unit(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
+    supports = {name: in_new_unit(part, factor) for name, part in surface.given_supports._asdict().items()}
+    moved = {"vertices": factor * surface.vertices, "curves": in_new_unit(surface.held_curves, factor)}
     return Surface(**parts | supports | moved)
 
 
@@ -265,8 +267,8 @@ def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     factor = length_factor(units.length, length)
     if factor == 1.0:
         return replace(data, units=units)
-    parts = {f.name: scaled(getattr(data, f.name), factor) for f in fields(data)}
-    parts["patches"] = tuple(p if p.name in data.bare else scaled(p, factor) for p in data.patches)
+    parts = {f.name: in_new_unit(getattr(data, f.name), factor) for f in fields(data)}
+    parts["patches"] = tuple(p if p.name in data.bare else in_new_unit(p, factor) for p in data.patches)
     parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
     parts["units"] = Units(length, units.force)
     parts["notes"] = (*data.notes, conversion_note(units.length, length))

@@ -21,11 +21,11 @@ import pandas as pd
 from ..base.errors import FileError, PcmcError
 from ..base.libraries import translated_errors
 from ..surface import HeldCurve, Surface
-from .formats import Content
+from .formats import PARTS, Content
 from .mesh_data import MeshData, numeric, support_of, within
 from .metadata import DAMAGED, parse_metadata
 
-VERSION = 8  # since 4 weights, 5 snow, 6 cables, rooms, lines, planes, 7 curves, 8 weights of cables
+VERSION = max(part.since for part in PARTS.values())
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -34,16 +34,10 @@ ROOM = 64_000_000  # bytes that any file may become
 def write(path: Path, surface: Surface, content: Content) -> None:
     """The archive; the same surface gives the same bytes."""
     tables = {k: v for k, v in content.certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
-    version = 5 if surface.snows.any() else 4 if surface.weights.any() else 1
-    if surface.rooms or surface.on_planes or surface.cables or surface.given_supports.on_line:
-        version = 6
-    if surface.held_curves:
-        version = 7
-    if surface.cable_edges.weight.any():
-        version = 8
+    since = [part.since for part in PARTS.values() if part.there(surface, content.units)]
     meta = {
         "format": FORMAT,
-        "version": version,  # the oldest that will do
+        "version": max(since, default=1),  # the oldest that will do
         "description": content.metadata,
         "curves": [one.plain() for one in surface.held_curves],
         "certificate": {k: v for k, v in content.certificate.items() if k not in tables},

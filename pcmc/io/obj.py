@@ -20,8 +20,8 @@ from ..surface import Surface
 from .formats import Content
 from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import parse_metadata
-from .polygons import triangulate
-from .text import TextSection, escaped, numbers
+from .polygons import cut_polygons
+from .text import TextSection, escaped, parsed_numbers
 
 MARK = "# pcmc "
 SPECIAL = "\\"
@@ -73,7 +73,7 @@ def read(path: Path) -> MeshData:
     sizes = np.array([len(part) for part in parts])
     patch, patches = pd.factorize(groups[sizes > 0])
     patch = np.repeat(patch, sizes[sizes > 0])
-    F, source, notes = triangulate(X, corners, counts)
+    F, source, notes = cut_polygons(X, corners, counts)
     metadata.check_counts(len(X), len(F))
     known = support if comment or support.any() else None
     about: dict[str, Any] = {"support": known, "joined": metadata.counts is not None}
@@ -88,7 +88,7 @@ def _vertices(file: TextSection) -> Floats:
     coordinates = VERTEX.findall(file.text)
     try:
         if len(coordinates) == len(re.findall(r"^[^\S\n]*v(?=\s)", file.text, re.M)):
-            return numbers([c for row in coordinates for c in row]).reshape(-1, 3)
+            return parsed_numbers([c for row in coordinates for c in row]).reshape(-1, 3)
     except ValueError:
         pass
     for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", file.text, re.M):
@@ -105,7 +105,7 @@ def _faces(file: TextSection, faces: list[str], n: int) -> tuple[Ints, Ints]:
     bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
     counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
     try:
-        corner = numbers(" ".join(bare).split(), np.int64)
+        corner = parsed_numbers(" ".join(bare).split(), np.int64)
     except (ValueError, OverflowError):
         every = list(FACE.finditer(file.text))
         odd = next((one for one in every if not all(map(CORNER.fullmatch, one[1].split()))), every[0])

@@ -19,7 +19,7 @@ from ..base.errors import FileError
 from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import bounding_size
-from .mesh_data import ROUNDING, MeshData, checked, support_of, without_unused
+from .mesh_data import ROUNDING, MeshData, checked_data, support_of, without_unused
 from .metadata import Metadata, row_of
 
 WALLS = "pcmc walls"  # the key of their text in a file
@@ -116,7 +116,7 @@ def _parsed(text: str) -> tuple[MeshData, Bools, int]:
     try:
         values = json.loads(text)
         X, F, patch, support = (values[key] for key in ("vertices", "faces", "patch", "support"))
-        walls = checked(MeshData(X, F, patch, tuple(Patch(*p) for p in values["patches"]), support))
+        walls = checked_data(MeshData(X, F, patch, tuple(Patch(*p) for p in values["patches"]), support))
         above, shown = np.array(values["above"], dtype=bool), int(values["shown"])
         if len(above) != len(walls.vertices):
             raise ValueError

@@ -22,7 +22,7 @@ from .formats import Content
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import from_polygons
-from .text import numbers
+from .text import parsed_numbers
 
 MARK = "comment pcmc "
 TYPES = {
@@ -98,7 +98,7 @@ def read(path: Path) -> MeshData:
     elements = _elements(header, kinds)
     if form[1] == "ascii":
         try:
-            data, start = numbers(data[start:].decode("ascii").split()).tobytes(), 0
+            data, start = parsed_numbers(data[start:].decode("ascii").split()).tobytes(), 0
         except ValueError as error:
             raise FileError(f"its body is not all numbers ({error})", where="body") from None
     tables: dict[str, dict[str, Any]] = {}

@@ -21,14 +21,14 @@ LABELS = ("patch", "PatchId", "RegionId", "GroupIds", "MaterialIds", "medit:ref"
 """Cell data that may hold the patch of each face; the first of these in the file counts."""
 
 
-def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:
+def cut_polygons(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:
     """Triangles (m,3), the polygon each comes from (m,), and a note if any was cut.
 
     ``corners`` lists the vertices of polygon after polygon, ``counts`` how many each has. A polygon of k
     corners becomes the fan of k - 2 triangles whose worst one is best: for a quad the better diagonal.
 
     >>> X = np.array([[0, 0, 0], [2, 0, 0], [3, 1, 0], [1, 1, 0.0]])
-    >>> triangulate(X, np.array([0, 1, 2, 3]), np.array([4]))[0].tolist()
+    >>> cut_polygons(X, np.array([0, 1, 2, 3]), np.array([4]))[0].tolist()
     [[1, 2, 3], [1, 3, 0]]
     """
     few = np.flatnonzero(counts < 3)
@@ -90,7 +90,7 @@ def from_polygons(
     metadata: Metadata,
     default: str,
 ) -> MeshData:
-    """The mesh of polygons as in ``triangulate``, with data on its points and cells.
+    """The mesh of polygons as in ``cut_polygons``, with data on its points and cells.
 
     "support" of the points holds supports, the first of LABELS of the cells patches, which the metadata name.
     """
@@ -103,7 +103,7 @@ def from_polygons(
         text = f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}"
         raise FileError(text, where=face)
     X = np.array(X, dtype=np.float64)
-    F, source, notes = triangulate(X, corners.astype(np.int64), counts.astype(np.int64))
+    F, source, notes = cut_polygons(X, corners.astype(np.int64), counts.astype(np.int64))
     metadata.check_counts(len(X), len(F))
     label = next((key for key in LABELS if key in cell_data), None)
     names, patch = [default], np.zeros(len(counts), dtype=np.int64)

@@ -26,7 +26,7 @@ from ..surface import Plane, Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import topology
 from .formats import FORMATS, READ_ONLY, Format, format_of
-from .mesh_data import MeshData, checked, converted, merged, to_surface, without_unused
+from .mesh_data import MeshData, checked_data, converted, merged, to_surface, without_unused
 from .metadata import with_parts
 from .patch_meshes import restore_walls
 
@@ -109,8 +109,8 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
 def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
     path = as_path(path)
-    with opened(path) as form:
-        data = without_unused(checked(contents(form, path)))
+    with format_opened(path) as form:
+        data = without_unused(checked_data(contents(form, path)))
         return with_parts(data if form.shared else restore_walls(merged(data)))
 
 
@@ -121,7 +121,7 @@ def contents(form: Format, path: Path) -> MeshData:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Format]:
+def format_opened(path: Path) -> Iterator[Format]:
     """The format of a file that is read in the block; what goes wrong there is a FileError with its name."""
     check_regular(path)
     form = format_of(path, {**FORMATS, **READ_ONLY})

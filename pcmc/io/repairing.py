@@ -22,7 +22,7 @@ from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
 from .mesh_data import MeshData, converted, to_surface, within
 from .metadata import Metadata
-from .reading import contents, opened
+from .reading import contents, format_opened
 
 WELD = 1e-5  # of the size
 HOLES = 8  # edges of a hole
@@ -149,7 +149,7 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
 
 def _read(path: Path) -> MeshData:
     """The mesh of a file as it is; MeshLab reads what pcmc's readers refuse."""
-    with opened(path) as form:
+    with format_opened(path) as form:
         try:
             return contents(form, path)
         except (PcmcError, ValueError, IndexError) as error:

@@ -27,7 +27,7 @@ from .formats import Content
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, parse_metadata
 from .patch_meshes import WALLS, patch_meshes
-from .polygons import triangulate
+from .polygons import cut_polygons
 
 KEY, CABLE, NAME = "pcmc", "pcmc cable", "pcmc name"
 VERSION = 7  # of Rhino's format
@@ -149,7 +149,7 @@ def read(path: Path) -> MeshData:
         metadata = replace(metadata, parts={**metadata.parts, "cables": rows})
         held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)
-    F, source, cut = triangulate(points, np.concatenate(corners), np.concatenate(counts))
+    F, source, cut = cut_polygons(points, np.concatenate(corners), np.concatenate(counts))
     notes = (*filter(None, (note,)), *cut)
     if others:
         notes = (*notes, f"{others} objects that are not meshes were left out")

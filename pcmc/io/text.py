@@ -23,7 +23,7 @@ LONGEST = 500  # characters: Python's parser cannot bear any depth of brackets a
 Fail = Callable[[str], FileError]
 
 
-def numbers(words: Sequence[str], kind: type = np.float64) -> Any:
+def parsed_numbers(words: Sequence[str], kind: type = np.float64) -> Any:
     """The numbers in words; ValueError for another word, and for 1_000, a number to Python alone."""
     if "_" in "".join(words):
         raise ValueError("no number has the character _")
@@ -45,16 +45,16 @@ def constant(expression: str, known: Mapping[str, float], fail: Fail) -> float:
     >>> constant("2*(h - 1)^2", {"h": 4.0}, FileError)
     18.0
     """
-    value = linear(expression, known, fail)
+    value = linear_expression(expression, known, fail)
     if value[1:].any():
         raise fail(f"expected a number, found {expression.strip()!r}")
     return float(value[0])
 
 
-def linear(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
+def linear_expression(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
     """(4,) constant and coefficients of x, y, z of an expression that is linear in them.
 
-    >>> linear("z - 0.5*(x + 1)", {}, FileError).tolist()
+    >>> linear_expression("z - 0.5*(x + 1)", {}, FileError).tolist()
     [-0.5, -0.5, 0.0, 1.0]
     """
     source = expression.strip().replace("^", "**")
@@ -142,7 +142,7 @@ class TextSection:
     def numbers(self, words: Sequence[str], row: int | None = None) -> Floats:
         """Floats from words of the given row, by default one of each row: numbers, or expressions."""
         try:
-            return numbers(words)
+            return parsed_numbers(words)
         except ValueError:
             rows = range(len(words)) if row is None else [row] * len(words)
             fails = (partial(self.error, row=k) for k in rows)

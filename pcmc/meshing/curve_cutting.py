@@ -44,7 +44,7 @@ def cut_curves(surface: Surface, along_curves: Floats, project: Projection | Non
     # 1→4 keeps the triangles' shape, cutting single edges does not
     while len(counts) and np.median(counts) >= 2.0:
         along_curves = prolongation(surface) @ along_curves
-        surface = _refined_round(surface)
+        surface = refined_round(surface)
         counts = _pieces(surface, along_curves)
     stay, cable = _curve_edges(surface)
     mesh = CurveMesh(
@@ -78,7 +78,7 @@ def _curve_edges(surface: Surface) -> tuple[Bools, Ints]:
     return surface.topology.curve_edge | fixed | sliding | (cable >= 0), cable
 
 
-def _refined_round(surface: Surface) -> Surface:
+def refined_round(surface: Surface) -> Surface:
     """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
 
     With t the components of the edge b - a across the normals at its ends, the middle of the cubic is

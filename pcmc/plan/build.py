@@ -137,7 +137,7 @@ def _cables(draft: Draft, held: Bools) -> list[Cable]:
             named = divider.wall is None and not divider.name.startswith("divider ")
             name = divider.name if named else f"cable {next(numbers)}"
             along = [chain.edges for chain in draft.divider(number)[1]]
-            cables.append(Cable(name, divider.cable, np.concatenate(along)))
+            cables.append(Cable(name, divider.cable, np.concatenate(along), divider.cable_weight))
     return cables
 
 

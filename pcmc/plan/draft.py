@@ -164,7 +164,7 @@ def _check_count(plan: Plan, outline: Floats, edges: int) -> None:
     count = short + area / math.sqrt(0.1875) / h / h  # the square of h may be 0 or infinite
     if count > MAX_TRIANGLES:
         least = math.sqrt(area / math.sqrt(0.1875) / max(MAX_TRIANGLES - short, 1))
-        change = f"use {two_digits(least):g} or more, and refine the roof by [[remesh]]"
+        change = f"use {two_digits(least, math.ceil):g} or more, and refine the roof by [[remesh]]"
         if short > MAX_TRIANGLES / 2:
             change = f"draw the lines with fewer points, they have {edges} edges"
         problem = f"edge_length={h:g} would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are"

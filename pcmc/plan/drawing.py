@@ -18,7 +18,8 @@ from ..base.errors import PlanError
 from ..base.units import conversion_note, size_note
 from ..surface.curves import Curve, polyline
 from ..surface.pieces import Piece, point_text, two_digits
-from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out, listed
+from ..surface.summary import listed
+from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out
 from .lines import EXACT, Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
@@ -202,7 +203,7 @@ class _Reader:
             one, two = (ends[k] for k in sorted((place, int(nearest[place]))))
             gap = float(apart[place])
             between = f"between {one[0]} at {point_text(one[1])} and {two[0]} at {point_text(two[1])}"
-            allow = f"draw what is missing, or close it with gap = {two_digits(gap):g}"
+            allow = f"draw what is missing, or close it with gap = {two_digits(gap, math.ceil):g}"
             text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
             raise PlanError(text, what=where, where=(_plain(one[1]), _plain(two[1])), found=gap)
         return paths

@@ -16,7 +16,7 @@ from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
 from ..surface.geometry import bounding_size
-from ..surface.pieces import point_text, to_local, to_space
+from ..surface.pieces import point_text, to_local, to_space, two_digits
 from .arrangement import Arrangement
 from .lines import EXACT, SNAP, Kind, LineTree, PlanLine
 from .parts import cable_label
@@ -35,9 +35,8 @@ class Boundary:
     line: Ints  # (e,) the number of the line
     state: Any  # (e,) one of EDGES, "mirror", or "held": a free one along a support
     cable: Ints  # (e,) index into ``cables``, -1 for none
-    cables: tuple[
-        tuple[float, str], ...
-    ]  # tension and name, perhaps empty, of each cable line and edge cable
+    # tension, weight and name, perhaps empty, of each cable line and edge cable
+    cables: tuple[tuple[float, float, str], ...]
 
     def among(self, *states: str) -> Bools:
         """(e,) the edges in any of these states."""
@@ -55,10 +54,10 @@ def boundary(plan: Plan, lines: Sequence[PlanLine], on_edge: Sequence[Curve], dr
     chains.sort(key=lambda chain: chain.line)
     ends = np.concatenate([chain.edges for chain in chains])
     line = np.repeat([chain.line for chain in chains], [len(chain.edges) for chain in chains])
-    parts = [(plan.edge, plan.cable), *((hole.edge, hole.cable) for hole in plan.holes)]
-    state = np.array([edge for edge, _ in parts], dtype="<U8")[line]
-    cables = [(tension, "") for _, tension in parts if tension is not None]
-    with_cable = np.array([tension is not None for _, tension in parts])
+    parts = [plan, *plan.holes]
+    state = np.array([part.edge for part in parts], dtype="<U8")[line]
+    cables = [(part.cable, part.cable_weight, "") for part in parts if part.cable is not None]
+    with_cable = np.array([part.cable is not None for part in parts])
     cable = np.where(with_cable, np.cumsum(with_cable) - 1, NONE)[line]
     for number, part in enumerate(plan.cables, start=1):
         along = _along(part.curve.local(plan.plane), drawn.points, ends, SNAP * plan.edge_length)
@@ -67,7 +66,7 @@ def boundary(plan: Plan, lines: Sequence[PlanLine], on_edge: Sequence[Curve], dr
             problem = f"{name} is on no edge of the outline or of a hole; draw it along one"
             raise PlanError(problem, what=name)
         state[along], cable[along] = "cable", len(cables)
-        cables.append((part.tension, part.name))
+        cables.append((part.tension, part.weight, part.name))
     for support in on_edge:  # a held stretch needs no cable
         along = _along(support, drawn.points, ends, SNAP * plan.edge_length)
         state[along] = np.where(np.isin(state[along], ["free", "cable"]), "held", "fixed")
@@ -136,7 +135,7 @@ def mirror_planes(plan: Plan, vertices: Floats) -> list[tuple[Plane, Bools]]:
 def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable]:
     """A Cable for each stretch of the boundary between held vertices; ``numbers`` those without a name."""
     cables = []
-    for index, (tension, name) in enumerate(edges.cables):
+    for index, (tension, weight, name) in enumerate(edges.cables):
         chosen = edges.cable == index
         ends, line = edges.ends[chosen], edges.line[chosen]
         new = held[ends[:, 0]] | (ends[:, 0] != np.roll(ends[:, 1], 1)) | (line != np.roll(line, 1))
@@ -147,7 +146,7 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
         stretches = [ends[group == k] for k in np.unique(group)]
         for k, stretch in enumerate(stretches, start=1):
             own = f"cable {next(numbers)}" if not name else f"{name}-{k}" if len(stretches) > 1 else name
-            cables.append(Cable(own, tension, stretch))
+            cables.append(Cable(own, tension, stretch, weight))
     return cables
 
 
@@ -159,7 +158,7 @@ def usual_cable(plan: Plan) -> float:
 
 def cable_for(outline: Curve, tension: float) -> float:
     """1.5 α × the size of the outline, two digits."""
-    return float(f"{1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max():.2g}")
+    return two_digits(1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max())
 
 
 def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:

@@ -68,12 +68,6 @@ def left_out(layers: Mapping[str, int]) -> str:
     return f"layers left out: {', '.join(parts)}{more}; understood are {UNDERSTOOD}"
 
 
-def listed(labels: Sequence[str]) -> str:
-    """The first labels of strokes, for messages."""
-    more = f" and {len(labels) - 4} more" if len(labels) > 4 else ""
-    return f"{', '.join(labels[:4])}{more}"
-
-
 @dataclass(frozen=True)
 class Label:
     """The name of a part of the plan, a point (x, y) inside it, and its tension, if the drawing has one."""

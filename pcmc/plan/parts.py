@@ -54,6 +54,7 @@ class Divider:
     cable : tension of a cable along the line, force; None for no cable. Without a wall the cable has the
         name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch, give
         the parts on both sides to that patch with ``at``.
+    cable_weight : of that cable, force per length, against Π's normal; ``cable`` is its tension at Π then.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
@@ -62,6 +63,7 @@ class Divider:
     bottom: str = field(default="held", metadata={"kind": BOTTOMS})
     cable: float | None = None
     upright: bool = False
+    cable_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +77,14 @@ class Hole:
         free, with a cable along it.
     name : for messages.
     cable : tension of that cable, force.
+    cable_weight : of that cable, force per length; ``cable`` is its tension at Π then.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
     edge: str = field(default="fixed", metadata={"kind": EDGES})
     name: str = ""
     cable: float | None = None
+    cable_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +98,14 @@ class CableLine:
         radius tension / α.
     name : of the cable; by default "cable 1", "cable 2", … in order. A cable ends where the edge is held;
         several of one name are numbered: "east-1", "east-2".
+    weight : of the cable, force per length, against Π's normal: it pulls with tension + weight · z at the
+        height z over Π.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
     tension: float
     name: str = ""
+    weight: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -173,9 +180,9 @@ def divider_of(spec: Any, number: int) -> Divider:
         validate.choice(f"wall of {what}", part.wall, (BALANCED,))
     if not isinstance(part.upright, bool):
         validate.refuse("upright", part.upright, "True or False", what)
-    line, cable = curve_of(part.curve, what), _tension(part.cable, what)
+    line, cable = curve_of(part.curve, what), _cable(part, what)
     wall, kind = (None, "divider") if part.wall is None or part.wall is False else (part.wall, "wall")
-    return replace(part, curve=line, cable=cable, wall=wall, name=part.name or f"{kind} {number}")
+    return replace(part, curve=line, wall=wall, name=part.name or f"{kind} {number}", **cable)
 
 
 def hole_of(spec: Any, number: int) -> Hole:
@@ -184,8 +191,8 @@ def hole_of(spec: Any, number: int) -> Hole:
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
     name = hole_label(checked_name(f"{what}.name", part.name, empty=True)) if part.name else what
-    cable = edge_cable(part.edge, part.cable, name)
-    return Hole(curve_of(part.curve, what, closed=True), part.edge, name, cable)
+    curve = curve_of(part.curve, what, closed=True)
+    return replace(part, curve=curve, name=name, **edge_cable(part, name))
 
 
 def hole_label(name: str) -> str:
@@ -197,8 +204,9 @@ def hole_label(name: str) -> str:
     return name if name.startswith("hole ") else f"hole {name!r}"
 
 
-def edge_cable(edge: str, cable: Any, what: str) -> float | None:
-    """The tension of the cable along an edge; refused without ``edge = "cable"``, and missing with it."""
+def edge_cable(part: Any, what: str) -> dict[str, Any]:
+    """The cable along the edge of a plan or a hole; refused without ``edge = "cable"``, missing with it."""
+    edge, cable = part.edge, part.cable
     if edge == "cable" and cable is None:
         message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
         message += ", and patches with pressure = 0.0"
@@ -206,11 +214,17 @@ def edge_cable(edge: str, cable: Any, what: str) -> float | None:
     if edge != "cable" and cable is not None:
         message = f'{what}: cable = {cable!r} needs edge = "cable", found "{edge}"'
         raise OptionError(message, what="edge", where=what, found=edge, expected="cable")
-    return _tension(cable, what)
+    return _cable(part, what)
 
 
-def _tension(cable: Any, what: str) -> float | None:
-    return None if cable is None else validate.number("cable", cable, least=0.0, where=what)
+def _cable(part: Any, what: str) -> dict[str, Any]:
+    """The tension and the weight of the cable along a line, checked."""
+    given, weight = part.cable, validate.number("cable_weight", part.cable_weight, where=what)
+    cable = None if given is None else validate.number("cable", given, least=0.0, where=what)
+    if weight and not cable:
+        message = f"{what}: cable_weight = {weight:g} needs a cable that pulls; give its tension, cable ="
+        raise OptionError(message, what="cable_weight", where=what, found=weight)
+    return {"cable": cable, "cable_weight": weight}
 
 
 def cable_of(spec: Any, number: int) -> CableLine:
@@ -222,7 +236,8 @@ def cable_of(spec: Any, number: int) -> CableLine:
     if not isinstance(spec, CableLine):
         raise OptionError(f"{what}: expected a curve with a tension, found {spec!r}", what=what, found=spec)
     tension = validate.number("tension", spec.tension, least=0.0, where=spec.name or what)
-    return CableLine(curve_of(spec.curve, cable_label(spec, number)), tension, spec.name)
+    weight = validate.number("weight", spec.weight, where=spec.name or what)
+    return CableLine(curve_of(spec.curve, cable_label(spec, number)), tension, spec.name, weight)
 
 
 def cable_label(cable: CableLine, number: int) -> str:
@@ -285,7 +300,7 @@ def patches_of(spec: Any) -> tuple[PatchSpec, ...]:
     return tuple(patches)
 
 
-def support_of(spec: Any, number: int) -> Any:
+def support_from(spec: Any, number: int) -> Any:
     """A point (2,) or (3,), or a Curve; ``number`` counts from 1."""
     if isinstance(spec, Sequence | np.ndarray) and len(spec) in (2, 3) and np.ndim(spec) == 1:
         point = np.array(spec, dtype=float)

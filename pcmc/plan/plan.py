@@ -59,6 +59,8 @@ class Plan:
         area has the potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
     cable : tension of the cables along the outline, with ``edge = "cable"``, force. Each stretch between
         supports is a cable: "cable 1", "cable 2", … in order.
+    cable_weight : of these cables, force per length, against Π's normal; ``cable`` is then their tension at
+        Π.
     cables : parts of the outline and of holes that are free and carry a cable of their own: CableLines.
     mirrors : straight lines, each two points, along edges of the outline: the plan is one half of a
         symmetric roof, or a quarter, and goes on behind these edges as its mirror image.
@@ -109,6 +111,7 @@ class Plan:
     weight: float = 0.0
     snow: float = 0.0
     cable: float | None = None
+    cable_weight: float = 0.0
     cables: Sequence[Any] = field(default=(), metadata={"kind": "a list of tables"})
     mirrors: Sequence[Any] = field(default=(), metadata=CURVES)
     rooms: Any = field(default=(), metadata={"kind": "a table"})
@@ -118,13 +121,13 @@ class Plan:
         for key in parts.MOST:
             parts.check_count(key, len(getattr(self, key)), OptionError)
         parsed: dict[str, Any] = {"outline": parts.curve_of(self.outline, "outline", closed=True)}
-        makers = {"dividers": parts.divider_of, "holes": parts.hole_of, "supports": parts.support_of}
+        makers = {"dividers": parts.divider_of, "holes": parts.hole_of, "supports": parts.support_from}
         for key, maker in (makers | {"cables": parts.cable_of, "mirrors": parts.mirror_of}).items():
             parsed[key] = tuple(maker(spec, number) for number, spec in enumerate(getattr(self, key), 1))
         parsed |= {"patches": parts.patches_of(self.patches), "points": parts.points_of(self.points)}
         parsed["rooms"] = parts.rooms_of(self.rooms, parsed["patches"])
         validate.choice("edge of the outline", self.edge, EDGES)
-        parsed["cable"] = parts.edge_cable(self.edge, self.cable, "the outline")
+        parsed |= parts.edge_cable(self, "the outline")
         for key, value in parsed.items():
             object.__setattr__(self, key, value)
         for key in ("pressure", "weight", "snow"):

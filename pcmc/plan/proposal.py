@@ -13,6 +13,7 @@ import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
 from ..surface.curves import Curve
+from ..surface.pieces import two_digits
 from ..surface.values import balanced_wall
 from .drawing import Drawing
 from .edges import cable_for
@@ -180,7 +181,7 @@ def _edge_length(parts: Sequence[Part], drawing: Drawing) -> float:
     least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
     holes = [curve.length / 12.0 for curve in drawing.holes.values()]
     wanted = min([most, *(part.radius / ACROSS for part in parts), *holes])
-    return float(f"{max(wanted, least):.2g}")
+    return two_digits(max(wanted, least))
 
 
 def _wall_tension(
@@ -202,7 +203,7 @@ def _patches(
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
     least = least_tension(_roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE))
-    default = float(f"{ABOVE_LEAST * least:.2g}") if tension is None else tension
+    default = two_digits(ABOVE_LEAST * least) if tension is None else tension
     labels, specs = _labels(parts, drawing), []
     for k, part in enumerate(parts):
         point = [_rounded(value, part.radius) for value in part.middle]

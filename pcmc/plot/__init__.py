@@ -3,7 +3,9 @@
 With a path every function writes a picture; each returns it as an (h,w,3) array of bytes.
 """
 
+from .cloth import strains
 from .curves import convergence, diagram, heatmap, histories, lines
+from .loads import under_load
 from .pictures import draw, families, panel, reactions, vectors
 
 __all__ = [
@@ -16,5 +18,7 @@ __all__ = [
     "lines",
     "panel",
     "reactions",
+    "strains",
+    "under_load",
     "vectors",
 ]

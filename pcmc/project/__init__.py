@@ -1,6 +1,6 @@
 """A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
-A file becomes a ``Project`` (``load``, which meshes nothing), its ``Start``, an ``Outcome`` (``designed``),
+A file becomes a ``Project`` (``load``, which meshes nothing), an ``Outcome`` (``start_of``, ``designed``),
 and files (``run``); each is a value, made once. A drawing or a mesh alone is a project, too. Gives these to
 sweep, page and command. May import ``plot`` and the subpackages below it.
 
@@ -19,26 +19,26 @@ in any file. A short one::
     files = ["roof.obj", "roof.glb"]
 """
 
-from .cache import cached_files
-from .cache import clear as clear_cache
-from .cache import folder as cache_folder
+from .cache import cache_folder, cached_files, clear_cache
 from .drawn import files_of, is_drawing
 from .file import Project, is_project, load, project_of, read_data, with_rise
 from .keys import json_schema, reference, sections
 from .outcome import MOST_CHECKED, OnStep, Outcome
 from .planning import drawing_reference, project_text, proposal_text
 from .running import (
+    analysis_jobs,
+    certified_files,
     check_outputs,
     designed,
+    draw_picture,
     model_job,
     opened,
-    paint,
     paint_families,
+    paint_strain,
     run,
     run_project,
     schedule_jobs,
     surface_files,
-    vertex_fields,
     write_all,
 )
 from .settings import (
@@ -46,20 +46,27 @@ from .settings import (
     Output,
     Remeshing,
     Structure,
-    check_model,
     check_names,
-    check_picture,
     schedule_paths,
 )
 from .solving import solve_project
-from .start import Start, build, start_of, surface_of
+from .start import build, start_of, surface_of
 from .varied import check_varied, digest, varied, with_loads
 
-__all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing", "Start"]
-__all__ += ["Structure", "build", "cache_folder", "cached_files", "check_model", "check_names"]
-__all__ += ["check_outputs", "check_picture", "check_varied", "clear_cache", "designed", "digest"]
-__all__ += ["drawing_reference", "files_of", "is_drawing", "is_project", "json_schema", "load", "model_job"]
-__all__ += ["opened", "paint", "paint_families", "project_of", "project_text", "proposal_text", "read_data"]
-__all__ += ["reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
-__all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "vertex_fields"]
-__all__ += ["with_loads", "with_rise", "write_all"]
+__all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing"]
+__all__ += ["Structure", "analysis_jobs", "build", "cache_folder", "cached_files", "certified_files"]
+__all__ += ["check_names", "check_outputs", "check_varied", "clear_cache", "designed", "digest"]
+__all__ += ["draw_picture", "drawing_reference", "files_of", "is_drawing", "is_project", "json_schema"]
+__all__ += [
+    "load",
+    "model_job",
+    "opened",
+    "paint_families",
+    "paint_strain",
+    "project_of",
+    "project_text",
+    "proposal_text",
+]
+__all__ += ["read_data", "reference", "run", "run_project", "schedule_jobs", "schedule_paths", "sections"]
+__all__ += ["solve_project", "start_of", "surface_files", "surface_of", "varied", "with_loads", "with_rise"]
+__all__ += ["write_all"]

@@ -49,7 +49,7 @@ PARTS = [
 NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a result
 
 
-def folder() -> Path | None:
+def cache_folder() -> Path | None:
     """The folder of the cache, which may not exist yet; None if it is switched off."""
     given = os.environ.get(VARIABLE, "")
     if given.lower() == "off":
@@ -63,13 +63,13 @@ def folder() -> Path | None:
 
 def cached_files() -> list[Path]:
     """The files of the cache, the one used longest ago first."""
-    place = folder()
+    place = cache_folder()
     with suppress(OSError):
         return sorted(place.glob("*.pcmc"), key=lambda path: path.stat().st_mtime_ns) if place else []
     return []
 
 
-def clear() -> list[Path]:
+def clear_cache() -> list[Path]:
     """Remove all files of the cache; return those removed."""
     removed = []
     for path in cached_files():
@@ -121,7 +121,7 @@ def keep(project: Project, outcome: Outcome) -> None:
         with atomic_write(path) as temporary:
             io.write(temporary, surface, certificate=values)
             back = to_surface(io.load(temporary))
-            if any(_bytes(getattr(surface, f)) != _bytes(getattr(back, f)) for f in FIELDS):
+            if any(plain_bytes(getattr(surface, f)) != plain_bytes(getattr(back, f)) for f in FIELDS):
                 raise FileError("the file does not hold all of the surface")
         for old in cached_files()[:-MOST]:
             old.unlink(missing_ok=True)
@@ -129,12 +129,12 @@ def keep(project: Project, outcome: Outcome) -> None:
 
 def _path(project: Project) -> Path | None:
     """The file for a project; None for one that is not kept."""
-    place = folder()
-    if place is None or not (project.plan is not None or project.has_file):
+    place = cache_folder()
+    if place is None or not project.specified:
         return None
     sha = hashlib.sha256(_program().encode())
     try:
-        sha.update(_bytes([getattr(project, name) for name in PARTS]))
+        sha.update(plain_bytes([getattr(project, name) for name in PARTS]))
         if project.mesh is not None:
             sha.update(read_bytes(project.path.parent / project.mesh.file))
             sha.update(repr(project.units).encode())
@@ -150,7 +150,7 @@ def _program() -> str:
     return f"pcmc {version('pcmc-surfaces')} {newest}\n"
 
 
-def _bytes(value: Any) -> bytes:
+def plain_bytes(value: Any) -> bytes:
     """The same for equal values and others for others; TypeError for a value of unknown kind."""
     return json.dumps(value, default=_plain, sort_keys=True).encode()
 

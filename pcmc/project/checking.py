@@ -28,7 +28,7 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
         raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
-def check_keys(text: str, data: Mapping[str, Any]) -> None:
+def check_project_keys(text: str, data: Mapping[str, Any]) -> None:
     """Check every key: known, of the right kind, none missing. ``text`` is the file as it is written."""
     _check_range(text, data, ())
     root, *below = main_sections()

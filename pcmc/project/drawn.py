@@ -134,7 +134,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
             text = "a plan has an outline or a drawing, not both; remove one of them"
             raise FileError(text, what="plan.outline")
         check_beside(name, "drawing")
-    drawing = read(path.parent / name, str(data.get("units", "")), gap)
+    drawing = drawing_of(path.parent / name, str(data.get("units", "")), gap)
     from ..plan.proposal import proposed
 
     try:
@@ -173,7 +173,7 @@ def check_beside(name: str, kind: str) -> None:
         raise FileError(text, what=f"plan.{kind}" if kind == "drawing" else kind, found=name)
 
 
-def read(path: Path, units: str, gap: float | None) -> Drawing:
+def drawing_of(path: Path, units: str, gap: float | None) -> Drawing:
     """The drawing in a project's unit of length; one without units takes the drawing's, or metres."""
     try:
         state = path.stat()

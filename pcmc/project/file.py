@@ -18,10 +18,11 @@ from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
+from ..cloth.settings import Pattern
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..structure.model import Structure
-from .checking import check_keys, in_file
+from ..structure.section import Structure
+from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
 
@@ -58,6 +59,7 @@ class Project:
     vary: Sequence[Parameter] = ()
     target_tolerance: float | None = None  # ``tolerance`` of ``pcmc.meet``; None for the default
     structure: Structure | None = None
+    pattern: Pattern | None = None
     output: Output = field(default_factory=Output)
     folder: Path | None = None  # made for the output if it is missing; None if the names include theirs
     drawing: Drawing | None = None  # that the plan refers to, or that ``path`` is
@@ -71,9 +73,14 @@ class Project:
         return [self.path, *drawing, *([] if self.mesh is None else [self.path.parent / self.mesh.file])]
 
     @property
+    def specified(self) -> bool:
+        """Whether it is a project file or a drawing: a mesh alone does not say what roof is wanted."""
+        return bool(self.data)
+
+    @property
     def has_file(self) -> bool:
         """Whether it is a project file: a drawing or a mesh alone says nothing about solving it."""
-        return bool(self.data) and self.path.suffix.lower() == TOML
+        return self.specified and self.path.suffix.lower() == TOML
 
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
@@ -129,9 +136,10 @@ def is_project(path: PathLike) -> bool:
 
 
 def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
-    """The text of a project file and its data, all keys checked; a drawing's data refer to it."""
+    """The text of a project file and its data, all keys checked; those of any other file, a drawing, refer
+    to it."""
     check_regular(path)
-    if is_drawing(path):
+    if path.suffix.lower() != TOML:
         return "", {"plan": {"drawing": path.name}} | ({"units": units} if units else {})
     where: int | None = None
     try:
@@ -160,7 +168,7 @@ def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
                 problem += "; put names with letters beyond a-z in quotes"
     else:
         with in_file(path, FileError):
-            check_keys(text, data)
+            check_project_keys(text, data)
         return text, data
     raise FileError(f"{path}: {problem}", what=str(path), where=where)
 
@@ -185,8 +193,10 @@ def project_of(
         values = _solving(data.get("solve", {}))
         output, units = _output(data.get("output", {})), Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
-        output.check(units, structure)
-        values |= {"output": output, "units": units, "structure": structure, "drawing": drawing}
+        pattern = section_of(Pattern, "pattern", data["pattern"]) if "pattern" in data else None
+        output.check(units, structure, pattern)
+        values |= {"output": output, "units": units, "drawing": drawing}
+        values |= {"structure": structure, "pattern": pattern}
         stages = stages if isinstance(stages, list) else [stages]
         values["remeshing"] = [section_of(Remeshing, "remesh", stage) for stage in stages]
         plan, targets, vary = None, list["Target"](), list["Parameter"]()

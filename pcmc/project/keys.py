@@ -13,10 +13,11 @@ from typing import Any
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
+from ..cloth.settings import Pattern
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.model import Structure
+from ..structure.section import PatchMaterial, Structure, Zone
 from ..surface import Plane
 from ..surface.curve_data import CURVES
 from .settings import PATCH_KEYS, AccuracyWanted, MeshFile, Output, Remeshing
@@ -61,6 +62,9 @@ KINDS: dict[str, Schema] = {
     "a name or a list": _any_of(_NAME, _LIST),
     "a name or a list of names": _any_of(_NAME, _list_of(_NAME)),
     "a list of points": _list_of(_LIST),
+    "a list of lines": _list_of(_LIST),
+    "a number or a table": _any_of(_NUMBER, TABLE),
+    "two numbers": _list_of(_NUMBER) | {"minItems": 2, "maxItems": 2},
     "a curve": _any_of(_LIST, TABLE),
     "a point [x, y, z]": _list_of(_NUMBER) | {"minItems": 3, "maxItems": 3},
     "a point [x, y] or a list of points": _LIST,
@@ -167,6 +171,7 @@ def main_sections() -> tuple[Section, ...]:
         Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
         Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
         Key("structure", "a table", None, "material, thickness and loads of the structural model"),
+        Key("pattern", "a table", None, "the cutting pattern of the cloth"),
         Key("output", "a table", None, "the files, the picture and the documents to write"),
     )
     drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
@@ -192,6 +197,9 @@ def main_sections() -> tuple[Section, ...]:
         "cable": "A part of the outline or of a hole that is free and carries a cable.",
         "remesh": "Other triangles, before or after solving; [[remesh]] if there are several.",
         "structure": "The structural model that `pcmc structure` writes, in the units of the surface.",
+        "material": "The material of a patch, where it is another one; NAME is the patch's name.",
+        "zone": "Snow or wind on a part of the roof; those with the same case act together.",
+        "pattern": "The cutting pattern that `pcmc pattern` writes, in the units of the surface.",
         "output": "What to write: all of it, or nothing. Without it nothing is written.",
     }
     return (
@@ -207,6 +215,9 @@ def main_sections() -> tuple[Section, ...]:
         Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", tuple(mesh_patch)),
         Section("remesh", help_of["remesh"], _of_class(Remeshing)),
         Section("structure", help_of["structure"], _of_class(Structure)),
+        Section("structure.patches.NAME", help_of["material"], _of_class(PatchMaterial)),
+        Section("structure.zones", help_of["zone"], _of_class(Zone)),
+        Section("pattern", help_of["pattern"], _of_class(Pattern)),
         Section("output", help_of["output"], _of_class(Output)),
     )
 
@@ -274,7 +285,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'output']
+    ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'pattern', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), CURVE)

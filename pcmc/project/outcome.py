@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
@@ -23,13 +23,16 @@ if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..certificate.quantities import Figure
     from ..certificate.theorem import Theorem
+    from ..cloth import CuttingPattern, Pattern
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..margins import Margin
     from ..panelling import FewerFamilies, Panels
     from ..report import RoofReport
-    from ..structure.model import StructuralModel, Structure
+    from ..structure import Analysis
+    from ..structure.model import StructuralModel
+    from ..structure.section import Structure
     from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
@@ -70,8 +73,8 @@ class Outcome:
     unfold : whether the whole roof is shown that ``surface`` is the part of between its mirror planes.
     data : all that the file of ``start`` holds, such as scalars; None without a file.
 
-    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh``, ``margin`` and ``model``
-    are computed when first asked for, and kept.
+    ``certificate``, ``whole``, ``figures``, ``theorem``, ``panels``, ``check_mesh``, ``margin`` and
+    ``analysis`` are computed when first asked for, and kept.
     """
 
     result: Result | None
@@ -87,6 +90,18 @@ class Outcome:
     unfold: bool = False
     data: MeshData | None = None
     _known: dict[Any, Any] = field(default_factory=dict, repr=False)  # copies of an outcome share it
+
+    @classmethod
+    def of(
+        cls, surface: Surface, units: Units, project: Project | None = None, data: MeshData | None = None
+    ) -> Outcome:
+        """A surface that is shown as it is, such as the start shape of a project."""
+        unfold = project is not None and project.output.whole
+        return cls(None, units=units, project=project, start=surface, unfold=unfold, data=data)
+
+    def changed(self, change: Callable[[Surface], Surface] | None) -> Outcome:
+        """The same with another surface, which has nothing of what the file holds besides the first one."""
+        return self if change is None else replace(self, start=change(self.surface), data=None, _known={})
 
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""
@@ -233,6 +248,7 @@ class Outcome:
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
             margins=self.margins,
+            analysis=self.analysis(anyway),
             theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
@@ -254,6 +270,22 @@ class Outcome:
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
+
+    def cutting_pattern(self, wanted: Pattern, anyway: bool = False) -> CuttingPattern:
+        """The cutting pattern of what is shown."""
+        from ..cloth import pattern_of
+
+        surface, certificate = self.shown
+        return pattern_of(surface, wanted, anyway, certificate)
+
+    def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:
+        """What is shown under load, found once by CalculiX; None where the project does not run it."""
+        structure = None if self.project is None else self.project.structure
+        if structure is None or not structure.run:
+            return None
+        from ..structure import analyse
+
+        return self._once("analysis", lambda: analyse(self.model(structure, anyway), progress=progress))
 
     @property
     def mesh_check(self) -> MeshCheck | None:

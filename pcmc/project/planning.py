@@ -14,7 +14,7 @@ from ..base.errors import FileError
 from ..base.files import PathLike
 from ..plan import plan_from
 from ..surface.curves import Curve
-from .drawn import FALLBACK, LENGTHS, height_targets, read
+from .drawn import FALLBACK, LENGTHS, drawing_of, height_targets
 from .file import Project
 from .start import surface_of
 
@@ -56,7 +56,7 @@ def project_text(
     path = Path(path)
     project = Path(folder or path.parent) / path.with_suffix(".toml").name
     name = drawing_reference(path, project) if refer else ""
-    drawing = read(path, units, gap)
+    drawing = drawing_of(path, units, gap)
     values = proposed(drawing)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no project is written that cannot be meshed

@@ -20,9 +20,11 @@ from ..base.files import folder as output_folder
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
+from ..cloth import CuttingPattern
+from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import StructuralModel, write_structure
+from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from . import cache
 from .checking import in_file
@@ -56,14 +58,9 @@ def opened(
     (True, False)
     """
     project = path if isinstance(path, Project) else load(path, units=units)
-    if (project.has_file or project.plan is not None) and not start:
+    if project.specified and not start:
         return designed(project, progress, changed=changed, use_cache=use_cache)
-    first = start_of(project)
-    surface, data = first.surface, first.data
-    if changed is not None:
-        surface, data = changed(surface), None
-    unfold = project.output.whole
-    return Outcome(None, units=first.units, project=first.project, start=surface, unfold=unfold, data=data)
+    return start_of(project).changed(changed)
 
 
 def designed(
@@ -178,7 +175,7 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
     """The project's files, each with the function that writes it; documents tell if it is not certified."""
     output, jobs = project.output, surface_files(outcome, project.output.files)
     if output.picture is not None:
-        painting = partial(paint, views=output.all_views, colour=output.colour, units=outcome.units)
+        painting = partial(draw_picture, views=output.all_views, colour=output.colour, units=outcome.units)
         jobs.append((Path(output.picture), partial(painting, outcome.shown.surface)))
     if not output.documents:
         return jobs
@@ -195,25 +192,27 @@ def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnS
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
             documents.append(model_job(Path(output.structure), model))
+        cloth = FileJobs()
+        if output.pattern and project.pattern is not None:
+            progress("cutting strips")
+            pattern = outcome.cutting_pattern(project.pattern, anyway)
+            cloth = pattern_files(pattern, output.pattern, outcome.units, output.sheet, outcome.name)
+        analysis = outcome.analysis(anyway, progress) if output.structure or output.report else None
+        loaded = FileJobs()
+        if output.structure is not None and analysis is not None:
+            loaded = analysis_jobs(Path(output.structure), analysis)
         if output.report is not None:
             listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
             listed[project.path.name] = "project"
             listed |= {path.name: "surface" for path, _ in jobs}
             listed |= {} if output.picture is None else {Path(output.picture).name: "picture"}
             listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
+            listed |= {path.name: "under load" for path, _ in loaded}
+            listed |= {path.name: "cutting pattern" for path, _ in cloth}
             report = outcome.report(output, files=listed, anyway=anyway)
             documents.append((Path(output.report), report.write))
+        documents += [*loaded, *cloth]
     return jobs + documents
-
-
-def vertex_fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
-    """Values (n,) by vertex: mean curvature (1/length), its relative error, and the size of the
-    reaction at supports (force)."""
-    return {
-        "mean curvature": mean_curvature(surface),
-        "error": curvature_error(surface),
-        "reaction": np.linalg.norm(certificate.reactions, axis=1),
-    }
 
 
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
@@ -221,21 +220,33 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
 
     Scalars of a surface that was not solved are those of its file.
     """
-    surface, certificate, data = *outcome.shown, outcome.data
-    about: dict[str, Any] = {"units": outcome.units, "colour": colour}
-    if outcome.result is None:
-        about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
-        if outcome.unfold:
-            unfold, half = unfolded(outcome.surface), outcome.surface
-            place = {half.m: unfold.face, half.n: unfold.vertex}
-            carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
-            about |= {"scalars": carried, "certificate": None}
-        return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
+    if outcome.result is not None:
+        return certified_files(*outcome.shown, files, outcome.units, colour)
+    data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
+    about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
+    if outcome.unfold:
+        unfold, half = unfolded(outcome.surface), outcome.surface
+        place = {half.m: unfold.face, half.n: unfold.vertex}
+        carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
+        about |= {"scalars": carried, "certificate": None}
+    return [(Path(file), partial(io.write, surface=outcome.shown.surface, **about)) for file in files]
+
+
+def certified_files(
+    surface: Surface, certificate: Certificate, files: Iterable[PathLike], units: Units, colour: str = ""
+) -> FileJobs:
+    """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
+    relative curvature error, and size of the reactions at supports (force)."""
+    scalars: dict[str, Floats] = {
+        "mean curvature": mean_curvature(surface),
+        "error": curvature_error(surface),
+        "reaction": np.linalg.norm(certificate.reactions, axis=1),
+    }
     jobs: FileJobs = []
-    scalars = vertex_fields(surface, certificate)
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]
         coloured = {name: values for name, values in scalars.items() if name == colour}
+        about: dict[str, Any] = {"units": units, "colour": colour}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
         jobs.append((file, partial(io.write, surface=surface, **about)))
@@ -275,6 +286,25 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
     return path, partial(write_structure, model=model)
 
 
+def analysis_paths(path: Path) -> dict[str, Path]:
+    """The files of an analysis beside the structural model, by what they hold."""
+    names = {name: f"{path.stem}-{name}.csv" for name in ("cases", "patches", "supports", "cables")}
+    return {name: path.with_name(file) for name, file in names.items()} | {
+        "picture": path.with_name(f"{path.stem}-cases.png")
+    }
+
+
+def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
+    """The tables and the picture of an analysis beside the structural model."""
+    from ..plot import under_load  # needs the extra plot
+
+    paths = analysis_paths(path)
+    jobs: FileJobs = [
+        (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
+    ]
+    return [*jobs, (paths["picture"], partial(under_load, analysis))]
+
+
 def paint_families(path: Path, schedule: Panels, view: Any) -> None:
     """Draw panels, coloured by family."""
     from ..plot import families  # needs the extra plot
@@ -282,7 +312,14 @@ def paint_families(path: Path, schedule: Panels, view: Any) -> None:
     families(schedule, path, view=view)
 
 
-def paint(
+def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
+    """Draw the strips on the roof, coloured by the strain of the cloth."""
+    from ..plot import strains  # needs the extra plot
+
+    strains(pattern, path, view=view)
+
+
+def draw_picture(
     surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""

@@ -15,13 +15,16 @@ from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.files import PathLike, suffix_of
 from ..base.units import LENGTHS, Units, expect_length
+from ..cloth.settings import Pattern
+from ..cloth.sheets import SUFFIXES as PATTERNS
+from ..cloth.sheets import table_paths
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import FORMATS
 from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..plot.figure import SUFFIXES
 from ..plot.scene import VIEWS
 from ..report.document import SUFFIXES as REPORTS
-from ..structure.model import Structure
+from ..structure.section import Structure
 from ..surface import Surface
 
 PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of a mesh
@@ -30,6 +33,7 @@ WHEN = ("before", "after")
 COLOURS = ("patches", "curvature", "error", "reactions")
 CSV, INP = ".csv", ".inp"
 SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
+LISTS = ("files", "drawings", "pattern")  # keys of several files
 SECTION = TypeVar("SECTION")
 
 
@@ -150,6 +154,7 @@ class Output:
     tolerance : largest difference of edges in a family of panels; with it drawings and report have them.
     panel_sheets : whether drawings have each panel at true size; needs ``tolerance``.
     structure : the structural model, .inp; needs the section [structure].
+    pattern : files of the cutting pattern: .dxf, .pdf, .svg, .csv; needs the section [pattern].
     report : the report, .pdf; see ``pcmc report``.
     date : printed in the report, which reads no clock.
     """
@@ -166,6 +171,7 @@ class Output:
     tolerance: float | None = None
     panel_sheets: bool = False
     structure: PathLike | None = None
+    pattern: Sequence[PathLike] = ()
     report: PathLike | None = None
     date: str = ""
 
@@ -180,7 +186,9 @@ class Output:
         if self.panels is not None:
             suffix_of(self.panels, (CSV,), "a schedule of panels")
         if self.structure is not None:
-            check_model(self.structure)
+            suffix_of(self.structure, (INP,), "a structural model")
+        for file in self.pattern:
+            suffix_of(file, PATTERNS, "a cutting pattern")
         if self.report is not None:
             suffix_of(self.report, REPORTS, "a report")
         for name in ("panels", "panel_sheets"):
@@ -196,42 +204,43 @@ class Output:
     @property
     def documents(self) -> bool:
         """Whether there are any besides files and a picture."""
-        return bool(self.drawings) or {self.panels, self.structure, self.report} != {None}
+        return bool(self.drawings or self.pattern) or {self.panels, self.structure, self.report} != {None}
 
     @property
     def names(self) -> list[str]:
         """The names of the files, as they are given."""
         single = [getattr(self, name) for name in SINGLE]
-        return [str(name) for name in (*self.files, *self.drawings, *single) if name is not None]
+        return [
+            str(name) for name in (*self.files, *self.drawings, *self.pattern, *single) if name is not None
+        ]
 
     @property
     def paths(self) -> list[Path]:
         """All files that are known before the roof is; sheets as .svg get numbers."""
         others = schedule_paths(Path(self.panels))[1:] if self.panels is not None else []
+        others += [path for file in self.pattern for path in table_paths(Path(file))[1:]]
         return [Path(name) for name in self.names] + others
 
     def in_folder(self, folder: Path) -> Output:
         """The same output in a folder."""
         single = {name: folder / path for name in SINGLE if (path := getattr(self, name)) is not None}
-        lists: dict[str, Any] = {
-            name: [folder / path for path in getattr(self, name)] for name in ("files", "drawings")
-        }
+        lists: dict[str, Any] = {name: [folder / path for path in getattr(self, name)] for name in LISTS}
         return replace(self, **lists, **single)
 
-    def check(self, units: Units, structure: Structure | None) -> None:
-        """Refuse documents that need a unit of length or a [structure] which the project does not have."""
+    def check(self, units: Units, structure: Structure | None, pattern: Pattern | None) -> None:
+        """Refuse documents that need a unit of length or a section which the project does not have."""
         if self.drawings:
             expect_length(units.length, "a drawing")
+        if any(Path(file).suffix.lower() != CSV for file in self.pattern):
+            expect_length(units.length, "a cutting pattern")
+        if self.pattern and pattern is None:
+            text = "a cutting pattern needs the width of the cloth; add [pattern] with width, strips or seams"
+            raise OptionError(text, what="pattern", expected="a table")
         if self.report is not None:
             expect_length(units.length, "a report")
         if self.structure is not None and structure is None:
             text = "a structural model needs material and thickness; add [structure] with young and thickness"
             raise OptionError(text, what="structure", expected="a table")
-
-
-def check_model(path: PathLike) -> None:
-    """Refuse the name of a structural model that does not end with .inp."""
-    suffix_of(path, (INP,), "a structural model")
 
 
 def schedule_paths(path: Path) -> list[Path]:

@@ -17,6 +17,7 @@ from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
+from ..structure.calculix import expect_program
 from ..surface import Surface
 from .checking import in_file
 from .file import Project
@@ -33,20 +34,20 @@ Changed = Callable[[Surface], Surface]
 def solve_from_start(project: Project, report: OnStep, changed: Changed | None) -> Outcome:
     """Make the start shape of a project, and solve it; ``changed`` is applied to the start shape."""
     report("reading" if project.plan is None else "meshing the plan")
-    start = start_of(project)
-    project, surface, data = start.project, start.surface, start.data
-    if changed is not None:
-        surface, data = changed(surface), None
+    given = start_of(project)
+    start = given.changed(changed)
+    project, surface = start.project or project, start.surface
     _check_wishes(project, surface)
     solved = solve_project(project, surface, report)
     notes = [*solved.notes]
     if project.has_file:  # a drawing alone is proposed as a whole
         notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
-    if project.drawing is not None or data is not None:
+    if project.drawing is not None or start.data is not None:
         notes += metres_note(project.output.files, start.units.length)
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas and volumes are those of the part between the mirror planes")
-    outcome = replace(solved, notes=notes, units=start.units, unfold=project.output.whole, data=data)
+    about: dict[str, Any] = {"units": start.units, "unfold": start.unfold, "data": start.data}
+    outcome = replace(solved, notes=notes, **about)
     if outcome.good:
         return outcome
     notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
@@ -59,14 +60,19 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())
         return solve_project(plain, surface)
 
-    return replace(outcome, advice=advice(task, start.surface, surface, outcome, try_plan))
+    return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
 
 
 def _check_wishes(project: Project, surface: Surface) -> None:
     """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
     with in_file(project.path):
-        if project.output.structure is not None and project.structure is not None:
-            project.structure.check(surface)
+        structure, output = project.structure, project.output
+        if structure is not None and (output.structure is not None or structure.run):
+            structure.check(surface)
+        if structure is not None and structure.run and (output.structure or output.report):
+            expect_program()
+        if project.pattern is not None and output.pattern:
+            project.pattern.check(surface)
         if project.margin:
             from ..margins.varied import Varied  # takes long to import
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from .checking import in_file
 from .file import Project, load
+from .outcome import Outcome
 from .settings import BOUNDARY, GROUND, MeshFile
 
 if TYPE_CHECKING:
@@ -30,30 +31,21 @@ if TYPE_CHECKING:
 NEAR = 1e-6  # of the size: vertices this near to a line or to the lowest level are on it
 
 
-@dataclass(frozen=True, eq=False)
-class Start:
-    """The start shape of a project, before it is solved."""
-
-    surface: Surface
-    units: Units  # of its numbers
-    project: Project  # with the targets for the rise of a mesh, which its file does not name
-    data: MeshData | None = None  # all that the file of a mesh holds; None for a plan
-
-
-def start_of(project: Project) -> Start:
-    """The start shape of a project. Errors as in ``load``."""
+def start_of(project: Project) -> Outcome:
+    """The start shape of a project, not solved: its ``project`` also has the targets for the rise of a mesh.
+    Errors as in ``load``."""
     if project.mesh is not None:
         surface, data = read_mesh(project.path, project.mesh, project.units)
         units = Units(data.units.length, project.units.force or data.units.force)
         surface, targets, vary = first_tensions(surface, project.mesh)
         if targets:
             project = replace(project, targets=[*project.targets, *targets], vary=[*project.vary, *vary])
-        return Start(surface, units, project, data)
+        return Outcome.of(surface, units, project, data)
     assert project.plan is not None
     layers = {} if project.drawing is None else project.drawing.layers
     with in_file(project.path):
         try:
-            return Start(project.plan.surface(), project.units, project)
+            return Outcome.of(project.plan.surface(), project.units, project)
         except PlanError as error:
             if error.what not in layers:
                 raise

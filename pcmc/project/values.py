@@ -25,11 +25,12 @@ DIGITS = 12  # of the values written
 KEYS = {kind: field for kind, (parts, field) in KINDS.items() if parts == "patches"}
 LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
 NO_POINTS = ("axes", "weights", "radius")  # of a curve
+WEIGHT_KEYS = {"cable": "cable_weight", "tension": "weight"}  # of a cable, by the key of its tension
 USUAL = {"tension": 0.0, "pressure": 1.0, "weight": 0.0}  # of a patch where its table has none
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
-def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
+def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
     """The values of a surface that can be changed, by kind and name; points are [x, y, z].
 
     Not those that follow from others: pressures around rooms of given volume and of walls, snow of walls.
@@ -40,7 +41,7 @@ def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
         **(values := all_values(surface)),
         "pressures": {name: p for name, p in values["pressures"].items() if name not in computed},
         "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
-        "weights": {name: w for name, w in values["weights"].items() if w},
+        **{kind: {name: w for name, w in values[kind].items() if w} for kind in ("weights", "cable_weights")},
         "points": {f"point {k}": place for k, place in enumerate(points, 1)},
     }
 
@@ -81,12 +82,12 @@ def _by_name(surface: Surface) -> dict[Name, float]:
         for name, value in named.items()
         if kind != "pressures" or name not in computed
     }
-    for name, place in values_of(surface)["points"].items():
+    for name, place in changeable_values(surface)["points"].items():
         values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
     return values
 
 
-def with_values(
+def data_with_values(
     path: Path, given: Mapping[str, Any], asked: Surface, left: Collection[Name] = ()
 ) -> tuple[dict[str, Any], Project, Surface]:
     """The data of a project with the values of the surface ``asked``, the project, and its start shape.
@@ -98,7 +99,7 @@ def with_values(
     >>> from .file import read_data
     >>> data = read_data(path)[1]
     >>> asked = surface_of(project_of(path, data)).retensioned({"corner": 9.0})
-    >>> with_values(path, data, asked)[0]["plan"]["patches"]["corner"]["tension"]
+    >>> data_with_values(path, data, asked)[0]["plan"]["patches"]["corner"]["tension"]
     9.0
     """
     data: dict[str, Any] = deepcopy(dict(given))
@@ -175,7 +176,11 @@ class _Writer(NamedTuple):
     def write(self, values: Mapping[Name, float], shared: bool) -> None:
         """Write values; if ``shared``, one for all patches where all have the same."""
         walls = {p.name for p in self.asked.patches if p.wall}
-        lines = {key: value for key, value in values.items() if key[0] == "cables" or key[1] in walls}
+        lines = {
+            key: value
+            for key, value in values.items()
+            if key[0] in ("cables", "cable_weights") or key[1] in walls
+        }
         if lines:
             self.write_lines(lines)
         for kind in dict.fromkeys(kind for kind, _ in values):
@@ -193,7 +198,7 @@ class _Writer(NamedTuple):
     def write_points(self, names: Collection[str]) -> None:
         """Points that hold the roof, in all lines through them."""
         for name in names:
-            places = (values_of(surface)["points"][name] for surface in (self.start, self.asked))
+            places = (changeable_values(surface)["points"][name] for surface in (self.start, self.asked))
             old, new = (self.asked.plane.to_local(np.array([place]))[0] for place in places)
             for key in LINES & self.plan.keys():
                 self.plan[key] = _with_point(self.plan[key], old, [_number(x) for x in new.tolist()], key)
@@ -222,23 +227,23 @@ class _Writer(NamedTuple):
             table[key] = _number(value)
 
     def write_lines(self, wanted: Mapping[Name, float]) -> None:
-        """Tensions of walls and cables, in the lines of the plan that carry them."""
+        """Tensions of walls and cables, and weights of cables, in the lines of the plan that carry them."""
         assert self.project.plan is not None
         values, sources = _by_name(self.asked), sources_of(self.project.plan)
         for (kind, name), value in wanted.items():
-            source = sources.get((kind, name))
+            weighed = kind == "cable_weights"
+            source = sources.get(("cables" if weighed else kind, name))
             if source is None:
                 continue
-            parts = [key for key, other in sources.items() if other == source]
-            alike = all(abs(values[part] - value) <= SAME * abs(value) for part in parts)
-            if alike:
+            parts = [part for (_, part), other in sources.items() if other == source]
+            if all(abs(values[kind, part] - value) <= SAME * abs(value) for part in parts):
                 table = self.plan if source.where == "cable" else self.line(source)
-                table[source.key] = _number(value)
+                table[WEIGHT_KEYS[source.key] if weighed else source.key] = _number(value)
             elif source.where == "cable":
-                self.split_cables([part for _, part in parts], values)
+                self.split_cables(parts, values)
             else:
-                names = ", ".join(part for _, part in parts)
-                text = f"{names}: parts of one line, which has one tension in a project; give them the same"
+                text = f"{', '.join(parts)}: parts of one line, which has one"
+                text += f" {'weight' if weighed else 'tension'} in a project; give them the same"
                 raise OptionError(text, what=source.key, where=name, found=value)
 
     def split_cables(self, names: Collection[str], values: Mapping[Name, float]) -> None:
@@ -251,6 +256,7 @@ class _Writer(NamedTuple):
                 raise OptionError(text, what="cable", where=name)
             curve = [[float(f"{x:.9g}") for x in point] for point in tips.tolist()]
             line = {"name": name, "curve": curve, "tension": _number(values["cables", name])}
+            line |= {"weight": _number(w)} if (w := values["cable_weights", name]) else {}
             self.plan.setdefault("cables", []).append(line)
 
     def line(self, source: Source) -> dict[str, Any]:

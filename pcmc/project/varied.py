@@ -22,9 +22,11 @@ from ..base.files import PathLike, as_path, read_bytes
 from ..forces.rooms import refuse_varied_pressure
 from ..plan import Curve, Divider, Hole, Plan
 from ..surface import Plane, Surface
+from ..surface.surface import FIELDS
 from ..surface.values import KINDS, all_values
+from .cache import plain_bytes
 from .checking import in_file
-from .drawn import files_of, is_drawing
+from .drawn import files_of
 from .file import Project, is_project, project_of, read_data
 from .keys import WALL, main_sections, solve_section
 from .settings import MeshFile
@@ -45,12 +47,12 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     path : of a project (``.toml``), or of a surface, which has no keys.
     values : by the dotted name of a number that the file has or may have, such as ``plan.edge_length``; by
         ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall,
-        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of
-        a divider, a hole, a support or a named point of the plan: all of it is shifted by the value, so 0
-        leaves it where it is drawn. Numbers of the file are replaced, and lines are shifted, before the plan
-        is meshed, the others afterwards. Where several things have one name, put what is meant before it:
-        ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider 1``, ``wall 1``,
-        ``hole 1``, ``support 1``, …
+        ``NAME.tension`` and ``NAME.weight`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``,
+        ``NAME.y`` and ``NAME.z`` of a divider, a hole, a support or a named point of the plan: all of it is
+        shifted by the value, so 0 leaves it where it is drawn. Numbers of the file are replaced, and lines
+        are shifted, before the plan is meshed, the others afterwards. Where several things have one name, put
+        what is meant before it: ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider
+        1``, ``wall 1``, ``hole 1``, ``support 1``, …
 
     Raises
     ------
@@ -64,8 +66,9 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     (2, 9.0)
     """
     source = _Source.of(path)
-    start = start_of(source.project(values))
-    return start.project, source.loaded(start.surface, values)
+    project = source.project(values)
+    start = start_of(project)
+    return start.project or project, source.loaded(start.surface, values)
 
 
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
@@ -73,7 +76,7 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     source = _Source.of(path)
     project = source.project({})
     start = start_of(project) if project.mesh is not None else None
-    project = project if start is None else start.project
+    project = (start and start.project) or project
     found_by_search: dict[str, str] = {}  # with what each is
     for parameter in project.vary:
         cable, table = parameter.kind == "cable", "mesh" if project.plan is None else "plan"
@@ -112,7 +115,7 @@ class _Source(NamedTuple):
     def of(cls, path: PathLike) -> _Source:
         path = as_path(path)
         text, data = read_data(path) if is_project(path) else ("", {})
-        return cls(path, text, data, numbers(data) if data else {})
+        return cls(path, text, data, numbers_by_name(data) if data else {})
 
     def is_load(self, name: str) -> bool:
         """Whether a name is neither a number of the file nor a shift of a line of its plan."""
@@ -137,7 +140,11 @@ class _Source(NamedTuple):
 
     def loaded(self, surface: Surface, values: Mapping[str, float]) -> Surface:
         """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
-        known = {f"{CABLE}{cable.name}.tension": ("cables", cable.name) for cable in surface.cables}
+        known = {
+            f"{CABLE}{cable.name}.{KINDS[kind][1]}": (kind, cable.name)
+            for kind in ("cables", "cable_weights")
+            for cable in surface.cables
+        }
         for kind, named in reversed(all_values(surface).items()):  # a patch comes after a cable of its name
             known |= {f"{name}.{KINDS[kind][1]}": (kind, name) for name in named}
         given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
@@ -161,12 +168,12 @@ def with_loads(surface: Surface, given: Mapping[str, Mapping[str, float]]) -> Su
     return surface.retensioned(**given)
 
 
-def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
+def numbers_by_name(data: Mapping[str, Any]) -> dict[str, KeyPath]:
     """The numbers of a project: the dotted name of each, and its path in the data; then those it may have.
 
     Entries of a list are named by their key "name" if they have one, otherwise by their number from 1.
 
-    >>> list(numbers({"plan": {"edge": "free", "holes": [{"name": "yard", "cable": 2.0}, [3]]}}))[:3]
+    >>> list(numbers_by_name({"plan": {"edge": "free", "holes": [{"name": "yard", "cable": 2.0}, [3]]}}))[:3]
     ['plan.holes.yard.cable', 'plan.holes.2.1', 'plan.gap']
     """
     items: list[Item] = list(_items({**data, "solve": data.get("solve", {})}, (), ()))
@@ -247,18 +254,10 @@ def _moved(part: Any, by: Floats, plane: Plane) -> Any:
 def digest(path: PathLike) -> str:
     """SHA-256, hexadecimal, of a project with its drawing, or of the surface that any other file holds."""
     if is_project(path):
-        sha = hashlib.sha256(read_data(Path(path))[0].encode())
-        for drawing in files_of(path)[0 if is_drawing(Path(path)) else 1 :]:
+        text, _ = read_data(Path(path))
+        sha = hashlib.sha256(text.encode())
+        for drawing in files_of(path)[1 if text else 0 :]:
             sha.update(read_bytes(drawing))
         return sha.hexdigest()
     surface = io.read_bare(path)[0]
-    about = [list(map(vars, surface.patches)), surface.plane, surface.rooms]
-    sha = hashlib.sha256(repr(about).encode())
-    for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
-        sha.update(getattr(surface, name).tobytes())
-    sha.update(repr([curve.plain() for curve in surface.curves]).encode() if surface.curves else b"")
-    for cable in surface.cables:
-        sha.update(repr((cable.name, cable.tension, cable.weight)).encode() + cable.edges.tobytes())
-    for held, on in (*surface.on_planes, *surface.given_supports.on_line):
-        sha.update(repr(vars(held)).encode() + on.tobytes())
-    return sha.hexdigest()
+    return hashlib.sha256(plain_bytes([getattr(surface, name) for name in FIELDS])).hexdigest()

@@ -24,12 +24,14 @@ from ..surface import Surface, expect_surface
 from . import tables
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
+from .under_load import chapter
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
 SUFFIXES = (".pdf",)
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..structure import Analysis
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -52,6 +54,7 @@ class RoofReport:
     theorem: Statement | None = None
     targets: pd.DataFrame | None = None
     margins: Sequence[Statement] = ()
+    analysis: Analysis | None = None
     files: Mapping[str, str] = field(default_factory=dict)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -108,6 +111,8 @@ class RoofReport:
         elif self.mesh_failure:
             yield Heading("Mesh check")
             yield f"The mesh could not be checked: {self.mesh_failure}."
+        if self.analysis is not None:
+            yield from chapter(self.analysis, units)
         if self.schedule is not None:
             yield Heading("Panels", new_page=True)
             yield panel_text(self.schedule, units)
@@ -141,7 +146,8 @@ def roof_report(
     certificate, schedule, figures : of the surface, where they are known; otherwise computed.
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
-        of a ``Design``; ``margins``, a sentence each; ``files``, the name of each file and what it is.
+        of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``;
+        ``files``, the name of each file and what it is.
 
     Raises
     ------

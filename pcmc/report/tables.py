@@ -101,15 +101,15 @@ def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
     pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]
-    columns = _numbers(table, ["tension"], units.tension) | _numbers(table, pressures, units.pressure)
-    columns |= _numbers(table, ["area"], units.area)
-    columns |= _numbers(table, ["mean curvature"], f"1/{units.length}")
+    columns = columns_of(table, ["tension"], units.tension) | columns_of(table, pressures, units.pressure)
+    columns |= columns_of(table, ["area"], units.area)
+    columns |= columns_of(table, ["mean curvature"], f"1/{units.length}")
     columns["its largest error"] = map(small, table["variational_max"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
     kinds = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
-    return _table("Patches", {"patch": table["patch"], "kind": kinds}, columns)
+    return text_table("Patches", {"patch": table["patch"], "kind": kinds}, columns)
 
 
 def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
@@ -117,27 +117,27 @@ def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     table, force = certificate.junctions, units.force or "force"
     if len(table):
         words: Columns = {"": [f"J{k + 1}" for k in range(len(table))], "between": table["junction"]}
-        columns = _numbers(table, ["length", *MIDDLE], units.length)
+        columns = columns_of(table, ["length", *MIDDLE], units.length)
         columns[f"force left, {units.tension}"] = map(small, table["force_left"])
-        yield _table("Junctions", words, columns)
+        yield text_table("Junctions", words, columns)
     table = certificate.leaning
     if len(table):
         leans: Columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
-        columns = leans | _numbers(table, "xyz", units.length)
-        yield _table("Walls: the largest angle from the vertical", {"wall": table["wall"]}, columns)
+        columns = leans | columns_of(table, "xyz", units.length)
+        yield text_table("Walls: the largest angle from the vertical", {"wall": table["wall"]}, columns)
     table = certificate.supports
     if len(table):
         own = table["name"].where(table["name"] != table["support"], "")
-        columns = _numbers(table, "xyz", units.length)
+        columns = columns_of(table, "xyz", units.length)
         columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
-        columns |= _vectors(table, "force", "R", force)
+        columns |= vectors_of(table, "force", "R", force)
         columns[f"largest, {units.tension}"] = column(table["per_length_max"])
         words = {"": table["support"], "of": own, "kind": table["kind"]}
-        yield _table("Supports and their reactions", words, columns)
+        yield text_table("Supports and their reactions", words, columns)
         balance = certificate.balance
-        columns = _vectors(balance, "force", "F", force)
-        columns |= _vectors(balance, "moment", "M", f"{force}·{units.length}")
-        yield _table("Balance", {"": balance["of"]}, columns)
+        columns = vectors_of(balance, "force", "F", force)
+        columns |= vectors_of(balance, "moment", "M", f"{force}·{units.length}")
+        yield text_table("Balance", {"": balance["of"]}, columns)
 
 
 def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
@@ -145,21 +145,23 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     table, force = certificate.cables, units.force or "force"
     if len(table):
         columns: Columns = {f"force, {force}": column(table["tension"])}
-        columns |= _numbers(table, ["length", *MIDDLE], units.length)
-        yield _table("Cables", {"cable": table["cable"]}, columns)
+        if "weight" in table:
+            columns |= columns_of(table, ["weight"], units.tension)
+        columns |= columns_of(table, ["length", *MIDDLE], units.length)
+        yield text_table("Cables", {"cable": table["cable"]}, columns)
     table = certificate.cable_ends
     if len(table):
         words: Columns = {
             "cable": table["cable"],
             "end": ["held" if held else "free" for held in table["held"]],
         }
-        columns = _numbers(table, "xyz", units.length) | _vectors(table, "force", "F", force)
-        yield _table("Ends of cables, and the forces on them", words, columns)
+        columns = columns_of(table, "xyz", units.length) | vectors_of(table, "force", "F", force)
+        yield text_table("Ends of cables, and the forces on them", words, columns)
     table = certificate.rooms
     if len(table):
-        columns = _numbers(table, ["volume", "prescribed"], units.volume)
-        columns |= _numbers(table, ["pressure"], units.pressure)
-        yield _table("Rooms of prescribed volume", {"room": table["room"]}, columns)
+        columns = columns_of(table, ["volume", "prescribed"], units.volume)
+        columns |= columns_of(table, ["pressure"], units.pressure)
+        yield text_table("Rooms of prescribed volume", {"room": table["room"]}, columns)
 
 
 def target_table(targets: pd.DataFrame, units: Units) -> Table:
@@ -170,7 +172,7 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
         "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
         "met": ["yes" if met else "no" for met in targets["met"]],
     }
-    return _table("Targets", {"quantity": targets.index}, columns)
+    return text_table("Targets", {"quantity": targets.index}, columns)
 
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
@@ -183,31 +185,31 @@ def mesh_table(check: MeshCheck, units: Units) -> Table:
         "its error bar": map(_bar, table["limit_error"]),
         "unit": [units.behind(dimension_of(quantity)).strip() for quantity in table["quantity"]],
     }
-    return _table("", {"quantity": table["quantity"], "of": table["of"]}, columns)
+    return text_table("", {"quantity": table["quantity"], "of": table["of"]}, columns)
 
 
 def family_table(schedule: Panels, units: Units) -> Table:
     """The first families of panels, the largest first."""
     table = schedule.families.head(MOST_FAMILIES)
     columns: Columns = {"panels": table["count"], "turned over": table["mirrored"]}
-    columns |= _numbers(table, "abc", units.length) | _numbers(table, ["area"], units.area)
-    return _table("", {"family": [f"F{k}" for k in table["family"]]}, columns)
+    columns |= columns_of(table, "abc", units.length) | columns_of(table, ["area"], units.area)
+    return text_table("", {"family": [f"F{k}" for k in table["family"]]}, columns)
 
 
-def _table(title: str, words: Columns, columns: Columns) -> Table:
+def text_table(title: str, words: Columns, columns: Columns) -> Table:
     """A table of columns of texts, those of ``words`` first."""
     every = words | columns
     return Table(title, [*every], [[*map(str, row)] for row in zip(*every.values(), strict=True)], len(words))
 
 
-def _vectors(table: pd.DataFrame, kind: str, letter: str, unit: str) -> Columns:
+def vectors_of(table: pd.DataFrame, kind: str, letter: str, unit: str) -> Columns:
     """Columns of vectors, with the decimals of their largest component."""
     numbers = table[[f"{kind}_{axis}" for axis in "xyz"]].to_numpy(float)
     texts = np.array(column(numbers.ravel())).reshape(-1, 3).T
     return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
-def _numbers(table: pd.DataFrame, keys: Iterable[str], unit: str) -> Columns:
+def columns_of(table: pd.DataFrame, keys: Iterable[str], unit: str) -> Columns:
     return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key in keys}
 
 

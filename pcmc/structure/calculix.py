@@ -6,14 +6,16 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..base.errors import PcmcError
-from .inp import write_structure
+from ..base.errors import FileError, PcmcError
+from ..base.files import writing
+from .inp import text_of, write_structure
+from .loads import Step
 from .model import StructuralModel
-from .results import StepResults, read_results
+from .results import StepResults, read_results, read_steps
 
 PROGRAM = "ccx"
 MISSING = (
@@ -22,8 +24,15 @@ MISSING = (
 )
 
 
+NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum")  # in what the program prints
+
+
 class CalculixError(PcmcError):
     """The program is absent, took too long, or did not come to an end."""
+
+
+class NotConverged(CalculixError):
+    """The program found no equilibrium under all of the loads."""
 
 
 def available() -> bool:
@@ -48,6 +57,34 @@ def run(
         write_structure(path, model)
         run_file(path, timeout)
         return read_results(path.with_suffix(suffix), model)
+
+
+def run_as_far(
+    model: StructuralModel, steps: Sequence[Step], timeout: float | None = None
+) -> tuple[StepResults, ...]:
+    """The results of these steps of a model, as far as the program finds equilibria; see ``read_steps``.
+
+    CalculixError where it finds none even for the first of them, the form-finding load.
+    """
+    with folder_for_input() as path:
+        with writing(path):
+            path.write_text(text_of(model, steps, every=True), encoding="utf-8", newline="\n")
+        try:
+            run_file(path, timeout)
+        except NotConverged:
+            pass
+        except CalculixError as error:
+            if not path.with_suffix(".dat").exists() or "within" in str(error):
+                raise
+        try:
+            found = read_steps(path.with_suffix(".dat"), model, steps)
+        except FileError as error:
+            text = str(error).removeprefix(f"{path.with_suffix('.dat')}: ")
+            raise CalculixError(f"{PROGRAM}: the results of step {steps[0].name!r}: {text}") from None
+    if not found or found[0].share < 1.0:
+        text = f"{PROGRAM} finds no equilibrium under the form-finding load alone; is the surface certified?"
+        raise CalculixError(text, what=steps[0].name)
+    return found
 
 
 @contextmanager
@@ -82,5 +119,6 @@ def run_file(path: Path, timeout: float | None = None) -> str:
         raise CalculixError(f"{PROGRAM} did not finish within {timeout:g} s") from None
     if "Job finished" not in done.stdout:
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
-        raise CalculixError(f"{PROGRAM}: {'; '.join(errors) or f'it stopped, code {done.returncode}'}")
+        stopped = NotConverged if any(text in done.stdout for text in NOT_CONVERGED) else CalculixError
+        raise stopped(f"{PROGRAM}: {'; '.join(errors) or f'it stopped, code {done.returncode}'}")
     return done.stdout

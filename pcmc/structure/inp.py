@@ -5,7 +5,8 @@ trusses: a beam would bend beside a held end over a length √(EI/τ), for a thi
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ POINTS, CABLE_POINTS = 2, 8  # integration points: one above the other; a truss 
 FIELD = "%.12e"  # the longest number that fits into a field of 20 characters
 LONGEST = 200  # characters of a comment
 INCREMENT = 0.25  # of a step under added loads; it is halved where the equations do not converge
+LEAST_INCREMENT = 1e-3  # where that does not help the analysis stops: the share of the load is known so well
 KINDS = {"membrane": ("M3D3", "MEMBRANE", "P1"), "shell": ("S3", "SHELL", "P")}
 """Elements by the words of the file: their type, their section, a pressure along their normal."""
 
@@ -42,26 +44,33 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     check_name(path)
     suffix_of(path, (".inp",), "a structural model")
     expect_model(model)
-    text = "".join(_sections(model))
+    text = text_of(model, model.steps)
     with writing(path), atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _sections(model: StructuralModel) -> Iterator[str]:
+def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) -> str:
+    """The input file of a model under these steps, the form-finding load first; with ``every`` it prints the
+    results of each increment, and writes none for viewers.
+    """
+    return "".join(_sections(model, steps, every))
+
+
+def _sections(model: StructuralModel, steps: Sequence[Step], every: bool) -> Iterator[str]:
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
     yield f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"
     yield f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")
     yield from (f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1))
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
     yield from (f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports)
-    yield from (f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(model.steps, 1))
+    yield from (f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1))
     yield "*NODE, NSET=NALL\n"
     yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)
     yield from _elements(model)
     yield from _supports(model)
     yield from _prestress(model)
-    for k, step in enumerate(model.steps):
-        yield from _step(model, step, form=k == 0)
+    for k, step in enumerate(steps):
+        yield from _step(model, step, k == 0, every)
 
 
 def _elements(model: StructuralModel) -> Iterator[str]:
@@ -69,15 +78,25 @@ def _elements(model: StructuralModel) -> Iterator[str]:
     surface, (name, section, _) = model.standing, KINDS[model.elements]
     patch_of = surface.patch_of_face[model.active]
     present = np.unique(patch_of) + 1
+    materials = list(dict.fromkeys(model.materials[k - 1] for k in present))
     for k, thickness in zip(present, model.thicknesses[present - 1].tolist(), strict=True):
         mine = patch_of == k - 1
         corners = surface.faces[model.active[mine]]
         yield f"*ELEMENT, TYPE={name}, ELSET=PATCH_{k}\n"
         yield format_rows("%d,%d,%d,%d\n", model.faces[mine] + 1, *(corners.T + 1))
         yield _set(f"NODES_{k}", np.unique(corners))
-        yield f"*{section} SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{short(thickness)}\n"
+        of = f"MATERIAL=MEMBRANE_{materials.index(model.materials[k - 1]) + 1}"
+        if not model.materials[k - 1].cloth:
+            yield f"*{section} SECTION, ELSET=PATCH_{k}, {of}\n{short(thickness)}\n"
+            continue
+        axes, which = np.unique(model.warps(k - 1).reshape(-1, 6).round(9) + 0.0, axis=0, return_inverse=True)
+        for a, row in enumerate(axes):
+            one = f"WARP_{k}_{a + 1}"
+            yield f"*ORIENTATION, NAME={one}, SYSTEM=RECTANGULAR\n{','.join(map(short, row))}\n"
+            yield _set(one, model.faces[mine][which.ravel() == a], "ELSET")
+            yield f"*{section} SECTION, ELSET={one}, {of}, ORIENTATION={one}\n{short(thickness)}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
-    yield _material("MEMBRANE", model.material)
+    yield from (_material(f"MEMBRANE_{k}", material) for k, material in enumerate(materials, 1))
 
     if not surface.cables:
         return
@@ -86,11 +105,17 @@ def _elements(model: StructuralModel) -> Iterator[str]:
         yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))
         yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE\n{short(area)}\n"
     yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(model.cable_areas)))
-    yield _material("CABLE", model.cable_material or model.material)
+    yield _material("CABLE", replace(model.material_of_cables, weft=None, shear=None))
 
 
 def _material(name: str, material: Material) -> str:
-    text = f"*MATERIAL, NAME={name}\n*ELASTIC\n{short(material.young)},{short(material.poisson)}\n"
+    """Of a cloth the numbers across its plane do not act: the stress there is 0."""
+    text, E, v = f"*MATERIAL, NAME={name}\n*ELASTIC", short(material.young), short(material.poisson)
+    if material.weft is None or material.shear is None:
+        text += f"\n{E},{v}\n"
+    else:
+        F, G = short(material.weft), short(material.shear)
+        text += f", TYPE=ENGINEERING CONSTANTS\n{E},{F},{F},{v},0.,0.,{G},{G},\n{G}\n"
     return text + (f"*DENSITY\n{short(material.density)}\n" if material.density > 0.0 else "")
 
 
@@ -134,17 +159,30 @@ def _stresses(elements: Ints, stress: Floats, points: int) -> str:
     return format_rows("%d,%d" + f",{FIELD}" * 6 + "\n", np.repeat(elements, points), point, *values.T)
 
 
-def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
+def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterator[str]:
     """A step of the analysis, with all loads that act at its end."""
-    yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n{1.0 if form else INCREMENT},1.\n"
+    yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n"
+    yield f"{1.0 if form else INCREMENT},1.,{LEAST_INCREMENT},1.\n"
     sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)
-    label, pressures = KINDS[model.elements][2], step.pressures
-    patches = np.unique(model.standing.patch_of_face[model.active])
-    rows = [f"PATCH_{k + 1},{label},{short(pressures[k])}\n" for k in patches if pressures[k] != 0.0]
+    label, pressures = KINDS[model.elements][2], step.pressures[model.active]
+    patch_of, rows = model.standing.patch_of_face[model.active], list[str]()
+    for k in np.unique(patch_of):
+        mine = np.flatnonzero(patch_of == k)
+        values = pressures[mine]
+        if (values == values[0]).all():
+            mine, names = mine[:1], [f"PATCH_{k + 1}"]
+        else:
+            names = (model.faces[mine] + 1).astype(str).tolist()
+        rows += [f"{n},{label},{short(p)}\n" for n, p in zip(names, pressures[mine], strict=True) if p]
     if step.gravity:
         down = ",".join(short(-c) for c in model.standing.plane.normal)
-        rows += [f"{name},GRAV,{short(step.gravity)},{down}\n" for name in sets]
-    yield "".join(["*DLOAD, OP=NEW\n", *rows] if rows else [])
+        heavy = {f"PATCH_{k + 1}": model.materials[k].density for k in np.unique(patch_of)}
+        heavy = {"EALL": 1.0} if all(heavy.values()) else heavy
+        heavy |= dict.fromkeys(sets[1:], model.material_of_cables.density)
+        rows += [f"{name},GRAV,{short(step.gravity)},{down}\n" for name, dense in heavy.items() if dense]
+    if not rows:  # without a line the loads of the step before would stay
+        rows = [f"EALL,{label},0.\n"]
+    yield "".join(["*DLOAD, OP=NEW\n", *rows])
     forces = np.einsum("nij,nj->ni", model.axes, step.forces)
     vertex, axis = np.nonzero(forces * model.nodes[:, None])
     if len(vertex):
@@ -152,17 +190,20 @@ def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
         yield format_rows(f"%d,%d,{FIELD}\n", vertex + 1, axis + 1, forces[vertex, axis])
     elif not form:
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
+    often = 1 if every else 1000
     printed = [("NODE", "NSET=NALL", "U"), *([("NODE", "NSET=HELD", "RF")] if model.held.any() else [])]
     for kind, name, what in (*printed, *(("EL", f"ELSET={name}", "S") for name in sets)):
-        yield f"*{kind} PRINT, {name}, GLOBAL=YES, FREQUENCY=1000\n{what}\n"
-    yield "*NODE FILE, OUTPUT=2D, GLOBAL=YES, FREQUENCY=1000\nU,RF\n*EL FILE, OUTPUT=2D, GLOBAL=YES\nS\n"
+        yield f"*{kind} PRINT, {name}, GLOBAL=YES, FREQUENCY={often}\n{what}\n"
+    if not every:
+        yield "*NODE FILE, OUTPUT=2D, GLOBAL=YES, FREQUENCY=1000\nU,RF\n*EL FILE, OUTPUT=2D, GLOBAL=YES\nS\n"
     yield "*END STEP\n"
 
 
-def _set(name: str, vertices: Ints) -> str:
-    numbers = (np.asarray(vertices) + 1).astype(str)
+def _set(name: str, members: Ints, kind: str = "NSET") -> str:
+    """A set of vertices or faces, whose numbers are one more."""
+    numbers = (np.asarray(members) + 1).astype(str)
     rows = [",".join(numbers[k : k + PER_LINE]) + "\n" for k in range(0, len(numbers), PER_LINE)]
-    return "".join([f"*NSET, NSET={name}\n", *rows] if rows else [])
+    return "".join([f"*{kind}, {kind}={name}\n", *rows] if rows else [])
 
 
 def short(value: float) -> str:

@@ -1,19 +1,23 @@
-"""Loads on a structural model, and the steps that they make."""
+"""Loads on a structural model, the steps that they make, and combinations of these with factors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
+from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 
 GRAVITY = 9.81  # m/s²
+FORM = "form"  # what combinations call the form-finding load
+STEEPEST = 180.0  # degrees: a face that looks down
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +25,18 @@ class Step:
     """All loads at the end of a step of the analysis."""
 
     name: str  # "form pressure" ("… less snow", where the form was found under snow), or those of its loads
-    pressures: Floats  # (k,) force per area on each patch along its normal: the form's, net of snow, and wind
+    pressures: Floats  # (m,) force per area on each face along its normal: the form's, net of snow, and wind
     forces: Floats  # (n,3) forces on the vertices that keep their direction
     gravity: float = 0.0  # length/time², 0 without self-weight
+
+    def plus(self, last: Step, first: Step, factor: float) -> Step:
+        """This step and ``factor`` times what ``last`` has more than ``first``: loads add up."""
+        return replace(
+            self,
+            pressures=self.pressures + factor * (last.pressures - first.pressures),
+            forces=self.forces + factor * (last.forces - first.forces),
+            gravity=self.gravity + factor * (last.gravity - first.gravity),
+        )
 
 
 @dataclass(frozen=True)
@@ -53,12 +66,19 @@ class Snow:
     load: float  # s, force per area of the plan; negative for a lift
     patches: Sequence[str] = ()  # names of those that carry it; by default all that are not walls
     name: str = "snow"  # of its step
+    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies where the slope is between these
+    area: Sequence[Sequence[float]] = ()  # points [x, y]: it lies within their polygon; empty: everywhere
+    slides: Sequence[
+        float
+    ] = ()  # degrees: whole up to the first slope, none from the second on; linear between
 
     def __post_init__(self) -> None:
         load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
-        vars(self).update(load=load, patches=tuple(self.patches))
+        vars(self).update(load=load, patches=tuple(self.patches), **_checked_zone("Snow", self))
+        if self.slides:
+            vars(self)["slides"] = _checked_slopes("Snow.slides", self.slides)
         _check_name(self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
@@ -72,7 +92,10 @@ class Snow:
         plan = area_vectors(surface.vertices[surface.faces]) @ normal
         side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
         plan = np.maximum(plan * side[surface.patch_of_face], 0.0)
-        plan[~np.isin(surface.patch_of_face, carrying)] = 0.0
+        plan[~(np.isin(surface.patch_of_face, carrying) & _in_zone(self, surface))] = 0.0
+        if self.slides:
+            whole, none = self.slides
+            plan *= np.clip((none - slopes(surface)) / (none - whole), 0.0, 1.0)
         snow = -self.load / 3.0 * vertex_sums(plan[:, None] * normal, surface.faces, surface.n)
         return replace(step, forces=step.forces + snow)
 
@@ -87,6 +110,8 @@ class Wind:
 
     pressures: Mapping[str, float]  # force per area by patch name
     name: str = "wind"  # of its step
+    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it acts where the slope is between these
+    area: Sequence[Sequence[float]] = ()  # points [x, y]: it acts within their polygon; empty: everywhere
 
     def __post_init__(self) -> None:
         if not isinstance(self.pressures, Mapping) or not self.pressures:
@@ -96,7 +121,7 @@ class Wind:
             zone: validate.number("Wind.pressures", value, least=-LARGEST, most=LARGEST, where=str(zone))
             for zone, value in self.pressures.items()
         }
-        object.__setattr__(self, "pressures", checked)
+        vars(self).update(pressures=checked, **_checked_zone("Wind", self))
         _check_name(self.name)
 
     @property
@@ -104,28 +129,39 @@ class Wind:
         return tuple(self.pressures)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
-        pressures = step.pressures.copy()
+        by_patch = np.zeros(len(surface.patches))
         for zone, value in self.pressures.items():
-            pressures[surface.patch_index(zone)] += value
-        return replace(step, pressures=pressures)
+            by_patch[surface.patch_index(zone)] = value
+        more = np.where(_in_zone(self, surface), by_patch[surface.patch_of_face], 0.0)
+        return replace(step, pressures=step.pressures + more)
 
 
 Load = SelfWeight | Snow | Wind
 
 
 def load_steps(
-    surface: Surface, loads: Sequence[Load | Sequence[Load]], gravity: float = GRAVITY
+    surface: Surface,
+    loads: Sequence[Load | Sequence[Load]],
+    gravity: float = GRAVITY,
+    combinations: Mapping[str, Mapping[str, float]] | None = None,
 ) -> tuple[Step, ...]:
-    """The form-finding load first, then a step for each load; loads in one tuple act together.
+    """The form-finding load first, then a step for each load, and one for each combination; loads in one
+    tuple act together.
+
+    A combination is Σ f L of the loads L of the steps that it names, with their factors f. The form-finding
+    load and self-weight act in it with the factor 1 where it does not name them.
 
     ``gravity`` is that of self-weight where it has none of its own, length/time².
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
     ...                  [0, 0], [Patch("roof", 1.0)], fixed=range(4))
-    >>> form, both = load_steps(square, [(Snow(0.5), Wind({"roof": 2.0}))])
+    >>> loads = [(Snow(0.5), Wind({"roof": 2.0}))]
+    >>> form, both, uls = load_steps(square, loads, combinations={"uls": {"snow and wind": 1.5}})
     >>> both.name, both.pressures.tolist(), both.forces.sum(axis=0).round(9).tolist()
-    ('snow and wind', [3.0], [0.0, 0.0, -2.0])
+    ('snow and wind', [3.0, 3.0], [0.0, 0.0, -2.0])
+    >>> uls.pressures.tolist(), uls.forces.sum(axis=0).round(9).tolist()
+    ([4.0, 4.0], [0.0, 0.0, -3.0])
     """
     per_face = surface.weights[surface.patch_of_face] * face_areas(surface.vertices[surface.faces])
     downwards = -np.array(surface.plane.normal) / 3.0
@@ -134,20 +170,39 @@ def load_steps(
     per_edge = 1.5 * per_length * segment_lengths(surface.vertices, ends)
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
-    permanent = Step(name, surface.net_pressures, weight)
-    steps = [permanent]
+    form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
+    empty = nothing(form)
+    steps, added = [form], {FORM: (form, empty)}
+    always = {FORM: 1.0}
     for together in map(acting_together, loads):
-        step = replace(permanent, name=" and ".join(load.name for load in together))
+        step = replace(permanent, name=step_name(together))
         for load in together:
             step = load.added_to(step, surface, gravity)
         steps.append(step)
+        added[step.name] = step, permanent
+        always |= {step.name: 1.0} if all(isinstance(load, SelfWeight) for load in together) else {}
         permanent = replace(permanent, gravity=step.gravity)
+    for name, factors in (combinations or {}).items():
+        sum_ = replace(empty, name=name)
+        for case, factor in (always | dict(factors)).items():
+            sum_ = sum_.plus(*added[case], factor)
+        steps.append(sum_)
     return tuple(steps)
+
+
+def nothing(step: Step) -> Step:
+    """A step without loads, of the same surface."""
+    return Step("nothing", np.zeros_like(step.pressures), np.zeros_like(step.forces))
 
 
 def acting_together(entry: Load | Sequence[Load]) -> tuple[Load, ...]:
     """The loads of one step: those of a tuple, or a single one."""
     return entry if isinstance(entry, tuple) else (entry,)
+
+
+def step_name(together: Sequence[Load]) -> str:
+    """The name of the step of loads that act together: that of each, once."""
+    return " and ".join(dict.fromkeys(load.name for load in together))
 
 
 def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
@@ -162,6 +217,89 @@ def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
     return tuple(loads)
+
+
+def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) -> dict[str, dict[str, float]]:
+    """Factors by the names of steps, by the name of each combination; every step named is there."""
+    steps = [step_name(acting_together(entry)) for entry in loads]
+    if not isinstance(given, Mapping):
+        validate.refuse("combinations", given, "factors by name, such as {'uls': {'snow': 1.5}}")
+    for name in set(steps) if given else ():
+        if steps.count(name) > 1 or name == FORM:
+            text = f"combinations: two cases are called {name!r}; give each a name of its own"
+            raise OptionError(text, what="combinations", found=name)
+    checked: dict[str, dict[str, float]] = {}
+    for name, factors in given.items():
+        _check_name(name)
+        if name in (*steps, FORM):
+            text = f"combination {name!r}: a case has this name; give the combination another one"
+            raise OptionError(text, what="combinations", found=name)
+        if not isinstance(factors, Mapping) or not factors:
+            validate.refuse("combinations", factors, "factors by name, such as {snow = 1.5}", where=name)
+        for case in factors:
+            if case not in (FORM, *steps):
+                text = f"combination {name!r}: {unknown('case', case, [FORM, *steps])}"
+                raise OptionError(text, what="combinations", where=name, found=case)
+        limits: dict[str, Any] = {"least": -1e3, "most": 1e3}
+        checked[name] = {c: validate.number("factor", f, where=c, **limits) for c, f in factors.items()}
+    return checked
+
+
+def slopes(surface: Surface) -> Floats:
+    """(m,) the angle between each face and Π, degrees: 90 if it is upright, above 90 if it overhangs.
+
+    The side of a patch that looks away from Π is the one of the larger part of its plan.
+    """
+    area = area_vectors(surface.vertices[surface.faces])
+    plan = area @ np.array(surface.plane.normal)
+    side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
+    up = plan * side[surface.patch_of_face] / np.linalg.norm(area, axis=1)
+    return np.asarray(np.degrees(np.arccos(np.clip(up, -1.0, 1.0))))
+
+
+def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
+    """(m,) the faces whose slope is a load's, and whose middle is in its area."""
+    least, most = load.slopes
+    slope = slopes(surface)
+    chosen: Bools = (slope >= least - 1e-9) & (slope <= most + 1e-9)
+    if len(load.area):
+        x, y = surface.vertices[surface.faces].mean(axis=1)[:, :2].T
+        odd = np.zeros(surface.m, dtype=bool)
+        corners = np.array(load.area, dtype=float)
+        for (a, b), (c, d) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            crossed = (b > y) != (d > y)  # by the line from the point along x
+            with np.errstate(divide="ignore", invalid="ignore"):
+                odd ^= crossed & (x < a + (y - b) * (c - a) / (d - b))
+        chosen = chosen & odd
+    if not chosen.any():
+        text = f"{load.name}: no triangle has its middle in the area and its slope in {[least, most]}"
+        raise OptionError(f"{text}; check the zone", what=load.name)
+    return chosen
+
+
+def _checked_zone(kind: str, load: Snow | Wind) -> dict[str, Any]:
+    """Slopes and area of a load, as tuples of numbers."""
+    area = load.area
+    try:
+        points = np.array(area, dtype=float).reshape(-1, 2) if len(area) else np.empty((0, 2))
+        good = not len(area) or (len(points) >= 3 and np.shape(area) == points.shape)
+        good = good and bool(np.isfinite(points).all())
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        validate.refuse(f"{kind}.area", area, "three or more points [x, y]")
+    corners = tuple(map(tuple, points.tolist()))
+    return {"slopes": _checked_slopes(f"{kind}.slopes", load.slopes), "area": corners}
+
+
+def _checked_slopes(what: str, given: Any) -> tuple[float, float]:
+    try:
+        least, most = (validate.number(what, value, least=0.0, most=STEEPEST) for value in given)
+    except (TypeError, ValueError):
+        validate.refuse(what, given, "two slopes in degrees, 0 to 180, such as [0, 30]")
+    if not least < most:
+        validate.refuse(what, given, "two slopes in degrees, the smaller one first")
+    return least, most
 
 
 def _check_name(name: object) -> None:

@@ -13,7 +13,6 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units, length_factor
-from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..forces.cables import directions
 from ..forces.pinching import standing_part
@@ -23,35 +22,66 @@ from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports
-from .loads import GRAVITY, Load, SelfWeight, Snow, Step, Wind, acting_together, check_loads, load_steps
+from .gas import Gas
+from .loads import (
+    GRAVITY,
+    Load,
+    SelfWeight,
+    Step,
+    acting_together,
+    check_combinations,
+    check_loads,
+    load_steps,
+)
 
+ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
 
 
 @dataclass(frozen=True)
 class Material:
-    """A linear elastic, isotropic material.
+    """A linear elastic material: isotropic, or a cloth with a warp and a weft.
 
     Parameters
     ----------
-    young : E > 0, force per area.
-    poisson : ν, 0 ≤ ν < 0.5.
+    young : E > 0, force per area; of a cloth along its warp.
+    poisson : ν, 0 ≤ ν < 0.5; of a cloth the contraction along the weft under tension along the warp.
     density : ρ ≥ 0, mass per volume, in the mass that a unit of force accelerates by a unit of length per
         s²: t/m³ with kN and m, t/mm³ with N and mm, slug/ft³ with lbf and ft.
+    weft, shear : of a cloth: E along the weft, and the shear modulus G, force per area; without them the
+        material is isotropic. Its stiffness needs ν² weft < young.
+    warp : of a cloth: a direction in space; in each triangle the warp is its projection onto the plane.
 
     >>> Material(young=1e6)
-    Material(young=1000000.0, poisson=0.3, density=0.0)
+    Material(young=1000000.0, poisson=0.3, density=0.0, weft=None, shear=None, warp=(1.0, 0.0, 0.0))
     """
 
     young: float
     poisson: float = 0.3
     density: float = 0.0
+    weft: float | None = None
+    shear: float | None = None
+    warp: Sequence[float] = (1.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         most: dict[str, Any] = {"most": LARGEST}
-        limits = {"young": {"least": SMALLEST, **most}, "poisson": {"least": 0.0, "below": 0.5}}
-        for name, bounds in (limits | {"density": {"least": 0.0, **most}}).items():
+        stiff = {"least": SMALLEST, **most}
+        limits = {"young": stiff, "poisson": {"least": 0.0, "below": 0.5}, "density": {"least": 0.0, **most}}
+        if (self.weft is None) != (self.shear is None):
+            missing = "shear" if self.shear is None else "weft"
+            text = f"Material.{missing} is missing: a cloth needs young, weft and shear"
+            raise OptionError(text, what=f"Material.{missing}")
+        for name, bounds in (limits | ({"weft": stiff, "shear": stiff} if self.cloth else {})).items():
             vars(self)[name] = validate.number(f"Material.{name}", getattr(self, name), **bounds)
+        if self.weft is not None and self.poisson**2 * self.weft >= self.young:
+            text = f"Material.weft: expected less than young/poisson² = {self.young / self.poisson**2:.4g}"
+            raise OptionError(f"{text}, found {self.weft:g}", what="Material.weft", found=self.weft)
+        vars(self)["warp"] = validate.vector("Material.warp", self.warp)
+
+    @property
+    def cloth(self) -> bool:
+        """Whether it has a warp and a weft."""
+        return self.weft is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +91,7 @@ class StructuralModel:
     Parameters
     ----------
     surface : a certified surface, or the result of a solver.
-    material : of all patches.
+    material : of all patches, or one for each, by name.
     thickness : t > 0, length, or one for each patch, by name.
     loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
         the first step and acts in all others, too, as self-weight does once it has come.
@@ -72,6 +102,10 @@ class StructuralModel:
     cable_material, certificate : by default those of the patches, and the one of the surface.
     units : of the numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it is not
         given. Without a unit of length that takes metres.
+    combinations : sums of the loads with factors: by the name of each combination the factors by the names
+        of the steps, and "form" for the form-finding load, such as {"uls": {"form": 1, "snow": 1.5}}. Each
+        is one more step. The form-finding load and self-weight have the factor 1 where they are not named.
+    gas : what is enclosed and changes its pressure with its volume; see ``Gas``. ``analyse`` finds it.
 
     Raises
     ------
@@ -90,7 +124,7 @@ class StructuralModel:
     """
 
     surface: Surface
-    material: Material
+    material: Material | Mapping[str, Material]
     thickness: float | Mapping[str, float]
     loads: Sequence[Load | tuple[Load, ...]] = ()
     anyway: bool = False
@@ -99,21 +133,32 @@ class StructuralModel:
     cable_material: Material | None = None
     certificate: Any = field(default=None, repr=False)
     units: Units = NO_UNITS
+    combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    gas: Gas | None = None
 
     def __post_init__(self) -> None:
         solved: Any = self.surface  # or a surface, which has neither of these
         surface = getattr(solved, "surface", solved)
         expect_surface(surface)
-        if not isinstance(self.material, Material):
-            hint = "give Material(young=..., poisson=...)"
-            validate.refuse("material", self.material, "a Material", hint=hint)
+        hint = "give Material(young=..., poisson=...)"
+        for name, material in _each(self.material, surface.patches, "patch"):
+            if not isinstance(material, Material):
+                where = name if isinstance(self.material, Mapping) else None
+                validate.refuse("material", material, "a Material", where, hint)
         thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
         checked_areas(self.cable_area, surface)
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
+        if self.cable_material is None and surface.cables and isinstance(self.material, Mapping):
+            validate.refuse("cable_material", None, "a Material, as the patches have several", hint=hint)
         vars(self).update(surface=surface, thickness=thickness, loads=check_loads(self.loads, surface))
-        if self.material.density == 0.0 and self.weights:
+        vars(self)["combinations"] = check_combinations(self.combinations, self.loads)
+        if not isinstance(self.gas, Gas | None):
+            validate.refuse("gas", self.gas, "a Gas or None")
+        if self.gas is not None:
+            self.gas.check(surface, self.units)
+        if self.weights and not any(material.density for material in self.materials):
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
         known = self.certificate or getattr(solved, "certificate", None)
@@ -142,6 +187,35 @@ class StructuralModel:
         if all(load.gravity for load in self.weights):
             return ""
         return f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
+
+    @cached_property
+    def materials(self) -> tuple[Material, ...]:
+        """The material of each patch."""
+        return tuple(material for _, material in _each(self.material, self.surface.patches))
+
+    @property
+    def material_of_cables(self) -> Material:
+        """The material of the cables: their own, or that of the patches along its warp."""
+        return self.cable_material or self.materials[0]
+
+    def warps(self, patch: int) -> Floats:
+        """(k,2,3) the directions of warp and weft in the elements of a patch of cloth; OptionError where the
+        warp stands across a triangle."""
+        mine = self.active[self.standing.patch_of_face[self.active] == patch]
+        P = self.standing.vertices[self.standing.faces[mine]]
+        normal = area_vectors(P)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        direction = np.array(self.materials[patch].warp)
+        direction /= np.linalg.norm(direction) or 1.0
+        warp = direction - (normal @ direction)[:, None] * normal
+        length = np.linalg.norm(warp, axis=1)
+        if length.min(initial=1.0) < ACROSS:
+            x, y, z = P[length.argmin()].mean(axis=0)
+            name = self.surface.patches[patch].name
+            text = f"Material.warp: at ({x:.4g}, {y:.4g}, {z:.4g}) {name!r} stands across the direction"
+            raise OptionError(f"{text} {list(direction)}; give it another one", what="Material.warp")
+        warp /= length[:, None]
+        return np.stack([warp, np.cross(normal, warp)], axis=1)
 
     @cached_array
     def thicknesses(self) -> Floats:
@@ -232,7 +306,7 @@ class StructuralModel:
     def steps(self) -> tuple[Step, ...]:
         """The steps of the analysis, the form-finding load first."""
         metre = length_factor("m", self.units.length) if self.units.length else 1.0
-        return load_steps(self.standing, self.loads, GRAVITY * metre)
+        return load_steps(self.standing, self.loads, GRAVITY * metre, self.combinations)
 
     def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
         """(n,3) the loads of a step as forces on the vertices: thirds of triangles', halves of cable edges';
@@ -240,78 +314,21 @@ class StructuralModel:
         """
         s, down = self.standing, -np.array(self.standing.plane.normal)
         X = s.vertices if displacements is None else s.vertices + displacements
-        per_face = step.pressures[s.patch_of_face, None] * area_vectors(X[s.faces])
-        mass = self.material.density * self.thicknesses[s.patch_of_face] * face_areas(s.vertices[s.faces])
+        per_face = step.pressures[:, None] * area_vectors(X[s.faces])
+        density = np.array([material.density for material in self.materials])
+        mass = (density * self.thicknesses)[s.patch_of_face] * face_areas(s.vertices[s.faces])
         per_face += step.gravity * mass[:, None] * down
         forces = step.forces + vertex_sums(per_face[self.active] / 3.0, s.faces[self.active], s.n)
-        density = (self.cable_material or self.material).density
         for cable, area, *_ in self.cable_edges():
-            half = 0.5 * density * area * step.gravity * segment_lengths(s.vertices, cable.edges)
+            half = (
+                0.5
+                * self.material_of_cables.density
+                * area
+                * step.gravity
+                * segment_lengths(s.vertices, cable.edges)
+            )
             forces += np.bincount(cable.edges.ravel(), np.repeat(half, 2), s.n)[:, None] * down
         return forces
-
-
-@dataclass(frozen=True)
-class Structure:
-    """Material, thickness and loads of the structural model, in the units of the surface.
-
-    Attributes
-    ----------
-    young : Young's modulus E > 0, force per area.
-    poisson : Poisson's ratio ν, 0 ≤ ν < 0.5.
-    density : mass per volume, as of ``Material``: t/m³ with kN and m. With a density, self-weight is a load.
-    thickness : of all patches, length, or a table with one for each patch.
-    gravity : length/s²; by default 9.81 m/s² in the unit of length.
-    snow : load per plan area, besides the snow that the form was found under; 0 for none.
-    wind : pressures by patch, above 0 for suction on a roof.
-    cable_area : of the cables' sections, length², or a table with one for each cable.
-    """
-
-    young: float | None = None
-    thickness: float | Mapping[str, float] | None = None
-    poisson: float = 0.3
-    density: float = 0.0
-    gravity: float | None = None
-    snow: float = 0.0
-    wind: Mapping[str, float] = field(default_factory=dict)
-    cable_area: float | Mapping[str, float] | None = None
-
-    def __post_init__(self) -> None:  # refuses bad values before any work
-        for name in ("young", "thickness"):
-            if getattr(self, name) is None:
-                text = f"a structural model needs {name}; give --{name} or the key {name} of [structure]"
-                raise OptionError(text, what=name)
-        self.material, self.loads  # noqa: B018
-
-    @property
-    def material(self) -> Material:
-        """The material of the patches and cables."""
-        return Material(young=self.young or 0.0, poisson=self.poisson, density=self.density)
-
-    @property
-    def loads(self) -> tuple[Load, ...]:
-        """Self-weight, snow and wind, each in a step of its own."""
-        weight = [SelfWeight(self.gravity)] if self.density > 0.0 else []
-        snow = [Snow(self.snow)] if self.snow != 0.0 else []
-        return (*weight, *snow, *([Wind(self.wind)] if self.wind else []))
-
-    def check(self, surface: Surface) -> None:
-        """Refuse values that name no patch or cable of the surface, before it is solved."""
-        checked_thickness(self.thickness, surface)
-        check_loads(self.loads, surface)
-        checked_areas(self.cable_area, surface)
-
-    def model(
-        self,
-        surface: Any,
-        anyway: bool = False,
-        certificate: Certificate | None = None,
-        units: Units = NO_UNITS,
-    ) -> StructuralModel:
-        """The structural model of a surface at rest or of a result; errors as in ``pcmc.StructuralModel``."""
-        about: dict[str, Any] = {"cable_area": self.cable_area, "certificate": certificate, "units": units}
-        thickness = self.thickness or 0.0
-        return StructuralModel(surface, self.material, thickness, self.loads, anyway=anyway, **about)
 
 
 def expect_model(value: object) -> None:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints, cached_array
+from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
 from ..surface.geometry import area_vectors
+from .loads import Step, nothing
 from .model import StructuralModel, expect_model
-from .tables import ResultBlock, read
+from .tables import WHOLE, ResultBlock, read
 
 TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
 FAR = 1e-4  # of the size: a node farther from its vertex belongs to another surface
@@ -34,6 +36,8 @@ class StepResults:
     reactions: Floats  # (n,3) forces of the supports on the structure; zero at vertices that nothing holds
     stresses: Floats  # (m,3,3) tensors in the axes of space, force/area, the mean over the thickness
     cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force; from a .dat alone
+    share: float = 1.0  # of the step's loads, besides those of the step before: 1 but where it stopped
+    taut: float = 1.0  # the part of that share up to which no face is slack, between increments by a line
 
     @cached_array
     def deflections(self) -> Floats:
@@ -45,15 +49,19 @@ class StepResults:
         """(m,2) the two principal membrane stresses in each face's plane, ascending, force/area."""
         shown = np.flatnonzero(np.isfinite(self.stresses).all(axis=(1, 2)))
         surface = self.model.surface
-        P = surface.vertices[surface.faces[shown]]
-        first = P[:, 1] - P[:, 0]
-        first /= np.linalg.norm(first, axis=1)[:, None]
-        normal = area_vectors(P)
-        second = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], first)
-        plane = np.stack([first, second], axis=1)
         values = np.full((surface.m, 2), np.nan)
-        values[shown] = np.linalg.eigvalsh(plane @ self.stresses[shown] @ plane.transpose(0, 2, 1))
+        values[shown] = _in_planes(surface.vertices[surface.faces[shown]], self.stresses[shown])
         return values
+
+    @cached_array
+    def principal_forces(self) -> Floats:
+        """(m,2) the principal stresses times the thickness, force/length, to compare with the tension α."""
+        return self.principal_stresses * self.model.thicknesses[self.model.surface.patch_of_face, None]
+
+    @cached_array
+    def slack(self) -> Bools:
+        """(m,) the faces where a principal stress is not above 0: there a membrane wrinkles."""
+        return self.principal_stresses[:, 0] <= 0.0
 
     @cached_property
     def largest_displacement(self) -> float:
@@ -71,13 +79,26 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     ``path`` is what ``ccx`` wrote for the input file of the model; .dat has the stresses by element.
     FileError for a file that is missing, damaged, incomplete, or of another model.
     """
-    path = Path(path)
     expect_model(model)
+    path = Path(path)
+    steps = read_steps(path, model, model.steps)
+    ended = len(steps) - (bool(steps) and steps[-1].share < 1.0)
+    if ended < len(model.steps):
+        text = f"{path}: has {ended} of the model's {len(model.steps)} steps"
+        where = f"ccx stopped in step {model.steps[ended].name!r}; pcmc.analyse finds how far the load goes"
+        raise FileError(f"{text}; {where}", what=str(path), found=ended, expected=len(model.steps))
+    return steps
+
+
+def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tuple[StepResults, ...]:
+    """The same for other ``steps`` of the model. Where the program stopped, the last results are those of the
+    ``share`` of the step that it reached; steps that it did not begin are left out.
+    """
     check_regular(path)
     suffix = suffix_of(path, (".dat", ".frd"), "a result of CalculiX")
     try:
-        steps = read(path.read_text(encoding="ascii"), suffix)
-        _check(steps, model)
+        tables = read(path.read_text(encoding="ascii"), suffix)
+        _check(tables, model, steps)
     except OSError as error:
         raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:
@@ -85,12 +106,19 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
         raise FileError(message, what=str(path), where=error.start) from None
     except FileError as error:
         raise error.in_file(path, what=str(path)) from None
-    return tuple(_results(model, k, blocks) for k, blocks in enumerate(steps))
+    return tuple(_results(model, steps, k, tables) for k in range(len(tables)))
 
 
-def _results(model: StructuralModel, k: int, blocks: dict[str, ResultBlock]) -> StepResults:
+def _results(
+    model: StructuralModel, steps: Sequence[Step], k: int, tables: list[dict[str, ResultBlock]]
+) -> StepResults:
     """The arrays of step k on the surface's vertices and faces; only the standing faces are elements."""
-    step, surface, stress = model.steps[k], model.standing, blocks["stresses"]
+    blocks = tables[k]
+    step, surface, stress = steps[k], model.standing, blocks["stresses"]
+    share = blocks["displacements"].time - k
+    if share < 1.0 - WHOLE:
+        before = steps[k - 1] if k else step.plus(step, nothing(step), -1.0)
+        step = replace(before.plus(step, before, share), name=step.name)
     displacements, reactions = np.full((surface.n, 3), np.nan), np.zeros((surface.n, 3))
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values
     if "forces" in blocks:
@@ -110,14 +138,44 @@ def _results(model: StructuralModel, k: int, blocks: dict[str, ResultBlock]) -> 
     for cable, area, numbers, along in model.cable_edges() if "cables" in blocks else ():
         mine = blocks["cables"].means(numbers)[:, TENSOR]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
-    return StepResults(step.name, model, displacements, reactions, stresses, tensions)
+    done = 1.0 if share >= 1.0 - WHOLE else share
+    taut = min(_taut(model, stress, k, tables[k - 1]["stresses"] if k else None), done)
+    return StepResults(step.name, model, displacements, reactions, stresses, tensions, done, taut)
 
 
-def _check(steps: list[dict[str, ResultBlock]], model: StructuralModel) -> None:
-    """Refuse results with other nodes, elements or steps than the model's."""
+def _taut(model: StructuralModel, last: ResultBlock, k: int, start: ResultBlock | None) -> float:
+    """The time in step k at which the first face gets slack, by lines through the least principal stress at
+    the increments and at the ``start``; 1 if none does."""
+    if last.by_node:
+        return 1.0
+    P, blocks = model.surface.vertices[model.surface.faces[model.faces]], [last]
+    while (earlier := blocks[0].before) is not None:
+        blocks.insert(0, earlier)
+    least = [(0.0, float(model.prestress.min()))] if start is None else []
+    for block in blocks if start is None else [start, *blocks]:
+        stresses = block.means(model.faces + 1)[:, TENSOR]
+        least.append((block.time - k, float(_in_planes(P, stresses).min())))
+    for (time, before), (end, after) in pairwise(least):
+        if after <= 0.0:
+            return time + (end - time) * before / (before - after) if before > 0.0 else time
+    return 1.0
+
+
+def _in_planes(P: Floats, stresses: Floats) -> Floats:
+    """(k,2) the principal values, ascending, of tensors (k,3,3) in the planes of triangles (k,3,3)."""
+    first = P[:, 1] - P[:, 0]
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    normal = area_vectors(P)
+    second = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], first)
+    plane = np.stack([first, second], axis=1)
+    return np.asarray(np.linalg.eigvalsh(plane @ stresses @ plane.transpose(0, 2, 1)))
+
+
+def _check(tables: list[dict[str, ResultBlock]], model: StructuralModel, steps: Sequence[Step]) -> None:
+    """Refuse results with other nodes or elements than the model's, and more steps."""
     nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
     cables = [number for *_, numbers, _ in model.cable_edges() for number in numbers]
-    for number, blocks in enumerate(steps[: len(model.steps)], 1):
+    for number, blocks in enumerate(tables[: len(steps)], 1):
         for kind in ("displacements", "stresses", *(("forces",) if len(held) else ())):
             if kind not in blocks:
                 text = f"step {number} has no {kind}; run ccx on the model's file again"
@@ -138,12 +196,9 @@ def _check(steps: list[dict[str, ResultBlock]], model: StructuralModel) -> None:
             if gap > FAR * model.surface.size:
                 text = f"its nodes are up to {gap:.3g} from the model's vertices"
                 raise FileError(f"{text}; they belong to another surface", found=float(gap))
-    if len(steps) != len(model.steps):
-        names = [step.name for step in model.steps]
-        state = f"{len(steps)} of the model's {len(names)} steps"
-        stopped = len(steps) < len(names)
-        hint = f"ccx stopped in step {names[len(steps)]!r}" if stopped else "is it another model's?"
-        raise FileError(f"has {state}; {hint}", found=len(steps), expected=len(names))
+    if len(tables) > len(steps):
+        text = f"has {len(tables)} steps, the model {len(steps)}; is it another model's?"
+        raise FileError(text, found=len(tables), expected=len(steps))
 
 
 def _same(what: str, found: Ints, expected: Ints) -> None:

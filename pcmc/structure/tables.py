@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 
+WHOLE = 1e-6  # of a step: a time so near to its end is the end
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
 DAT_COLUMNS = {"displacements": (1, 3), "forces": (1, 3), "stresses": (2, 6)}  # keys and values of a row
@@ -33,6 +35,7 @@ class ResultBlock:
     values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
     by_node: bool  # whether the numbers are those of nodes
     places: Floats | None = None  # (k,3) where the nodes are, if the file has it
+    before: ResultBlock | None = None  # the same at the increment before, in the same step
 
     def means(self, elements: Ints) -> Floats:
         """(k,c) the mean over the integration points of each of the elements (k,), ascending numbers."""
@@ -43,7 +46,8 @@ class ResultBlock:
 
 
 def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
-    """The tables of each step, whose times are 1, 2, ...; of several in a step the last counts.
+    """The tables of each step, which end at the times 1, 2, ...; of several in a step the last counts, so
+    that of an analysis that stopped the last step's is what it reached. Each has the one ``before`` it.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
     >>> read(text, ".dat")[0]["displacements"].values.tolist()
@@ -51,10 +55,10 @@ def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
     """
     steps: list[dict[str, ResultBlock]] = []
     for block in (_of_dat if suffix == ".dat" else _of_frd)(text):
-        number = round(block.time)
-        if abs(block.time - number) <= 1e-6 and number >= 1:  # else a part of a step
-            steps += [{} for _ in range(number - len(steps))]
-            steps[number - 1][block.kind] = block
+        number = max(math.ceil(block.time - WHOLE), 1)
+        steps += [{} for _ in range(number - len(steps))]
+        earlier = steps[number - 1].get(block.kind)
+        steps[number - 1][block.kind] = replace(block, before=earlier)
     return steps
 
 

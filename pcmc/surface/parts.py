@@ -138,6 +138,10 @@ class Cable:
         chain += chain[:1] * closed
         return cls(name, tension, np.stack([chain[:-1], chain[1:]], axis=1))
 
+    def shared(self, share: float, edges: Ints) -> Cable:
+        """A share of the cable, such as the half that a mirror plane leaves of it, on other edges."""
+        return replace(self, tension=share * self.tension, weight=share * self.weight, edges=edges)
+
     def carried(self, number: Ints) -> Cable | None:
         """The cable on the vertices that have these numbers (n,) now; None where no edge of it is left.
 

@@ -201,11 +201,13 @@ def point_text(point: Floats) -> str:
     return f"({', '.join(f'{value:.6g}' for value in shown)})"
 
 
-def two_digits(value: float, rounded: Callable[[float], int] = math.ceil) -> float:
-    """A number > 0 rounded up to two digits, or down with ``math.floor``.
+def two_digits(value: float, rounded: Callable[[float], int] | None = None) -> float:
+    """A number rounded to two digits; one > 0 up with ``math.ceil``, or down with ``math.floor``.
 
-    >>> two_digits(0.3001), two_digits(0.3001, math.floor)
-    (0.31, 0.3)
+    >>> two_digits(0.3049), two_digits(0.3001, math.ceil), two_digits(0.3001, math.floor)
+    (0.3, 0.31, 0.3)
     """
+    if rounded is None:
+        return float(f"{value:.2g}")
     step = 10.0 ** (math.floor(math.log10(value)) - 1)
     return float(f"{rounded(value / step + (1e-9 if rounded is math.ceil else 0.0)) * step:.2g}")

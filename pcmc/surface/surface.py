@@ -23,7 +23,7 @@ from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
 from .summary import summary
 from .topology import Topology, topology
-from .values import wall_changes, with_values
+from .values import with_values
 from .walls import wall_patches
 
 PARTS = (
@@ -285,12 +285,14 @@ class Surface(supports.Supported):
         weights: Mapping[str, float] | None = None,
         snows: Mapping[str, float] | None = None,
         cables: Mapping[str, float] | None = None,
+        cable_weights: Mapping[str, float] | None = None,
         volumes: Mapping[str, float] | None = None,
     ) -> Surface:
         """The same surface with other tensions, pressures, weights or snow, given by patch name.
 
-        ``walls`` names patches that are walls whatever their pressure; ``cables`` gives tensions by the name
-        of the cable, ``volumes`` volumes by the name of the room. The pressure of a wall changes with the
+        ``walls`` names patches that are walls whatever their pressure; ``cables`` and
+        ``cable_weights`` give tensions and weights per length by the name of the cable, ``volumes`` volumes
+        by the name of the room. The pressure of a wall changes with the
         difference of its two rooms' pressures, and its snow with that of the snow over them, unless the wall
         itself is named.
 
@@ -304,26 +306,9 @@ class Surface(supports.Supported):
         >>> hall.retensioned(pressures={"west": 1.25}).pressures.tolist()
         [1.25, 1.0, 0.25]
         """
-        by_patch = {"tension": tensions, "pressure": pressures, "weight": weights, "snow": snows}
-        for key, values in (by_patch | {"cable": cables, "volume": volumes}).items():
-            if not isinstance(values or {}, Mapping):
-                validate.refuse(f"{key}s", values, "a mapping from names to numbers", error=SurfaceError)
-        if isinstance(walls, str) or not isinstance(walls, Iterable):
-            validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
-        given: dict[str, Any] = {key: dict(values or {}) for key, values in by_patch.items()}
-        declared = dict.fromkeys(walls, True)
-        patches = with_values(self.patches, "patch", {**given, "wall": declared})
-        following: dict[str, dict[str, float]] = {}
-        for key in ("pressure", "snow"):
-            old, new = (np.array([getattr(p, key) for p in parts]) for parts in (self.patches, patches))
-            change = wall_changes(self, new - old, {self.patch_index(name) for name in given[key]})
-            following[key] = {patches[k].name: float(old[k] + change[k]) for k in np.flatnonzero(change)}
-        follow = dict.fromkeys((*following["pressure"], *following["snow"]), True)
-        changed = self._with(
-            patches=with_values(patches, "patch", {**following, "wall": follow}),
-            cables=with_values(self.cables, "cable", {"tension": cables or {}}),
-            rooms=with_values(self.rooms, "room", {"volume": volumes or {}}),
-        )
+        given = {"tensions": tensions, "pressures": pressures, "weights": weights, "snows": snows}
+        given |= {"cables": cables, "cable_weights": cable_weights, "volumes": volumes}
+        changed = self._with(**with_values(self, given, walls))
         snowed = bool(snows) and not np.array_equal(changed.snows, self.snows)
         return changed.with_held_snow() if snowed else changed
 

@@ -100,9 +100,7 @@ def _cut_cables(surface: Surface, side: Ints, number: Ints) -> tuple[Cable, ...]
             text = f"cable {cable.name!r} lies in the plane in part; make that part a cable of its own"
             raise SurfaceError(text, what="cables", where=cable.name)
         if stays.any():
-            share = 0.5 if inside.any() else 1.0
-            edges = number[cable.edges[stays]]
-            cables.append(Cable(cable.name, share * cable.tension, edges, share * cable.weight))
+            cables.append(cable.shared(0.5 if inside.any() else 1.0, number[cable.edges[stays]]))
     return tuple(cables)
 
 
@@ -346,8 +344,7 @@ def _cables(surface: Surface, place: Ints) -> tuple[Cable, ...]:
         if times.min() != times.max():
             text = f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
             raise SurfaceError(text, what="cables", where=cable.name)
-        factor = int(times[0])
-        cables.append(Cable(cable.name, factor * cable.tension, edges, factor * cable.weight))
+        cables.append(cable.shared(int(times[0]), edges))
     return tuple(cables)
 
 

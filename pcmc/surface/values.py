@@ -7,7 +7,7 @@ of the snow over them, and its tension must balance theirs.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,11 +15,13 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.errors import SurfaceError
 from ..base.tolerances import SAME_PRESSURE
 
 KINDS = {
     **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
     "cables": ("cables", "tension"),
+    "cable_weights": ("cables", "weight"),
     "volumes": ("rooms", "volume"),
 }
 """The kinds of values, as ``Surface.retensioned`` takes them: the parts of the surface, and their field."""
@@ -49,14 +51,38 @@ def part_index(surface: Any, kind: str, name: str) -> int:
 
 
 def with_values(
+    surface: Any, given: Mapping[str, Mapping[str, float] | None], walls: Iterable[str]
+) -> dict[str, tuple[Any, ...]]:
+    """The patches, cables and rooms of a Surface with other values; see ``Surface.retensioned``."""
+    changes: dict[str, dict[str, dict[str, Any]]] = {parts: {} for parts in PARTS}
+    for kind, values in given.items():
+        if not isinstance(values or {}, Mapping):
+            validate.refuse(kind, values, "a mapping from names to numbers", error=SurfaceError)
+        parts, field = KINDS[kind]
+        changes[parts][field] = dict(values or {})
+    if isinstance(walls, str) or not isinstance(walls, Iterable):
+        validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
+    of_patches = changes["patches"]
+    of_patches["wall"] = dict.fromkeys(walls, True)
+    changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
+    following: dict[str, dict[str, Any]] = {}
+    for field in ("pressure", "snow"):
+        old, new = (
+            np.array([getattr(p, field) for p in patches])
+            for patches in (surface.patches, changed["patches"])
+        )
+        change = wall_changes(surface, new - old, {surface.patch_index(name) for name in of_patches[field]})
+        following[field] = {
+            surface.patches[k].name: float(old[k] + change[k]) for k in np.flatnonzero(change)
+        }
+    following["wall"] = dict.fromkeys((*following["pressure"], *following["snow"]), True)
+    return changed | {"patches": _replaced(changed["patches"], "patch", following)}
+
+
+def _replaced(
     parts: tuple[Any, ...], part: str, by_field: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Any, ...]:
-    """The parts with other values of their fields; OptionError for an unknown name.
-
-    >>> from pcmc import Patch
-    >>> with_values((Patch("roof", 1.0),), "patch", {"tension": {"roof": 2.0}, "pressure": {"roof": 3.0}})
-    (Patch(name='roof', tension=2.0, pressure=3.0),)
-    """
+    """The parts with other values of their fields; OptionError for an unknown name."""
     changes: dict[str, dict[str, Any]] = {part.name: {} for part in parts}
     for field, by_name in by_field.items():
         for name, value in by_name.items():

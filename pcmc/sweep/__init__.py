@@ -10,10 +10,10 @@ each case in a process of its own (case_script.py). May import project and all r
 """
 
 from .grid import Sweep, checked
-from .running import Progress, run
+from .running import SweepProgress, run
 from .solving import solve_case
 from .store import Record, read_store
 from .tables import draw_sweep, provenance, short_table, table, write_table
 
-__all__ = ["Progress", "Record", "Sweep", "checked", "draw_sweep", "provenance", "read_store", "run"]
+__all__ = ["Record", "Sweep", "SweepProgress", "checked", "draw_sweep", "provenance", "read_store", "run"]
 __all__ += ["short_table", "solve_case", "table", "write_table"]

@@ -29,7 +29,7 @@ PACE = 0.05  # seconds between two transactions: each costs some milliseconds
 
 
 @dataclass(frozen=True)
-class Progress:
+class SweepProgress:
     """The state of a sweep, passed to ``on_record`` after each case."""
 
     record: Record  # just stored
@@ -48,7 +48,7 @@ def run(
     workers: int | None = None,
     time_limit: float | None = 600.0,
     retry_failed: bool = False,
-    on_record: Callable[[Progress], object] | None = None,
+    on_record: Callable[[SweepProgress], object] | None = None,
     on_resume: Callable[[int, int], object] | None = None,
 ) -> pd.DataFrame:
     """Run every case of the sweep that its store does not hold yet; a row per case (see ``table``).
@@ -67,8 +67,8 @@ def run(
     workers : number of local processes; default one for each processor.
     time_limit : per case, in seconds; None for no limit.
     retry_failed : run the stored cases that failed again.
-    on_record : called with a Progress after each stored case. Raise StopIteration to stop as Ctrl-C does;
-        any other exception passes through.
+    on_record : called with a SweepProgress after each stored case. Raise StopIteration to stop as Ctrl-C
+        does; any other exception passes through.
     on_resume : called once, before any case runs, with how many cases the store holds and how many remain.
 
     Raises
@@ -139,7 +139,7 @@ def _check_options(
     for name, value, sound, expected in (
         ("executor", executor, isinstance(executor, Executor), "one of concurrent.futures"),
         ("scheduler", scheduler, isinstance(scheduler, str), "'tcp://host:8786'"),
-        ("on_record", on_record, callable(on_record), "a function of a Progress"),
+        ("on_record", on_record, callable(on_record), "a function of a SweepProgress"),
         ("on_resume", on_resume, callable(on_resume), "a function of two numbers of cases"),
     ):
         if value is not None and not sound:
@@ -150,16 +150,18 @@ def _check_options(
         validate.number("time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST)
 
 
-def _progress(records: dict[int, Record], todo: dict[int, Any], total: int) -> Callable[[Record], Progress]:
+def _progress(
+    records: dict[int, Record], todo: dict[int, Any], total: int
+) -> Callable[[Record], SweepProgress]:
     """A function that counts a new record and returns the state of the sweep."""
     counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
     before, begin = total - len(todo), time.perf_counter()
 
-    def count(record: Record) -> Progress:
+    def count(record: Record) -> SweepProgress:
         counts[record.verdict or record.status] += 1
         done = counts.total()
         pace = (time.perf_counter() - begin) / (done - before)
-        return Progress(record, done, total, dict(counts), pace * (total - done))
+        return SweepProgress(record, done, total, dict(counts), pace * (total - done))
 
     return count
 

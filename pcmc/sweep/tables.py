@@ -24,7 +24,9 @@ FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met")
 USUAL = ("apex", "rise", "area", "reaction per length")  # the first of each patch, the others of the roof
 GOOD = ("stable", "neutral")
 DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
-DIMENSIONS |= {"wall": "tension"}  # of numbers of a project that are no quantities of a roof
+# of numbers of a project that are no quantities of a roof
+DIMENSIONS |= {"wall": "tension", "cable_weight": "tension"}
+OF_CABLES = {"tension": "force", "weight": "tension"}
 
 
 def table(records: Iterable[Record]) -> pd.DataFrame:
@@ -112,7 +114,7 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
 def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
     """The names of numbers with their units in brackets, as far as these are known.
 
-    ``cables`` are names whose tension is a force.
+    ``cables`` are names of cables, whose tension is a force.
 
     >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
     ['west.tension [kN/m]', 'hem.tension [kN]']
@@ -124,9 +126,9 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
         stem, _, quantity = name.rpartition(".")
         if quantity == "margin_value":
             quantity = stem.partition(" of ")[0]
-        cable = quantity == "tension" and (stem in cables or stem.startswith("plan.cables."))
+        cable = OF_CABLES.get(quantity) if stem in cables or stem.startswith("plan.cables.") else None
         with suppress(OptionError):
-            dimension = DIMENSIONS.get(quantity) or dimension_of("force" if cable else quantity)
+            dimension = cable or DIMENSIONS.get(quantity) or dimension_of(quantity)
             shown[name] = f"{name} [{units.behind(dimension).strip()}]"
     return shown
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from rich.table import Table
 from generators import two_squares
 from pcmc import Surface
 from pcmc.base.arrays import Floats
+from pcmc.base.errors import OptionError, unknown
 from pcmc.forces.functional import energy_and_gradient
 
 from ..folder import Folder, write_json
@@ -56,6 +57,8 @@ def energy_rate(quick: bool) -> list[Row]:
 
 
 BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *HEIGHT, *SWEEP, *EXPLORE, *COMMAND]
+GROWTH = "growth of cost"
+NAMES = (*(each.__name__.replace("_", " ") for each in BENCHMARKS), GROWTH)
 
 
 def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:
@@ -82,14 +85,21 @@ def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:
     return energy, gradient
 
 
-def main(results: Path, quick: bool = False) -> int:
-    """Print every benchmark's rows and write them to ``results / "benchmark"``; 1 if one is missed."""
+def main(results: Path, quick: bool = False, only: Sequence[str] = ()) -> int:
+    """Print every benchmark's rows and write them to ``results / "benchmark"``; 1 if one is missed.
+
+    ``only`` names some benchmarks: their rows take the place of those in the table.
+    """
     console = Console(width=None if sys.stdout.isatty() else 140)
     console.print(f"{machine()}; wall time, medians of repeats")
     folder, name = Folder(results / "benchmark"), "quick" if quick else "full"
-    benchmarks = {each.__name__.replace("_", " "): each for each in BENCHMARKS}
     rows = []
-    for title, benchmark in (benchmarks | {"growth of cost": partial(growth, folder)}).items():
+    for title in only or NAMES:
+        if title not in NAMES:
+            raise OptionError(
+                unknown("benchmark", title, NAMES), what="benchmark", found=title, expected=NAMES
+            )
+        benchmark = partial(growth, folder) if title == GROWTH else BENCHMARKS[NAMES.index(title)]
         found = benchmark(quick)
         shown = Table(*COLUMNS, title=title)
         for row in found:
@@ -97,9 +107,25 @@ def main(results: Path, quick: bool = False) -> int:
         console.print(shown)
         rows += [[row.what, row.value, row.unit, row.asked, row.met, row.remark] for row in found]
     table = pd.DataFrame(rows, columns=list(COLUMNS))
+    if only:
+        table = renewed(folder.read_table(name), table)
     folder.write_table(name, table)
-    write_json(folder.path / f"{name}.json", {"machine": machine()})
+    write_json(folder.path / f"{name}.json", {"machine": machine()} | ({"only": list(only)} if only else {}))
     return int((table["met"] == "no").any())
+
+
+def renewed(table: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
+    """The table with the rows found in place of those of the same names; rows of new names go beside them.
+
+    >>> old = pd.DataFrame({"what": ["a", "b", "c"], "median": [1, 2, 3]})
+    >>> renewed(old, pd.DataFrame({"what": ["b", "b2"], "median": [4, 5]})).what.tolist()
+    ['a', 'b', 'b2', 'c']
+    """
+    old = table["what"].isin(found["what"]).to_numpy()
+    place = int(old.argmax()) if old.any() else len(table)
+    rest = table[~old]
+    before = place - int(old[:place].sum())
+    return pd.concat([rest[:before], found, rest[before:]], ignore_index=True)
 
 
 def growth(folder: Folder, quick: bool) -> list[Row]:

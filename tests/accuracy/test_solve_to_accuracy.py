@@ -185,6 +185,35 @@ def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():
     assert size_field(cap, np.zeros(cap.m), 400).min() > 0.0
 
 
+def test_the_next_mesh_has_the_triangles_that_equal_shares_need(roof, monkeypatch):
+    """Where a quarter of the triangles has no share in the error, equal shares need 3/4 of the triangles."""
+    asked, bar = [], check_mesh(roof).row("volume").error
+
+    def shares(surface, fine, goals):
+        return np.where(np.arange(surface.m) < surface.m / 4, 0.0, 1.0)
+
+    def sizes(surface, shares, triangles):
+        asked.append(triangles / surface.m)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(adaptive, "error_shares", shares)
+    monkeypatch.setattr(adaptive, "size_field", sizes)
+    found = solve_to_accuracy(roof, {"volume": bar / 1.8})
+    assert found.status is AccuracyStatus.STOPPED
+    assert asked == pytest.approx([adaptive.SPARE * 0.75 * 1.8], rel=0.02)
+
+
+def test_evenness_is_the_least_error_of_as_many_triangles():
+    """A triangle cut into k leaves 1/k of its share: Σ η/k is least for k in proportion to √η."""
+    random = np.random.default_rng(0)
+    shares = random.uniform(0.1, 9.0, 20)
+    best = estimator.evenness(shares) * shares.sum()
+    cuts = 20.0 * np.sqrt(shares) / np.sqrt(shares).sum()
+    assert (shares / cuts).sum() == pytest.approx(best, rel=1e-12)
+    for other in np.abs(cuts + random.normal(scale=0.1, size=(50, 20))):
+        assert (shares / (20.0 * other / other.sum())).sum() > best
+
+
 @pytest.mark.nightly
 def test_order_two_is_regained_at_a_re_entrant_corner():
     start = solve(l_roof(2.0)).surface

@@ -1,6 +1,7 @@
 """Units of length and force, and files that carry them."""
 
 import warnings
+from contextlib import nullcontext
 
 import ezdxf
 import ezdxf.units
@@ -16,7 +17,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning, LostWarning, OptionError
 from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor, size_note
-from pcmc.io.mesh_data import scaled, scaled_surface
+from pcmc.io.mesh_data import in_new_unit, scaled_surface
 from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
 from pcmc.surface import Room
@@ -125,6 +126,31 @@ def test_a_rhino_file_in_millimetres_keeps_its_size(tmp_path):
     assert unit == rhino3dm.UnitSystem.Millimeters
 
 
+RHINO = {"Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 0.01, "Decimeters": 0.1, "Meters": 1.0}
+RHINO |= {"Kilometers": 1e3, "Inches": 0.0254, "Feet": 0.3048, "Yards": 0.9144, "Miles": 1609.344}
+
+
+@pytest.mark.parametrize("system", RHINO)
+def test_a_rhino_file_in_any_unit_has_the_size_that_its_unit_says(tmp_path, system):
+    path = in_millimetres(tmp_path / "a.3dm")
+    model = rhino3dm.File3dm.Read(str(path))
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, system)
+    model.Write(str(path), 7)
+    with pytest.warns(FileWarning) if system != "Meters" else nullcontext():
+        roof = pcmc.read(path, units="m")
+    size = RHINO[system] * np.array([12000.0, 12000.0, 3000.0])
+    np.testing.assert_allclose(np.ptp(roof.vertices, axis=0), size, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("units", "system"),
+    [("m", "Meters"), ("mm", "Millimeters"), ("cm", "Centimeters"), ("ft", "Feet"), ("in", "Inches")],
+)
+def test_a_rhino_file_names_the_unit_that_it_is_written_in(tmp_path, roof, units, system):
+    pcmc.write(tmp_path / "a.3dm", roof, units=units)
+    assert size_in_rhino(tmp_path / "a.3dm")[1] == getattr(rhino3dm.UnitSystem, system)
+
+
 def test_the_command_keeps_the_unit_of_a_file(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     in_millimetres(tmp_path / "mm.3dm")
@@ -178,7 +204,7 @@ def test_all_parts_of_a_surface_are_scaled():
         pcmc.Circle((1, 2, 3), (0, 0, 1), 4.0),
         Room("r", {"a": 1}, 7.0),
     )
-    patch, plane, line, circle, room = scaled(parts, 2.0)
+    patch, plane, line, circle, room = in_new_unit(parts, 2.0)
     assert (patch.tension, patch.pressure, patch.weight) == (1.0, 0.75, 1.25)
     assert plane == pcmc.Plane((2, 4, 6), (0, 0, 1))
     assert line == pcmc.Line((2, 4, 6), (1, 0, 0))

@@ -212,6 +212,8 @@ def findings(**changes):
         ({"spectrum": Spectrum(1, 0, soft=1)}, Verdict.NEUTRAL),
         ({"spectrum": Spectrum(None, 0, soft=1)}, Verdict.NEUTRAL),
         ({"spectrum": Spectrum(1, 1)}, Verdict.SADDLE),
+        ({"rigid": 1}, Verdict.NEUTRAL),
+        ({"spectrum": Spectrum(1, 1), "rigid": 3}, Verdict.SADDLE),
         ({"spectrum": Spectrum(2, 1, soft=1)}, Verdict.SADDLE),
         ({"spectrum": Spectrum(0, 0, hidden="ARPACK stops")}, Verdict.UNDECIDED),
         ({"own_residuals": np.array([1e-4])}, Verdict.NOT_CONVERGED),
@@ -242,6 +244,45 @@ def findings(**changes):
 )
 def test_the_first_rule_that_applies_decides(changes, verdict):
     assert judge(findings(**changes))[0] is verdict
+
+
+STALLED, LATER = Attempt("given start", "stalled"), Attempt("pressure", "diverged", 0.9, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "not_there"),
+    [
+        ({}, "", "fold"),
+        ({"rigid": 3}, "nothing resists 3 rigid motions; every change of shape at these volumes", "fold"),
+        ({"spectrum": Spectrum(0, 0, near=1)}, "1 softest mode within ±1 α/size², index 0", "modes"),
+        ({"spectrum": Spectrum(0, 0, near=2)}, "2 softest modes within ±1 α/size², index 0", "0.01"),
+        ({"spectrum": Spectrum(0, 0, near=2, soft=1)}, "1 softest mode within ±0.01 α/size²", "modes"),
+        ({"spectrum": Spectrum(None, 0, soft=1)}, "of signs that rounding hides", "index"),
+        ({"pulled": (7, 9)}, "at 2 pinched vertices, the first 7, the sheets pull harder", "fold"),
+        ({"left_over": "something is left"}, "something is left", "fold"),
+        ({"residual": 1e-6}, "relative residual 1.0e-06, tolerance 1e-08", "rounding"),
+        ({"residual": 1e-6, "tried": (STALLED, LATER)}, str(LATER), str(STALLED)),
+        (
+            {"residual": 1e-7, "rounding": 1e-8},
+            "rounding of the coordinates alone leaves about 1e-08",
+            "fold",
+        ),
+        (
+            {"own_residuals": np.array([1e-4])},
+            "left in patch 'roof', or in an island of it, are 1.0e-04",
+            "–",
+        ),
+        ({"spectrum": Spectrum(0, 0, hidden="ARPACK stops")}, "but ARPACK stops", "factor"),
+        ({"residual": 1e-7, "evidence": Evidence.INFLATED}, "it grew without bound", "shrank"),
+        ({"residual": 1e-7, "evidence": Evidence.VANISHED}, "it shrank to nothing", "grew"),
+        ({"quality": 1e-4, "tried": (STALLED, LATER)}, str(LATER), str(STALLED)),
+    ],
+)
+def test_the_detail_has_the_reason_and_its_numbers(changes, words, not_there):
+    detail = judge(findings(**changes))[1]
+    assert words in detail
+    assert bool(detail) == bool(words)
+    assert not_there not in detail
 
 
 @pytest.mark.parametrize(("weak", "named"), [(1e-7, True), (1e-5, False), (0.0, False)])

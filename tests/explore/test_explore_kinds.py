@@ -15,7 +15,7 @@ from pcmc.explore import saving
 from pcmc.explore.roof import read_roof
 from pcmc.io import write
 from pcmc.plan import Plan
-from pcmc.project.values import differences, single_points, values_of
+from pcmc.project.values import changeable_values, differences, single_points
 
 HALL = "[plan]\nedge_length = 1.0  # coarse\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
 CUT = "dividers = [[[6, 0], [6, 6]]]\n"
@@ -90,7 +90,7 @@ def draw(path):
 
 def changed(surface, kind, name, factor=1.1):
     """The surface with one value a little larger."""
-    values = {kind: {name: factor * values_of(surface)[kind][name]}}
+    values = {kind: {name: factor * changeable_values(surface)[kind][name]}}
     return surface.retensioned(**values)
 
 
@@ -167,7 +167,9 @@ def test_every_kind_of_project_goes_through_the_page(kind, driver, tmp_path):
         assert page.verdict == "stable"
         label = f"{LABELS[MOVED[kind][0]]} of {MOVED[kind][1]}"
         value = float(page.number(label).get_attribute("value"))
-        assert value == pytest.approx(values_of(shown)[MOVED[kind][0]][MOVED[kind][1]], rel=0.02)  # new mesh
+        assert value == pytest.approx(
+            changeable_values(shown)[MOVED[kind][0]][MOVED[kind][1]], rel=0.02
+        )  # new mesh
         assert measure(running.start.surface, target).value == pytest.approx(wanted, rel=1e-6)
         assert page.complaints() == []
 
@@ -194,7 +196,7 @@ def _drag(page, kind, session):
         hand = ActionChains(page.driver).move_to_element_with_offset(page.find("#canvas"), round(x), round(y))
         hand.click_and_hold().move_by_offset(0, -10).move_by_offset(0, -10).release().perform()
         page.idle()
-        place = values_of(session.state().surface)["points"]["point 3"]
+        place = changeable_values(session.state().surface)["points"]["point 3"]
         assert place[2] > 4.1
         z = page.find("input[aria-label='z of point 3']")
         assert float(z.get_attribute("value")) == pytest.approx(place[2], rel=1e-5)

@@ -17,7 +17,7 @@ from pcmc.certificate import Verdict
 from pcmc.explore.following import between, reach
 from pcmc.explore.session import Session, solved_start
 from pcmc.plan import Plan
-from pcmc.project.values import values_of
+from pcmc.project.values import changeable_values
 
 CAP = spherical_cap(edge_length=0.25)
 HALL = bezier_hall(edge_length=10.0)
@@ -227,7 +227,7 @@ def test_a_single_point_is_moved_and_the_surface_follows():
     session = Session(solved_start(Plan(square, supports=masts, **plan).surface()))
     state = session.settle({"points": {"point 3": [8.5, 8.0, 3.0]}})
     assert state.failure is None
-    assert values_of(state.surface)["points"]["point 3"] == [8.5, 8.0, 3.0]
+    assert changeable_values(state.surface)["points"]["point 3"] == [8.5, 8.0, 3.0]
     masts[2], square[2] = [8.5, 8.0, 3.0], [8.5, 8.0]
     again = pcmc.solve(Plan(square, supports=masts, **plan).surface())
     assert state.certificate.energy == pytest.approx(again.energy, rel=2e-3)  # another mesh

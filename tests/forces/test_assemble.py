@@ -31,13 +31,15 @@ def symmetric(pattern, data):
 def dense_laplacian(surface):
     """L_α (n,n) from the angles: -½ α (cot β + cot γ) summed over the triangles at each edge.
 
-    A cable adds τ/ℓ to its edges, and a weight w z to the tension of triangles where it is positive.
+    A cable adds τ/ℓ to its edges; a weight adds w z to the tension of triangles, and g z to that of cables,
+    where it is positive.
     """
     L = np.zeros((surface.n, surface.n))
     height = surface.plane.height(surface.vertices)
     for cable in surface.cables:
         for a, b in cable.edges:
-            pull = cable.tension / np.linalg.norm(surface.vertices[a] - surface.vertices[b])
+            tension = cable.tension + max(cable.weight * height[[a, b]].mean(), 0.0)
+            pull = tension / np.linalg.norm(surface.vertices[a] - surface.vertices[b])
             L[[a, b], [b, a]] -= pull
             L[[a, b], [a, b]] += pull
     for face, patch in zip(surface.faces, surface.patch_of_face, strict=True):

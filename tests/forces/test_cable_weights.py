@@ -6,7 +6,7 @@ from math import cosh
 
 import numpy as np
 import pytest
-from cable_cases import net
+from cable_cases import heavy_net
 from refusals import refused
 from scipy.optimize import brentq
 
@@ -19,12 +19,6 @@ from pcmc.diagnostics import check_gradient, check_hessian
 from pcmc.forces.motion_space import vertex_classes
 from pcmc.structure.loads import load_steps
 from pcmc.surface.topology import CURVE, POINT
-
-
-def heavy_net():
-    weights = (0.3, -0.2, 0.5)
-    cables = [dataclasses.replace(c, weight=g) for c, g in zip(net().cables, weights, strict=True)]
-    return dataclasses.replace(net(), cables=cables)
 
 
 def hanging(columns, weight=1.0):

@@ -20,7 +20,7 @@ from pcmc.forces.rooms import room_pressures
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import PatchSpec, Plan
 from pcmc.project import digest, run, varied
-from pcmc.project.values import values_of
+from pcmc.project.values import changeable_values
 from pcmc.solvers.starts import low_start
 from pcmc.structure import Material, Snow, StructuralModel
 from studies.reference import evolver
@@ -177,7 +177,7 @@ def test_sweeps_vary_the_snow(tmp_path):
 
 def test_the_page_follows_the_snow():
     start = pcmc.solve(hall()).surface
-    values = values_of(start)
+    values = changeable_values(start)
     assert values["snows"] == {"west": 0.25, "east": 0.5}
     assert values["pressures"] == {"west": 0.9, "east": 1.0}
     asked = wanted(start, values | {"snows": {"west": 0.25, "east": 0.25}})
@@ -185,7 +185,7 @@ def test_the_page_follows_the_snow():
     assert between(start, asked, 0.5).snows.tolist() == [0.25, 0.375, -0.125]
     reached = reach(start, asked, lambda: False)
     assert reached.failed is None
-    assert values_of(reached.surface) == values_of(asked)
+    assert changeable_values(reached.surface) == changeable_values(asked)
 
 
 def test_snow_can_be_sought():

@@ -7,7 +7,7 @@ from refusals import refused
 import pcmc
 from pcmc.base.errors import FileError, FileWarning, FreeSurfaceWarning
 from pcmc.io import load
-from pcmc.io.polygons import triangulate
+from pcmc.io.polygons import cut_polygons
 
 meshio = pytest.importorskip("meshio")
 pyvista = pytest.importorskip("pyvista")
@@ -254,7 +254,7 @@ def test_ply_in_every_form(tmp_path, order):
 
 def test_polygons_are_cut_well():
     dart = np.array([[0, 0, 0], [2, 2, 0], [0, 1, 0], [-2, 2, 0.0]])  # concave at 2
-    faces, origin, notes = triangulate(dart, np.arange(4), np.array([4]))
+    faces, origin, notes = cut_polygons(dart, np.arange(4), np.array([4]))
     assert sorted(sorted(f) for f in faces.tolist()) == [[0, 1, 2], [0, 2, 3]]
     assert origin.tolist() == [0, 0]
     assert notes == ("1 quads were cut into triangles",)
@@ -263,14 +263,14 @@ def test_polygons_are_cut_well():
     angle = 2 * np.pi * np.arange(6) / 6
     hexagon = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     corners = np.array([0, 1, 2, 0, 1, 2, 3, 4, 5])
-    faces, origin, notes = triangulate(hexagon, corners, np.array([3, 6]))
+    faces, origin, notes = cut_polygons(hexagon, corners, np.array([3, 6]))
     assert origin.tolist() == [0, 1, 1, 1, 1]
     assert notes == ("1 polygons were cut into triangles",)
     comb = np.array(
         [[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]
     )
     with refused(FileError, where=0, found=12):
-        triangulate(np.pad(1.0 * comb, ((0, 0), (0, 1))), np.arange(12), np.array([12]))
+        cut_polygons(np.pad(1.0 * comb, ((0, 0), (0, 1))), np.arange(12), np.array([12]))
 
 
 def test_closed_mesh_is_free(tmp_path):

@@ -14,9 +14,12 @@ import pcmc
 from generators import two_caps, two_squares
 from pcmc import Patch, Surface
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.panelling.distance import distances
 from pcmc.panelling.families import families
+from pcmc.report.tables import MOST_FAMILIES
+from pcmc.report.words import panel_text
 from pcmc.surface.geometry import edge_vectors, face_areas
 from studies.questions import panel_families
 from studies.study import perform
@@ -141,6 +144,49 @@ def test_edges_are_counted_once_and_walls_are_no_panels_by_default(squares):
     assert set(schedule.panels["patch"]) == {"left", "right"}
     assert "wall" in set(pcmc.panels(squares, 0.01, walls=True).panels["patch"])
     assert np.isnan(schedule.family_of_face[squares.walls[squares.patch_of_face]]).all()
+
+
+def hipped():
+    """Panels with edges 4, 3, 3 and 2, 3, 3 in turn, over a rectangle of 4 on 2."""
+    corners = [[2, 1, 0], [-2, 1, 0], [-2, -1, 0], [2, -1, 0], [0, 0, 2]]
+    faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    return Surface(corners, faces, [0] * 4, [Patch("hip", 1.0)], fixed=range(4))
+
+
+def test_the_schedule_prints_the_numbers_of_a_hipped_roof():
+    """Areas 2 √5 and 2 √2; between the planes of two neighbours cos = -1/√10."""
+    schedule = pcmc.panels(hipped(), 0.1, anyway=True)
+    text = str(schedule)
+    assert "panels  4 in 2 families, at least 2 are needed" in text
+    assert "  area  14.601126" in text
+    assert "largest panel  1 of patch 'hip': 3 × 3 × 4, area 4.472" in text
+    assert "smallest panel  2 of patch 'hip': 2 × 3 × 3, area 2.828" in text
+    assert "edges  24 long: boundary 12 (4), inside 12 (4)" in text
+    assert "angles  108.4 to 108.4 degrees between neighbours" in text
+    assert "tolerance  0.1, mirror images alike" in text
+    words = panel_text(schedule, Units("m"))
+    assert "4 flat triangles in 2 families" in words
+    assert "by at most 0.1 m in the length of each edge" in words
+    assert "an area of 14.60 m², and edges of 24.00 m." in words
+    assert "The largest has 4.472 m², the smallest 2.828 m²." in words
+    assert "from 108.4° to 108.4°" in words
+    assert "more families" not in text
+    assert "The table has" not in words
+
+
+def test_a_family_has_the_middle_of_its_panels_lengths():
+    (family,) = pcmc.panels(hipped(), 1.0, anyway=True).families.to_dict("records")
+    assert (family["count"], family["mirrored"], family["spread"]) == (4, 0, 1.0)
+    assert [family[name] for name in "abc"] == [2.5, 3.0, 3.5]
+    assert family["area"] == pytest.approx(4.0 * 5.0**0.5 + 4.0 * 2.0**0.5, rel=1e-14)
+
+
+def test_the_text_of_many_families_tells_how_many_are_not_shown(squares):
+    schedule = pcmc.panels(squares, 1e-7)
+    assert schedule.count > MOST_FAMILIES > 12
+    assert str(schedule).count("\n... ") == 1
+    assert f"\n... {schedule.count - 12} more families" in str(schedule)
+    assert f"The table has the {MOST_FAMILIES} largest families." in panel_text(schedule, Units("m"))
 
 
 def test_angles_of_a_cube_and_around_an_edge_of_three():

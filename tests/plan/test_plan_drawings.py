@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
+from unittest import mock
 
 import drawn
 import numpy as np
@@ -16,7 +17,7 @@ import pcmc
 from pcmc import cli, project
 from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError
 from pcmc.base.libraries import read_arrays
-from pcmc.plan import plan_from
+from pcmc.plan import plan_from, strokes
 from pcmc.plan.drawing import read_drawing
 from pcmc.plan.proposal import ABOVE_LEAST, least_tension, proposed
 from pcmc.surface.curve_data import curve_data
@@ -209,7 +210,11 @@ def test_curves_of_rhino_stay_exact(tmp_path):
     model.Objects.AddTextDot("nave", *at((4, 5, 0)), on("patch"))
     path = tmp_path / "hall.3dm"
     model.Write(str(path), 7)
-    assert project.is_drawing(path)
+    with mock.patch("pcmc.plan.strokes.read_strokes", wraps=strokes.read_strokes) as reads:
+        loaded = project.load(path)
+    assert reads.call_count == 1  # of the whole file: no second look at what kind it is
+    assert loaded.specified
+    assert not loaded.has_file
     plan = read_drawing(path, "m")
     assert (plan.unit, plan.units) == ("mm", "m")
     (half,) = [piece for piece in plan.outline.pieces if piece.sweep]

@@ -18,7 +18,7 @@ from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import SessionState
 from pcmc.plot import colors, pictures, raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
-from pcmc.project import paint
+from pcmc.project import draw_picture
 from pcmc.surface.colours import WALLS, patch_colors, rgb
 
 RENDERERS = [
@@ -284,7 +284,7 @@ def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path
     monkeypatch.setattr(
         pictures, "vectors", lambda s, field, *_, **__: drawn.append(field) or vectors(s, field)
     )
-    paint(surface, tmp_path / "a.png", ["diagonal"], "reactions")
+    draw_picture(surface, tmp_path / "a.png", ["diagonal"], "reactions")
     shown = page_fields(SessionState(surface, found, surface), np.zeros(3))["reactions"]
     np.testing.assert_allclose(drawn[0], np.nan_to_num(shown), atol=1e-12)
     most = np.linalg.norm(drawn[0], axis=1).max()
@@ -292,7 +292,7 @@ def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path
 
 
 def test_reactions_are_arrows(tmp_path):
-    paint(two_squares(6), tmp_path / "r.png", ["elevation"], "reactions")
+    draw_picture(two_squares(6), tmp_path / "r.png", ["elevation"], "reactions")
     image = np.asarray(Image.open(tmp_path / "r.png").convert("RGB"))
     assert near(image, rgb("#B2182B")).sum() > 500
 

@@ -1,91 +1,104 @@
-"""Numbers of README and documentation that come from ``results/``: number, page, and the key that it is."""
+"""Numbers of README and documentation: each is measured and has a key, or is given and listed."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from numbers_in_text import numbers_in, prose
+
+from studies import stated
+from studies.__main__ import main
+from studies.folder import Folder
 
 HOME = Path(__file__).resolve().parents[2]
-GRID = "corners.grid"
-
-
-def table(name):
-    return pd.read_csv(HOME / "results" / f"{name}.csv")
-
-
-def measured(key):
-    study = key.split(".")[0]
-    return float(table(f"{study}/measured").set_index("key").value[key])
-
-
-def held(study):
-    """The quantities of a study that have a limit."""
-    return measured(f"{study}.quantities") - measured(f"{study}.no_limit")
-
-
-def savings(family, quantity, bar_of="extrapolated value"):
-    rows = table("accuracy/savings")
-    row = rows[(rows.family == family) & (rows.quantity == quantity) & (rows.bar_of == bar_of)]
-    return float(row.saving.iloc[0])
-
-
-def of_benchmark(what):
-    rows = table("benchmark/full")
-    return float(rows.loc[rows.what == what, "median"].iloc[0])
-
-
-NUMBERS = (  # page, the sentence with the number's place, the number
-    ("docs/how-to/mesh-check.md", "on {:.0f} quantities of", lambda: held("coverage") + held("mesh_check")),
-    (
-        "docs/how-to/mesh-check.md",
-        "quantities of {:.0f} exact surfaces",
-        lambda: measured("coverage.cases") + measured("mesh_check.closed_forms"),
-    ),
-    ("docs/how-to/mesh-check.md", "checks {:.0f} quantities", lambda: measured("coverage.quantities")),
-    ("docs/how-to/mesh-check.md", "of {:.0f} surfaces of 13 families", lambda: measured("coverage.cases")),
-    ("docs/how-to/mesh-check.md", "surfaces of {:.0f} families", lambda: measured("coverage.families")),
-    ("docs/how-to/mesh-check.md", "| {:.1f} in the median", lambda: measured("coverage.limit_width_median")),
-    ("docs/how-to/mesh-check.md", "median, {:.0f} at the 95th", lambda: measured("coverage.limit_width_95")),
-    (
-        "docs/how-to/mesh-check.md",
-        "| {:.0f} % in the median",
-        lambda: 100 * measured("coverage.limit_share_median"),
-    ),
-    ("docs/how-to/mesh-check.md", "{:.0f} % at the 95th", lambda: 100 * measured("coverage.limit_share_95")),
-    (
-        "docs/how-to/large-meshes.md",
-        "takes {:.1f} times as",
-        lambda: of_benchmark("Newton step, superlu") / of_benchmark("Newton step, pardiso"),
-    ),
-    ("docs/how-to/accuracy.md", "roof {:.0f} times fewer", lambda: savings("roof", "height of north")),
-    ("docs/how-to/accuracy.md", "and {:.0f} times for the volume", lambda: savings("roof", "volume")),
-    (
-        "docs/how-to/accuracy.md",
-        "needs {:.1f} times as many",
-        lambda: 1 / savings("caps", "height of large", "value on the mesh"),
-    ),
-    (
-        "docs/explanation/contact.md",
-        "bottoms {:.0f} have a limit",
-        lambda: measured("corners.grid_held_limit"),
-    ),
-    ("docs/explanation/contact.md", "limit: {:.0f} are lost", lambda: measured(f"{GRID}_sliding_lost")),
-    (
-        "docs/explanation/contact.md",
-        "and {:.0f} are lost (patches",
-        lambda: measured("corners.grid_held_lost"),
-    ),
-    (
-        "docs/explanation/contact.md",
-        "Of the {:.0f} equilibria in Fig. 16",
-        lambda: measured("alpha_grid_geometric.equilibria"),
-    ),
+# other lists: years and pages of books; what was true at the time; made from the code by a test
+ELSEWHERE = {"docs/bibliography.md", "docs/history.md", "docs/how-to/project-keys.md"}
+MADE = {"docs/gallery.md", "docs/reference/command-line.md"}  # at each build of the site
+PAGES = sorted(
+    {"README.md", *(path.relative_to(HOME).as_posix() for path in HOME.glob("docs/**/*.md"))}
+    - {path.relative_to(HOME).as_posix() for path in HOME.glob("docs/_build/**/*.md")}
+    - ELSEWHERE
+    - MADE
 )
+SMALL = {"0", "1", "-1"}  # ends of ranges, indices, exit codes
+SENTENCES = defaultdict(list)
+for sentence in stated.sentences():
+    SENTENCES[sentence.page].append(sentence.says)
 
 
-@pytest.mark.parametrize(("page", "sentence", "value"), NUMBERS, ids=[entry[1] for entry in NUMBERS])
-def test_a_number_is_that_of_the_results(page, sentence, value):
-    text = " ".join((HOME / page).read_text(encoding="utf-8").split())
-    assert sentence.format(value()) in text
+def text_of(page):
+    return prose((HOME / page).read_text(encoding="utf-8"))
+
+
+def strange(text, page):
+    """The numbers of a page's prose that are neither measured nor given."""
+    for says in SENTENCES[page]:
+        text = text.replace(prose(says), " … ")
+    return [number for number in numbers_in(text) if number not in SMALL.union(stated.given(page))]
+
+
+@pytest.mark.parametrize(("page", "says"), [(page, says) for page in SENTENCES for says in SENTENCES[page]])
+def test_a_measured_number_is_that_of_the_results(page, says):
+    words = " ".join((HOME / page).read_text(encoding="utf-8").split())
+    if says not in words:
+        pytest.fail(
+            f"{page} says this no more, or with other numbers; see studies/stated.toml", pytrace=False
+        )
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_other_number_is_given(page):
+    assert strange(text_of(page), page) == [], (
+        "new numbers: write the sentence with its keys to studies/stated.toml, or list what is given there"
+    )
+
+
+@pytest.mark.parametrize("page", sorted({*SENTENCES, *stated._stated()}))
+def test_the_list_of_given_numbers_has_no_others(page):
+    text = text_of(page)
+    for says in SENTENCES[page]:
+        text = text.replace(prose(says), " … ")
+    assert sorted(set(stated.given(page)) - set(numbers_in(text))) == []
+
+
+def test_a_number_without_a_key_is_found():
+    page = "docs/how-to/mesh-check.md"
+    assert strange(text_of(page) + " The bars hold on 1764 surfaces, 99.9 % of them.", page) == [
+        "1764",
+        "99.9",
+    ]
+
+
+def test_a_key_may_be_a_cell_a_share_or_a_bound(tmp_path):
+    folder = Folder(tmp_path / "study")
+    folder.write_table("measured", pd.DataFrame({"key": ["study.a", "study.b"], "value": [7.0, 26.0]}))
+    rows = pd.DataFrame({"case": ["x", "y", "y"], "share": [0.5, 0.25, 0.966]})
+    folder.write_table("table", rows)
+
+    def says(template):
+        return stated.filled(template, tmp_path).says
+
+    assert says("{study.a:.0f} of {study.b:.0f}, {100 * study.a / study.b:.1f} %") == "7 of 26, 26.9 %"
+    assert says("{study/table(share; only; case=x):.1f}") == "0.5"
+    assert (
+        says("{study/table(share; least; case!=x):.2f} to {study/table(share; largest):.2f}")
+        == "0.25 to 0.97"
+    )
+    assert (
+        says("{100 * study/table(share; largest):.0f down}, {study/table(share; median):.0f up}") == "96, 1"
+    )
+    assert says("{study/table(share; count; case=x|y):.0f}") == "3"
+    with pytest.raises(ValueError, match="of 2 rows"):
+        says("{study/table(share; only; case=y):.1f}")
+
+
+def test_the_command_lists_each_number_with_its_key(capsys):
+    assert main(["numbers"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.split() == ["docs/how-to/mesh-check.md", "1122", "coverage.quantities"] for line in lines)
+    report = [line for line in lines if line.startswith("results/REPORT.md")]
+    assert any(line.endswith("solvers.worst_quality_newton_minimum") for line in report)
+    assert any(line.endswith("example4.best_largest_error") for line in report)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import pcmc
 from generators import catenoid, four_fans, spherical_cap, two_caps
@@ -80,6 +81,23 @@ def test_a_surface_of_one_unknown_can_be_neutral(modes):
     found = certify(needle(300.0), modes=modes)
     assert (found.verdict, found.index) == (Verdict.NEUTRAL, 0)
     assert len(found.eigenvalues) == modes
+
+
+@pytest.mark.parametrize(
+    ("bound", "below", "above"),
+    [
+        (0.01, (Verdict.NEUTRAL, "1 softest mode within ±0.01 α/size²"), (Verdict.STABLE, "1 softest mode")),
+        (1.0, (Verdict.STABLE, "1 softest mode within ±1 α/size²"), (Verdict.STABLE, None)),
+    ],
+)
+def test_a_fold_is_named_up_to_the_bounds_that_the_certificate_tells(bound, below, above):
+    """λ size²/α of a pyramid over a square is 3 (8 + h²)/(1 + h²)²; certificates have ±0.01 and ±1."""
+    for times, (verdict, words) in ((0.97, below), (1.03, above)):
+        height = brentq(lambda h, t=times: 3.0 * (8.0 + h * h) / (1.0 + h * h) ** 2 - t * bound, 1.0, 99.0)
+        found = certify(needle(height))
+        assert found.verdict is verdict
+        assert ("softest mode" in found.detail) == (words is not None)
+        assert words is None or words in found.detail
 
 
 def test_without_convergence_the_verdict_is_undecided(monkeypatch, small_cap):

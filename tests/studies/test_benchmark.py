@@ -19,6 +19,7 @@ from studies.alpha_grid.grid import TENSIONS
 from studies.benchmarks import explore, height, run, scaling, solver, sweep
 from studies.benchmarks.solver import Step
 from studies.benchmarks.timing import Row, median, median_seconds, peak_bytes
+from studies.folder import Folder
 from studies.orders import richardson
 from studies.reference import evolver
 
@@ -66,6 +67,24 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     if evolver.available():
         assert numbers.notna().all()
     assert "machine" in json.loads((tmp_path / "benchmark" / "quick.json").read_text())
+
+
+def test_some_benchmarks_alone_take_the_place_of_their_rows(tmp_path, monkeypatch, capsys):
+    def to_height(quick):
+        return [Row("height", 2.0, "s"), Row("new pair", 3.0, "times")]
+
+    monkeypatch.setattr(run, "BENCHMARKS", [run.energy_rate, to_height])
+    monkeypatch.setattr(run, "NAMES", ("energy rate", "to height", run.GROWTH))
+    rows = [("energy", 1.0), ("height", 9.0), ("height", 8.0), ("sweep", 4.0)]
+    table = pd.DataFrame(rows, columns=["what", "median"]).assign(unit="s", asked="", met="", remark="")
+    Folder(tmp_path / "benchmark").write_table("full", table)
+    words = ["benchmark", "--results", str(tmp_path), "--only"]
+    assert main([*words, "to height"]) == 0
+    found = pd.read_csv(tmp_path / "benchmark" / "full.csv")
+    assert found["what"].tolist() == ["energy", "height", "new pair", "sweep"]
+    assert found["median"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert main([*words, "to heigth"]) == 2
+    assert "to height" in capsys.readouterr().err
 
 
 def test_a_step_is_newtons():

@@ -101,6 +101,30 @@ def test_the_step_of_the_energy_in_example_1_is_the_meshs():
     assert abs(mine.height.diff()[row.level]) < 2e-3
 
 
+@pytest.mark.parametrize("case", ["example3", "fig4"])
+def test_on_round_outlines_the_step_is_what_new_vertices_on_the_outline_leave(case):
+    """With the outline left as a polygon all steps have one sign and get smaller; no level is solved anew."""
+    jumps = Folder(RESULTS / "corners").read_table("jumps").set_index("case").loc[[case]]
+    assert len(jumps) >= 2
+    assert not jumps.anew.any()
+    assert (jumps.slid < 0.01).all()
+    assert (jumps.step.abs() > jumps.step_before.abs()).all()
+    assert (jumps.polygon_step < 0.0).all()
+    assert (jumps.polygon_step_before < 2.0 * jumps.polygon_step).all()
+    text = " ".join(report.report(RESULTS).split())
+    row = jumps[jumps.bottom == "sliding"].iloc[0]
+    assert f"{row.polygon_step_before:.2g} and {row.polygon_step:.2g}" in text
+
+
+def test_the_largest_and_the_least_effect_of_cutting_are_of_example_1_alone():
+    jumps = Folder(RESULTS / "corners").read_table("jumps")
+    mine = jumps[jumps.case.isin(["example1-1", "example1-2"])]
+    ratios = (mine.step / mine.step_halved).tolist()
+    text = " ".join(report.report(RESULTS).split())
+    assert f"Example 1's steps smaller, {min(ratios):.1f} to {max(ratios):.1f} times" in text
+    assert 3.0 < min(ratios) < max(ratios) < 5.0
+
+
 def test_fair_pairs_compare_the_same_work(tmp_path):
     rows = [("Newton step, evolver", 2.0), ("Newton step, pardiso", 1.0), ("evolver, linear", 3.0),
             ("height of one mesh", 2.0), ("evolver, linear, extrapolated by us", 1.0),
@@ -116,3 +140,11 @@ def test_fair_pairs_compare_the_same_work(tmp_path):
 
 def test_fields_are_filled_and_a_missing_number_is_said():
     assert fill("{a.x:.1f} and {b.y}, {ours}", {"a.x": 1.25}, {"ours": "2"}) == f"1.2 and {MISSING}, 2"
+
+
+def test_the_comparison_is_that_of_what_is_measured(tmp_path):
+    """``python -m studies readme`` writes it."""
+    for name, frame in zip(("comparison", "figures"), compare(MEASURED), strict=True):
+        Folder(tmp_path).write_table(name, frame)
+        stored = (RESULTS / f"{name}.csv").read_text(encoding="utf-8")
+        assert (tmp_path / f"{name}.csv").read_text(encoding="utf-8") == stored

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from tables import last_row
 
 from generators import four_fans, two_squares
 from pcmc import sweep
+from pcmc.accuracy import AccuracyStatus
 from pcmc.base.errors import OptionError, SweepError
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
@@ -20,9 +22,11 @@ from studies.corners.cone import cone
 from studies.examples.flow import NOISE
 from studies.folder import Folder
 from studies.orders import limit_order, slope
-from studies.questions import refinement, solvers, stability
+from studies.questions import accuracy, refinement, solvers, stability
 from studies.registry import STUDIES, chosen, of_the_paper
 from studies.study import perform
+
+RESULTS = Path(__file__).parents[2] / "results"
 
 # ------------------------------------------------------------------------------------ registry
 
@@ -244,3 +248,20 @@ def test_solvers_side_by_side_on_one_small_mesh(tmp_path, monkeypatch):
     for column in ("seconds", "wall_time"):
         assert column not in histories.columns
     assert folder.figure("residual-time").is_file()
+
+
+# ------------------------------------------------------------------------------------ accuracy
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("family", accuracy.FAMILIES, ids=lambda family: family.name)
+def test_adaptive_meshes_go_on_up_to_the_limit_of_triangles(family, tmp_path):
+    """The boundary is known: a guess is never as good as the accuracy that is asked for."""
+    found = accuracy.adaptive(family, family.quantities[1], 700)
+    assert found.status is AccuracyStatus.TRIANGLES
+    assert len(found.history) > 1
+
+
+def test_every_ladder_of_stored_bars_has_several_meshes():
+    bars = pd.read_csv(RESULTS / "accuracy" / "bars.csv")
+    assert bars.groupby(["family", "quantity", "meshes"]).triangles.nunique().min() >= 3

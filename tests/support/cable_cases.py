@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from shapes import shaken
 
@@ -30,3 +32,9 @@ def net(pressures: tuple[float, float] = (0.5, 0.2), weights: tuple[float, float
         ],
     )
     return shaken(surface)
+
+
+def heavy_net() -> Surface:
+    """The same with weights on the cables, one of them upwards."""
+    weights = (0.3, -0.2, 0.5)
+    return replace(net(), cables=[replace(c, weight=g) for c, g in zip(net().cables, weights, strict=True)])

@@ -1,7 +1,7 @@
 """Surfaces with everything a motion space distinguishes, small enough for dense algebra."""
 
 import numpy as np
-from cable_cases import net
+from cable_cases import heavy_net, net
 from shapes import octahedron, pyramid, shaken, three_patches
 from tents import tent
 
@@ -58,5 +58,6 @@ SURFACES = {
     "faces against each other": against,
     "touching": touching,
     "cables and weights": net,
+    "cables with weights": heavy_net,
     "bubbles": lambda: shaken(double_bubble(1.2)),
 }

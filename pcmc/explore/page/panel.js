@@ -11,6 +11,7 @@ const QUANTITIES = {
   snows: { label: "Snow s", unit: "pressure" },
   weights: { label: "Weight w", unit: "pressure" },
   cables: { label: "Tension τ", unit: "force" },
+  cable_weights: { label: "Weight g", unit: "tension" },
   volumes: { label: "Volume V", unit: "volume" },
 };
 

@@ -1,0 +1,254 @@
+"""The mesh of a roof cut along seams: geodesics get vertices where they cross edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError
+from ..base.libraries import load_library
+from ..meshing.curve_cutting import cut_triangles, refined_round
+from ..meshing.quality import edge_lengths
+from ..surface import Surface
+from ..surface.geometry import bounding_size, segment_lengths
+from ..surface.pieces import point_text
+from ..surface.topology import Topology, components, edge_places, topology
+
+SNAP = 0.05  # of an edge: a seam that passes a vertex so near goes through it
+MOST_TRIANGLES = 50_000  # beyond which triangles are not cut into four
+ON = 1e-9  # of the size: what lies so near an edge is on it
+
+
+@dataclass(frozen=True, eq=False)
+class CutMesh:
+    """The sheets of a roof, with the edges that are cut.
+
+    Attributes
+    ----------
+    X, F : (n,3) vertices and (m,3) triangles.
+    source : (m,) the face of the surface that each triangle is a part of.
+    cuts : (c,2) edges along which the cloth is cut, each row ascending.
+    seam : (c,) the number of the seam on each, -1 for the curves of the roof.
+    """
+
+    X: Floats
+    F: Ints
+    source: Ints
+    cuts: Ints
+    seam: Ints
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Edges of the mesh."""
+        return topology(self.F, np.zeros(len(self.F), dtype=np.int64), len(self.X))
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box, length."""
+        return bounding_size(self.X)
+
+    @cached_property
+    def cut_edge(self) -> Bools:
+        """(e,) the edges of the mesh that are cut or have no triangle on their other side."""
+        mask = self.topology.valence != 2
+        mask[self.topology.edge_numbers(self.cuts)] = True
+        return mask
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The pieces that it falls into, each with vertices of its own."""
+        topo = self.topology
+        inner = np.flatnonzero(~self.cut_edge[topo.edge_of_face.ravel()])
+        one, other = inner[np.argsort(topo.edge_of_face.ravel()[inner], kind="stable")].reshape(-1, 2).T
+        start, end = (3 * (one // 3) + (one % 3 + step) % 3 for step in (1, 2))  # corners at its ends
+        # both triangles have the same outside, so the neighbour runs along the edge the other way
+        end_too, start_too = (3 * (other // 3) + (other % 3 + step) % 3 for step in (1, 2))
+        pairs = np.stack([np.append(start, end), np.append(start_too, end_too)], axis=1)
+        corner = self.F.ravel()
+        label = components(pairs, 3 * len(self.F)).astype(np.int64)
+        vertex = np.empty(label.max() + 1, dtype=np.int64)
+        vertex[label] = corner
+        faces = label.reshape(-1, 3)
+        piece = components(np.stack([one // 3, other // 3], 1), len(self.F)).astype(np.int64)
+        return Pieces(faces, vertex, piece)
+
+    def with_points(self, ends: Ints, points: Floats) -> CutMesh:
+        """The mesh with vertices at points (k,3) on different edges (k,2)."""
+        number = len(self.X) + np.arange(len(ends))
+        F, source = cut_triangles(self.F, self.source, ends, number)
+        split = edge_places(self.cuts, ends)
+        halved = split >= 0
+        halves = [np.stack([self.cuts[halved, side], number[split[halved]]], axis=1) for side in (0, 1)]
+        cuts = np.concatenate([self.cuts[~halved], *halves])
+        seam = np.concatenate([self.seam[~halved], self.seam[halved], self.seam[halved]])
+        return CutMesh(np.concatenate([self.X, points]), F, source, cuts, seam)
+
+    def with_vertex(self, point: Floats, faces: Bools) -> tuple[CutMesh, int]:
+        """The mesh with a vertex nearest to a point (3,) on chosen faces (m,), and its number."""
+        chosen = np.flatnonzero(faces)
+        weights, away = nearest_places(self.X[self.F[chosen]], point)
+        f = int(away.argmin())
+        corners, at = self.F[chosen[f]], weights[f]
+        if at.max() >= 1.0 - SNAP:
+            return self, int(corners[at.argmax()])
+        if at.min() <= SNAP:
+            beside = np.delete(np.arange(3), at.argmin())
+            place = at[beside] @ self.X[corners[beside]] / at[beside].sum()
+            return self.with_points(corners[None, beside], place[None]), len(self.X)
+        thirds = np.tile(corners, (3, 1))
+        thirds[np.arange(3), np.arange(3)] = len(self.X)
+        F = np.concatenate([np.delete(self.F, chosen[f], axis=0), thirds])
+        source = np.append(np.delete(self.source, chosen[f]), np.repeat(self.source[chosen[f]], 3))
+        X = np.concatenate([self.X, (at @ self.X[corners])[None]])
+        return replace(self, X=X, F=F, source=source), len(self.X)
+
+    def with_seam(self, start: int, end: int, number: int, name: str) -> CutMesh:
+        """The mesh cut along a geodesic between two vertices of one piece; OptionError if there is none."""
+        if start == end:
+            return self
+        first, last = (np.flatnonzero(np.any(v == self.F, axis=1)) for v in (start, end))
+        both = np.intersect1d(self.pieces.piece[first], self.pieces.piece[last])
+        if not len(both):
+            places = " to ".join(point_text(self.X[vertex]) for vertex in (start, end))
+            text = f"{name}: from {places} it crosses another seam, a ridge or a cable; end it there"
+            raise OptionError(text, what="seams", where=number)
+        path, piece = self._geodesic(start, end, both)
+        place, share = self._on_edges(path, piece)
+        return self._along(place, share, path, number, name)
+
+    def _geodesic(self, start: int, end: int, candidates: Ints) -> tuple[Floats, int]:
+        """(k,3) points of the shortest path that edge flips find, and its piece, among the ``candidates``."""
+        library = load_library("potpourri3d", "cloth")
+        best: tuple[float, Floats, int] | None = None
+        for piece in candidates.tolist():
+            faces = self.pieces.faces[self.pieces.piece == piece]
+            used, local = np.unique(faces, return_inverse=True)
+            vertex = self.pieces.vertex[used]
+            solver = library.EdgeFlipGeodesicSolver(self.X[vertex], local.reshape(-1, 3))
+            for a in np.flatnonzero(vertex == start).tolist():
+                for b in np.flatnonzero(vertex == end).tolist():
+                    path = np.asarray(solver.find_geodesic_path(a, b))
+                    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+                    if best is None or length < best[0]:
+                        best = length, path, piece
+        assert best is not None
+        return best[1], best[2]
+
+    def _on_edges(self, path: Floats, piece: int) -> tuple[Ints, Floats]:
+        """(k,2) the edge of the piece that each point of a path is on, and (k,) where: 0 to 1."""
+        sides = np.unique(self.topology.edge_of_face[self.pieces.piece == piece])
+        edges = self.topology.edges[sides]
+        middle, length = self.X[edges].mean(axis=1), segment_lengths(self.X, edges)
+        near = cKDTree(path).query(middle)[0] <= 0.5 * length + ON * self.size
+        edges, start, along = edges[near], self.X[edges[near, 0]], np.diff(self.X[edges[near]], axis=1)[:, 0]
+        place, share = np.empty((len(path), 2), dtype=np.int64), np.empty(len(path))
+        for k, point in enumerate(path):
+            t = np.clip(((point - start) * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+            best = int(np.linalg.norm(start + t[:, None] * along - point, axis=1).argmin())
+            place[k], share[k] = edges[best], t[best]
+        return place, share
+
+    def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
+        """The mesh with the points of a path as vertices, and the edges between them cut.
+
+        An inner vertex that the path passes closely is moved onto it, which spares triangles without width.
+        """
+        X = self.X.copy()
+        fixed = np.zeros(len(X), dtype=bool)
+        fixed[self.topology.edges[self.cut_edge]] = True
+        nodes: list[int] = []
+        new: list[list[int]] = []
+        points: list[Floats] = []
+        last = len(path) - 1
+        for k, (pair, t, point) in enumerate(zip(place.tolist(), share.tolist(), path, strict=True)):
+            snap = 0.5 if k in (0, last) else SNAP
+            if min(t, 1.0 - t) <= snap:
+                vertex = pair[int(t > 0.5)]
+                if not fixed[vertex]:
+                    X[vertex], fixed[vertex] = point, True
+            elif pair in new:
+                vertex = len(X) + new.index(pair)
+            else:
+                vertex = len(X) + len(new)
+                new.append(pair)
+                points.append(point)
+            if not nodes or nodes[-1] != vertex:
+                nodes.append(vertex)
+        mesh = replace(self, X=X)
+        if new:
+            mesh = mesh.with_points(np.array(new), np.array(points))
+        pairs = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1), axis=1)
+        numbers = mesh.topology.edge_numbers(pairs)
+        if (numbers < 0).any():
+            text = f"{name}: the triangles are too coarse for it; refine the mesh, or move the seam"
+            raise OptionError(text, what="seams", where=number)
+        pairs = pairs[~mesh.cut_edge[numbers]]
+        cuts = np.concatenate([mesh.cuts, pairs])
+        return replace(mesh, cuts=cuts, seam=np.append(mesh.seam, np.full(len(pairs), number)))
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """The pieces of a cut mesh: vertices on a cut are there once for each piece beside it."""
+
+    faces: Ints  # (m,3) the triangles of the mesh, of vertices of pieces
+    vertex: Ints  # (u,) the vertex of the mesh that each is
+    piece: Ints  # (m,) the piece of each triangle
+
+
+def cut_mesh(surface: Surface, edge_length: float = np.inf) -> CutMesh:
+    """The sheets of a roof without its walls, cut along junctions, seams of patches and cables.
+
+    Triangles are cut into four, rounded like the surface, until half of their edges have the ``edge_length``:
+    on coarser ones geodesics keep to the gaps between vertices.
+
+    >>> from pcmc import Patch
+    >>> corners = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]]
+    >>> flat = Surface(corners, [[0, 1, 2], [0, 2, 3]], [0, 1], [Patch("a", 1.0), Patch("b", 1.0)],
+    ...                fixed=range(4))
+    >>> mesh = cut_mesh(flat)
+    >>> mesh.cuts.tolist(), mesh.pieces.piece.tolist()
+    ([[0, 2]], [0, 1])
+    """
+    parents = np.arange(surface.m)
+    while np.median(edge_lengths(surface)) > edge_length and surface.m <= MOST_TRIANGLES:
+        surface, parents = refined_round(surface), np.repeat(parents, 4)
+    topo = surface.topology
+    cut = topo.junction_edge | topo.seam_edge | topo.one_way_edge
+    for cable in surface.cables:
+        cut[topo.edge_numbers(cable.edges)] = True
+    roof = np.flatnonzero(surface.roof[surface.patch_of_face])
+    used = np.zeros(len(cut), dtype=bool)
+    used[topo.edge_of_face[roof]] = True
+    cuts = topo.edges[cut & used].astype(np.int64)
+    F = surface.faces[roof].astype(np.int64)
+    return CutMesh(surface.vertices, F, parents[roof], cuts, np.full(len(cuts), -1))
+
+
+def nearest_places(P: Floats, point: Floats) -> tuple[Floats, Floats]:
+    """(m,3) barycentric coordinates of the places of triangles P (m,3,d) nearest to a point, (m,) how far.
+
+    >>> P = np.array([[[0, 0, 0], [4, 0, 0], [0, 4, 0.0]]])
+    >>> [found.tolist() for found in nearest_places(P, np.array([2.0, -3.0, 0.0]))]
+    [[[0.5, 0.5, 0.0]], [3.0]]
+    """
+    u, v, d = P[:, 1] - P[:, 0], P[:, 2] - P[:, 0], point - P[:, 0]
+    uu, uv, vv, du, dv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v), (d, u), (d, v)))
+    det = np.maximum(uu * vv - uv * uv, 1e-300)
+    s, t = (vv * du - uv * dv) / det, (uu * dv - uv * du) / det
+    tries = np.zeros((4, len(P), 3))
+    tries[3] = np.stack([1.0 - s - t, s, t], axis=1)
+    for k in range(3):
+        start, end = (k + 1) % 3, (k + 2) % 3
+        along = P[:, end] - P[:, start]
+        share = ((point - P[:, start]) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300)
+        tries[k, :, end] = np.clip(share, 0.0, 1.0)
+        tries[k, :, start] = 1.0 - tries[k, :, end]
+    away = np.linalg.norm(np.einsum("kmi,mij->kmj", tries, P) - point, axis=2)
+    away[3, tries[3].min(axis=1) < 0.0] = np.inf
+    best, every = away.argmin(axis=0), np.arange(len(P))
+    return tries[best, every], away[best, every]

@@ -1,0 +1,230 @@
+"""The cutting pattern of a roof: where it is cut, and strips that fit the cloth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Ints
+from ..base.errors import OptionError, SurfaceError
+from ..base.libraries import load_library
+from ..certificate import Certificate
+from ..certificate.certificate import certified
+from ..surface import Surface, expect_surface
+from ..surface.geometry import face_areas
+from .cut_mesh import CutMesh, cut_mesh
+from .flattening import FOLDED, Flat
+from .layout import Sheet, sheet_axes, with_levels, with_lines
+from .settings import Pattern
+from .sewing import Cloth, loops, seams_of
+from .strips import CuttingPattern, Strip
+
+ACROSS = 4  # edges across the narrowest strip, about
+ROUNDS = 12  # in which levels are moved until every strip fits the cloth
+FILL = 0.995  # of the cloth's width that strips are laid out for
+ROUNDING = 1e-9  # of a width
+MOST_STRAIN = 0.25  # of cloth: strips that need more are refused
+
+
+def cutting_pattern(
+    surface: Surface,
+    width: float | None = None,
+    *,
+    anyway: bool = False,
+    certificate: Certificate | None = None,
+    **options: Any,
+) -> CuttingPattern:
+    """Cut a roof into strips of cloth along geodesics, and lay them flat.
+
+    Junctions, seams between patches and cables are always cut. Each sheet between them is cut into strips of
+    about the same width, from rim to rim; ends of seams that nearly meet at a junction meet. The strips are
+    laid flat with the least strain for which the sides of each seam are equally long.
+
+    Parameters
+    ----------
+    surface : a certified surface.
+    width : of the cloth: no strip is wider, with its allowances.
+    anyway : cut a surface that is not certified.
+    certificate : of the surface, where it is known; by default it is computed.
+    options : of ``pcmc.cloth.Pattern``: ``strips``, ``seams``, ``direction``, ``compensation``,
+        ``stiffness``, ``poisson``, ``allowance``, ``hem``, ``notches``.
+
+    Raises
+    ------
+    OptionError : for a seam off the roof or across another, a width that seams cannot reach, a strip that no
+        cloth could follow.
+    SurfaceError : the surface is not certified, or a sheet of it is closed.
+    MissingExtra : potpourri3d is not installed.
+
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> pattern = cutting_pattern(roof, width=1.2)
+    >>> len(pattern.strips), bool(pattern.largest_difference < 1e-6)
+    (2, True)
+    """
+    return pattern_of(surface, Pattern(width=width, **options), anyway, certificate)
+
+
+def pattern_of(
+    surface: Surface, options: Pattern, anyway: bool = False, certificate: Certificate | None = None
+) -> CuttingPattern:
+    """The cutting pattern that ``options`` ask for; the rest as of ``cutting_pattern``."""
+    expect_surface(surface)
+    options.check(surface)
+    certificate = certified(surface, anyway, certificate)
+    base = with_lines(cut_mesh(surface, _narrowest(surface, options) / ACROSS), options.lines, surface.plane)
+    if not len(base.F):
+        text = "surface: it has no roof to be cut: every patch is a wall"
+        raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
+    sheets, sheet_of_source = _sheets(surface, base, options)
+    for number in range(ROUNDS):
+        mesh = with_levels(base, sheets, sheet_of_source)
+        _refuse_closed(surface, mesh)
+        cloth = Cloth.of(surface, mesh, sheets, sheet_of_source)
+        flat = cloth.laid_flat()
+        moved = _moved_levels(cloth, flat, sheets, options, number)
+        if moved is None:
+            break
+        sheets = moved
+    flat = cloth.sewn(flat, [options.stretch(tension) for tension in cloth.tensions.tolist()])
+    return _pattern(surface, certificate, options, cloth, flat)
+
+
+def _narrowest(surface: Surface, options: Pattern) -> float:
+    """About the width of the narrowest strips, length."""
+    area = np.bincount(
+        surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
+    )
+    area *= surface.roof
+    widths = [] if options.net_width is None else [options.net_width]
+    for patch, own in zip(surface.patches, area.tolist(), strict=True):
+        if own > 0.0 and (count := options.of_patch("strips", patch.name)):
+            widths.append(own**0.5 / count)
+    if drawn := sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in options.lines):
+        widths.append(float(area.sum()) / drawn)
+    return min(widths, default=np.inf)
+
+
+def _sheets(surface: Surface, base: CutMesh, options: Pattern) -> tuple[list[Sheet], Ints]:
+    """The sheets without drawn seams, at even levels; the sheet of each face of the surface, or -1."""
+    pieces, topo = base.pieces, base.topology
+    drawn = np.zeros(len(topo.edges), dtype=bool)
+    drawn[topo.edge_numbers(base.cuts[base.seam >= 0])] = True
+    with_seams = set(pieces.piece[drawn[topo.edge_of_face].any(axis=1)].tolist())
+    sheet_of_source = np.full(surface.m, -1)
+    sheets: list[Sheet] = []
+    for piece in range(pieces.piece.max() + 1):
+        mine = pieces.piece == piece
+        name = surface.patches[surface.patch_of_face[base.source[mine][0]]].name
+        count, net = options.of_patch("strips", name), options.net_width
+        if piece in with_seams or (count is None and net is None):
+            continue
+        P = base.X[base.F[mine]]
+        along, across = sheet_axes(P, surface.plane, options.of_patch("direction", name))
+        low, high = (P @ across).min(), (P @ across).max()
+        number = count if net is None else int(np.ceil((high - low) / net - 1e-9))
+        sheet_of_source[base.source[mine]] = len(sheets)
+        sheets.append(Sheet(len(sheets), name, along, across, np.linspace(low, high, max(number, 1) + 1)))
+    return sheets, sheet_of_source
+
+
+def _refuse_closed(surface: Surface, mesh: CutMesh) -> None:
+    """SurfaceError for a piece that has no outline."""
+    piece = mesh.pieces.piece
+    opened = np.unique(piece[mesh.cut_edge[mesh.topology.edge_of_face].any(axis=1)])
+    for closed in np.setdiff1d(piece, opened).tolist():
+        name = surface.patches[surface.patch_of_face[mesh.source[piece == closed][0]]].name
+        text = f"patch {name!r} is closed, without a rim: no seam starts anywhere; draw seams that open it"
+        raise SurfaceError(text, what="surface", where=name)
+
+
+def _moved_levels(
+    cloth: Cloth, flat: Flat, sheets: Sequence[Sheet], options: Pattern, number: int
+) -> list[Sheet] | None:
+    """Sheets with levels between which strips are equally wide, more of them where they were too wide.
+
+    None where all fit: then the levels may stay as they are. OptionError for a strip that will not fit.
+    """
+    net, strips = options.net_width, cloth.strip_of_vertex
+    widths = np.array([np.ptp(flat.points[strips == k, 1]) for k in range(len(cloth.sheet))])
+    if net is not None:
+        most = np.where(cloth.sheet < 0, net * (1.0 + ROUNDING), FILL * net)
+        wide = np.flatnonzero(widths > most)
+        if (cloth.sheet[wide] < 0).any() or (len(wide) and number == ROUNDS - 1):
+            k = int(wide[np.lexsort((-widths[wide], cloth.sheet[wide]))[0]])
+            patch = cloth.surface.patch_of_face[cloth.mesh.source[cloth.strip_of_face == k][0]]
+            text = f"width: a strip of {cloth.surface.patches[patch].name!r} is {widths[k]:.4g} wide"
+            text += f", and {net:.4g} is there between allowances; draw seams in it"
+            raise OptionError(text, what="width", found=options.width)
+    elif number == 2:
+        return None
+    rim = cloth.seam_of_edge[cloth.sides.edge] < 0  # its middle tells a strip's levels: seams bulge over them
+    place, strip = cloth.mesh.X[cloth.mesh.topology.edges[cloth.sides.edge[rim]]], cloth.sides.strip[rim]
+    count_of = np.maximum(np.bincount(strip, minlength=len(widths)), 1)
+    moved = []
+    for sheet in sheets:
+        mine = np.flatnonzero(cloth.sheet == sheet.number)
+        total = np.bincount(strip, place.mean(axis=1) @ sheet.across, len(widths))
+        middle = (total / count_of)[mine]
+        row = np.clip(np.searchsorted(sheet.levels, middle) - 1, 0, len(sheet.levels) - 2)
+        found = np.zeros(len(sheet.levels) - 1)
+        np.maximum.at(found, row, widths[mine])
+        found = np.where(found > 0.0, found, np.diff(sheet.levels))
+        count = len(found)
+        if net is not None:
+            if (found <= FILL * net).all():
+                continue
+            count = max(count, int(np.ceil(found.sum() / (FILL * net)))) + int(number > 2)
+        total = np.append(0.0, np.cumsum(found))
+        steps = np.linspace(0.0, total[-1], count + 1)
+        moved.append(replace(sheet, levels=np.interp(steps, total, sheet.levels)))
+    changed = {sheet.number: sheet for sheet in moved}
+    return [changed.get(sheet.number, sheet) for sheet in sheets] if moved else None
+
+
+def _pattern(
+    surface: Surface, certificate: Certificate, options: Pattern, cloth: Cloth, flat: Flat
+) -> CuttingPattern:
+    """The strips and seams of a cloth laid flat."""
+    mesh, sides = cloth.mesh, cloth.sides
+    local = np.empty(len(cloth.X), dtype=np.int64)
+    strips = []
+    for k in range(len(cloth.sheet)):
+        mine = np.flatnonzero(cloth.strip_of_face == k)
+        used = np.flatnonzero(cloth.strip_of_vertex == k)
+        local[used] = np.arange(len(used))
+        source = mesh.source[mine]
+        strip = Strip(
+            number=k + 1,
+            patch=surface.patches[surface.patch_of_face[source[0]]].name,
+            faces=local[mesh.pieces.faces[mine]],
+            source=source,
+            roof=cloth.X[used],
+            flat=flat.points[used],
+            stretch=options.stretch(float(cloth.tensions[k])),
+            strain=flat.strain[mine],
+            outlines=loops(local, sides, sides.strip == k),
+        )
+        _refuse_folded(strip)
+        strips.append(strip)
+    return CuttingPattern(surface, certificate, options, strips, seams_of(cloth, local))
+
+
+def _refuse_folded(strip: Strip) -> None:
+    """OptionError for a strip that no cloth follows."""
+    outline, *holes = (strip.cut[loop] for loop in strip.outlines)
+    strain, problem = float(np.abs(strip.strain).max()), ""
+    if strain > 0.5 * FOLDED or not load_library("shapely", "cloth").Polygon(outline, holes).is_valid:
+        problem = "lies over itself"
+    elif strain > MOST_STRAIN:
+        problem = f"stretches by {100.0 * strain:.0f} %"
+    if problem:
+        text = (
+            f"strip {strip.number} of patch {strip.patch!r} {problem} where it is laid flat: no cloth follows"
+        )
+        raise OptionError(f"{text} it; make strips narrower, or draw a seam that opens it", what="width")

@@ -1,0 +1,153 @@
+"""What a cutting pattern is to be: the section [pattern] of a project."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import OptionError
+from ..surface import Surface
+
+LARGEST_COMPENSATION = 20.0  # percent
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """How the cloth of a roof is cut.
+
+    Attributes
+    ----------
+    width : of the cloth, length: no strip with its allowances is wider.
+    strips : number of strips of each sheet instead, or a table of numbers by patch.
+    seams : lines that are drawn, lists of two or more points [x, y] in the plan or [x, y, z]: geodesics join
+        them. Sheets with such seams have no others.
+    direction : of the warp in the plan, degrees from x, or a table by patch; by default along the longer side
+        of each sheet.
+    compensation : [warp, weft], percent by which the cloth is cut shorter than it is on the roof.
+    stiffness : [warp, weft] of the cloth, force per length (E t), from which the compensation follows: the
+        tension of the patch stretches the cloth back.
+    poisson : contraction of the weft where only the warp is pulled, 0 ≤ ν < 1; with ``stiffness``.
+    allowance : cloth added outside of seams, length.
+    hem : cloth added at rims, where no other strip follows, length; by default ``allowance``.
+    notches : distance of the marks along seams, length; 0 for none; by default the mean width.
+    """
+
+    width: float | None = None
+    strips: int | Mapping[str, int] | None = field(default=None, metadata={"kind": "a number or a table"})
+    seams: Sequence[Any] = field(default=(), metadata={"kind": "a list of lines"})
+    direction: float | Mapping[str, float] | None = field(
+        default=None, metadata={"kind": "a number or a table"}
+    )
+    compensation: Sequence[float] | None = field(default=None, metadata={"kind": "two numbers"})
+    stiffness: Sequence[float] | None = field(default=None, metadata={"kind": "two numbers"})
+    poisson: float = 0.3
+    allowance: float = 0.0
+    hem: float | None = None
+    notches: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.width is not None:
+            validate.positive("width", self.width)
+        if self.width is not None and self.strips is not None:
+            raise OptionError("strips: the width gives their number; leave out one of both", what="strips")
+        if self.width is None and self.strips is None and not len(self.seams):
+            text = (
+                "a cutting pattern needs the width of the cloth, a number of strips, or seams; give --width"
+            )
+            raise OptionError(f"{text} or the key width of [pattern]", what="width")
+        counts = self.strips.values() if isinstance(self.strips, Mapping) else [self.strips]
+        for count in counts if self.strips is not None else ():
+            validate.integer("strips", count, least=1)
+        angles = self.direction.values() if isinstance(self.direction, Mapping) else [self.direction]
+        for angle in angles if self.direction is not None else ():
+            validate.number("direction", angle)
+        for name in ("allowance", "hem", "notches"):
+            if getattr(self, name) is not None:
+                validate.number(name, getattr(self, name), least=0.0)
+        validate.number("poisson", self.poisson, least=0.0, below=1.0)
+        self.lines  # noqa: B018 — refuses lines that are none
+        if self.compensation is not None and self.stiffness is not None:
+            text = "stiffness: the compensation is given; leave out one of both"
+            raise OptionError(text, what="stiffness")
+        for percent in _pair("compensation", self.compensation):
+            validate.number("compensation", percent, least=-LARGEST_COMPENSATION, most=LARGEST_COMPENSATION)
+        for stiffness in _pair("stiffness", self.stiffness):
+            validate.positive("stiffness", stiffness)
+        if self.width is not None and self.net_width is not None and self.net_width <= 0.0:
+            text = f"width: {self.width:g} leaves no cloth between two allowances of {self.allowance:g}"
+            raise OptionError(text, what="width", found=self.width)
+
+    @property
+    def net_width(self) -> float | None:
+        """Largest width of a strip between its seams; None for any."""
+        return None if self.width is None else self.width - 2.0 * max(self.allowance, self.rim_allowance)
+
+    @property
+    def rim_allowance(self) -> float:
+        """Cloth added at rims, length."""
+        return self.allowance if self.hem is None else self.hem
+
+    @property
+    def lines(self) -> list[Floats]:
+        """The drawn seams as arrays (k,2) or (k,3)."""
+        lines = []
+        for number, line in enumerate(self.seams, 1):
+            try:
+                points = np.asarray(line, dtype=float)
+            except (TypeError, ValueError):
+                points = np.empty(0)
+            if (
+                points.ndim != 2
+                or len(points) < 2
+                or points.shape[1] not in (2, 3)
+                or not np.isfinite(points).all()
+            ):
+                hint = "such as [[0, 0], [4, 2]]"
+                validate.refuse("seams", line, "two or more points [x, y] or [x, y, z]", str(number), hint)
+            lines.append(points)
+        return lines
+
+    def check(self, surface: Surface) -> None:
+        """Refuse names of patches that the roof does not have, before it is solved."""
+        names = [patch.name for patch in surface.patches]
+        for key in ("strips", "direction"):
+            given = getattr(self, key)
+            for name in given if isinstance(given, Mapping) else ():
+                validate.choice(f"patch in {key}", name, names)
+
+    def of_patch(self, key: str, name: str) -> Any:
+        """The number of strips or the direction for a patch; None where there is none."""
+        given = getattr(self, key)
+        return given.get(name) if isinstance(given, Mapping) else given
+
+    def stretch(self, tension: float) -> tuple[float, float]:
+        """Cut length over length on the roof, along warp and weft, under a tension, force/length.
+
+        With the stiffnesses S and T of warp and weft, the strains of the cloth are α (1 - ν) / S and
+        α (1 / T - ν / S), as the contraction of the one is that of the other times T / S.
+
+        >>> [round(part, 6) for part in Pattern(width=2.0, stiffness=(500, 250), poisson=0.2).stretch(4.0)]
+        [0.993641, 0.985804]
+        >>> Pattern(width=2.0, compensation=(0.5, 2.0)).stretch(4.0)
+        (0.995, 0.98)
+        """
+        if self.stiffness is not None:
+            warp, weft = self.stiffness
+            strains = tension * (1.0 - self.poisson) / warp, tension * (1.0 / weft - self.poisson / warp)
+            return 1.0 / (1.0 + strains[0]), 1.0 / (1.0 + strains[1])
+        warp, weft = self.compensation or (0.0, 0.0)
+        return 1.0 - warp / 100.0, 1.0 - weft / 100.0
+
+
+def _pair(name: str, given: object) -> Sequence[Any]:
+    """The two numbers of a key; none where it is None."""
+    if given is None:
+        return ()
+    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
+        validate.refuse(name, given, "two numbers, [warp, weft]")
+    return list(given)

@@ -1,0 +1,189 @@
+"""A cut mesh as cloth: its strips in order, laid flat, sewn, and the seams between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints, cached_array
+from ..forces.triangles import effective_tensions
+from ..surface import Surface
+from ..surface.geometry import face_areas
+from .cut_mesh import CutMesh
+from .flattening import Flat, SewnEdges, flattened
+from .layout import Sheet
+from .strips import Seam, Side
+
+KINDS = ("seam", "junction", "rim")  # in the order of their numbers
+
+
+class Sides(NamedTuple):
+    """Sides of triangles along cuts, sorted by edge."""
+
+    edge: Ints  # (b,) of the mesh
+    ends: Ints  # (b,2) vertices of pieces, first the lower one in the mesh
+    forward: Ints  # (b,) whether the triangle runs along it so
+    strip: Ints  # (b,)
+
+
+@dataclass(frozen=True, eq=False)
+class Cloth:
+    """A cut mesh with its strips in order."""
+
+    surface: Surface
+    mesh: CutMesh
+    strip_of_face: Ints  # (m,) from 0
+    sheet: Ints  # (k,) of each strip, -1 for none
+    along: Sequence[Floats | None]  # (k) the direction (3,) of each strip's warp, None for its longer side
+
+    @classmethod
+    def of(cls, surface: Surface, mesh: CutMesh, sheets: Sequence[Sheet], sheet_of_source: Ints) -> Cloth:
+        """Strips in the order of their patches, then of their places across the sheet."""
+        piece = mesh.pieces.piece
+        count = int(piece.max()) + 1
+        first = np.zeros(count, dtype=np.int64)
+        first[piece[::-1]] = np.arange(len(piece))[::-1]
+        centre = mesh.X[mesh.F].mean(axis=1)
+        middle = np.stack([np.bincount(piece, c) / np.bincount(piece) for c in centre.T], axis=1)
+        sheet = sheet_of_source[mesh.source[first]]
+        place = np.array(
+            [sheets[s].across @ m if s >= 0 else m[0] for m, s in zip(middle, sheet, strict=True)]
+        )
+        order = np.lexsort((place.round(9), sheet, surface.patch_of_face[mesh.source[first]]))
+        rank = np.empty(count, dtype=np.int64)
+        rank[order] = np.arange(count)
+        along = [sheets[s].along if s >= 0 else None for s in sheet[order].tolist()]
+        return cls(surface, mesh, rank[piece], sheet[order], along)
+
+    @cached_array
+    def strip_of_vertex(self) -> Ints:
+        """(u,) the strip of each vertex of a piece."""
+        strip = np.empty(len(self.mesh.pieces.vertex), dtype=np.int64)
+        strip[self.mesh.pieces.faces] = self.strip_of_face[:, None]
+        return strip
+
+    @cached_array
+    def X(self) -> Floats:
+        """(u,3) places of the vertices of pieces on the roof."""
+        return self.mesh.X[self.mesh.pieces.vertex]
+
+    @cached_array
+    def tensions(self) -> Floats:
+        """(k,) the mean tension of each strip, force/length."""
+        s, source = self.surface, self.mesh.source
+        pulls = effective_tensions(s, s.vertices, s.faces, s.patch_of_face)[source]
+        area = face_areas(self.mesh.X[self.mesh.F])
+        return np.bincount(self.strip_of_face, area * pulls) / np.bincount(self.strip_of_face, area)
+
+    @cached_property
+    def sides(self) -> Sides:
+        """The sides of triangles along cuts and rims."""
+        edge = self.mesh.topology.edge_of_face.ravel()
+        chosen = np.flatnonzero(self.mesh.cut_edge[edge])
+        chosen = chosen[np.argsort(edge[chosen], kind="stable")]
+        start, end = (3 * (chosen // 3) + (chosen % 3 + step) % 3 for step in (1, 2))
+        corner, own = self.mesh.F.ravel(), self.mesh.pieces.faces.ravel()
+        forward = corner[start] < corner[end]
+        low, high = np.where(forward, start, end), np.where(forward, end, start)
+        ends = np.stack([own[low], own[high]], axis=1)
+        return Sides(edge[chosen], ends, forward, self.strip_of_face[chosen // 3])
+
+    @cached_array
+    def seam_of_edge(self) -> Ints:
+        """(e,) the number of the seam on each edge of the mesh, -1 for rims, junctions and edges within."""
+        seam = np.full(len(self.mesh.topology.edges), -1)
+        seam[self.mesh.topology.edge_numbers(self.mesh.cuts)] = self.mesh.seam
+        return seam
+
+    def laid_flat(self) -> Flat:
+        """Each strip alone, with its warp along x."""
+        none = SewnEdges(np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64))
+        F, ones = self.mesh.pieces.faces, np.ones((len(self.X), 2))
+        flat = flattened(self.X, F, self.strip_of_vertex, none, ones)
+        points = flat.points.copy()
+        for k, along in enumerate(self.along):
+            mine = self.strip_of_vertex == k
+            points[mine] = _turned(points[mine], self._warp(k, along, flat.points))
+        return flat._replace(points=points)
+
+    def _warp(self, k: int, along: Floats | None, points: Floats) -> Floats:
+        """(2,) where the direction of the warp lies on a flat strip."""
+        mine = self.strip_of_face == k
+        faces = self.mesh.pieces.faces[mine]
+        if along is None:
+            ends = points[np.unique(faces)]
+            angles = np.radians(np.arange(0.0, 180.0, 0.5))
+            axes = np.stack([-np.sin(angles), np.cos(angles)])
+            return np.array([axes[1], -axes[0]])[:, np.ptp(ends @ axes, axis=0).argmin()]
+        P, Q = self.X[faces], points[faces]
+        edges = np.stack([P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]], axis=1)
+        flat = np.stack([Q[:, 1] - Q[:, 0], Q[:, 2] - Q[:, 0]], axis=1)
+        gram = edges @ edges.transpose(0, 2, 1)
+        share = np.linalg.solve(gram, (edges @ along)[:, :, None])[:, :, 0]  # along = share · edges + normal
+        return (face_areas(P)[:, None] * np.einsum("mi,mij->mj", share, flat)).sum(axis=0)
+
+    def sewn(self, flat: Flat, stretch: Sequence[tuple[float, float]]) -> Flat:
+        """The strips with sides of seams that are equally long once they are cut."""
+        sides = self.sides
+        first = np.searchsorted(sides.edge, sides.edge)  # the side that all others at an edge are sewn to
+        others = np.flatnonzero(first != np.arange(len(first)))
+        seams = SewnEdges(sides.ends[first[others]], sides.ends[others])
+        by_vertex = np.array(stretch)[self.strip_of_vertex]
+        F = self.mesh.pieces.faces
+        return flattened(self.X, F, self.strip_of_vertex, seams, by_vertex, flat.points)
+
+
+def _turned(points: Floats, axis: Floats) -> Floats:
+    """Points (v,2) turned so that ``axis`` lies along x, their longer half below."""
+    c, s = axis / (np.linalg.norm(axis) or 1.0)
+    return points @ np.array([[c, -s], [s, c]])
+
+
+def loops(local: Ints, sides: Sides, mine: Bools) -> list[Ints]:
+    """The outlines of a strip: vertices in the order of its triangles, the longest first."""
+    ends = local[np.where(sides.forward[mine, None], sides.ends[mine], sides.ends[mine, ::-1])]
+    after = dict(ends.tolist())
+    found = []
+    while after:
+        loop = [next(iter(after))]
+        while (following := after.pop(loop[-1])) != loop[0]:
+            loop.append(following)
+        found.append(np.array(loop))
+    return sorted(found, key=len, reverse=True)
+
+
+def seams_of(cloth: Cloth, local: Ints) -> list[Seam]:
+    """Cut edges joined to seams: those with the same strips beside them, drawn as one line."""
+    mesh, sides = cloth.mesh, cloth.sides
+    topo = mesh.topology
+    keys: dict[tuple[Any, ...], list[int]] = {}
+    start = np.flatnonzero(np.append(True, np.diff(sides.edge) > 0))
+    for first, after in zip(start, np.append(start[1:], len(sides.edge)), strict=True):
+        edge = int(sides.edge[first])
+        beside = tuple(sorted(sides.strip[first:after].tolist()))
+        keys.setdefault((beside, int(cloth.seam_of_edge[edge])), []).append(edge)
+    seams: list[Seam] = []
+    for (beside, number), edges in keys.items():
+        mask = np.zeros(len(topo.edges), dtype=bool)
+        mask[edges] = True
+        kind = "rim" if len(beside) == 1 else "seam" if number >= 0 else "junction"
+        for curve in topo.curves_among(mask):
+            numbers = topo.edge_numbers(curve.pairs)
+            onward = curve.pairs[:, 0] < curve.pairs[:, 1]
+            found: dict[tuple[int, bool], Ints] = {}
+            at = np.searchsorted(sides.edge, numbers)
+            for step in range(len(beside)):
+                ends = local[np.where(onward[:, None], sides.ends[at + step], sides.ends[at + step, ::-1])]
+                left = sides.forward[at + step] == onward
+                for k, (strip, forward) in enumerate(zip(sides.strip[at + step], left, strict=True)):
+                    rows = found.setdefault((int(strip), bool(forward)), np.empty_like(ends))
+                    rows[k] = ends[k]
+            points = mesh.X[np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices]
+            both = [Side(strip + 1, rows, forward) for (strip, forward), rows in sorted(found.items())]
+            seams.append(Seam(0, kind, points, both))
+    seams.sort(key=lambda s: (KINDS.index(s.kind), [side.strip for side in s.sides]))
+    return [replace(seam, number=k) for k, seam in enumerate(seams, 1)]

@@ -1,0 +1,222 @@
+"""Drawings of a cutting pattern: seams on the roof, strips with allowances, notches and labels, tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ..base.arrays import Floats
+from ..base.files import suffix_of
+from ..base.libraries import load_library
+from ..base.units import Units, as_units, expect_length, length_factor
+from ..certificate.certificate import warning_mark
+from ..drawings import DrawingSet, Sheet
+from ..drawings.drawing_set import DECIMALS
+from ..drawings.drawing_set import SUFFIXES as DRAWINGS
+from ..drawings.sheet import SheetLine, Text, add_frames, table_sheets
+from ..drawings.views import DrawnView, placed
+from .strips import CuttingPattern, Seam, Side, Strip
+
+SUFFIXES = (*DRAWINGS, ".csv")
+LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "rim": "PCMC-RIM"}
+PER_SHEET = 4  # strips drawn to scale on a sheet
+LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
+ARROW = 0.3  # of a strip's length: the arrow of its warp
+
+
+class Label(NamedTuple):
+    """A text beside an edge of a strip."""
+
+    at: Floats  # (2,)
+    text: str
+    inward: Floats  # (2,) unit vector away from the edge
+
+
+def pattern_drawings(
+    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = ""
+) -> DrawingSet:
+    """The sheets of a cutting pattern, and a model with all strips flat at true size, for .dxf, .pdf, .svg.
+
+    Parameters
+    ----------
+    units : of the lengths: "m", "cm", "mm", "ft" or "in".
+    sheet : format of the sheets, "A4" to "A0".
+    name : of the roof, in the title strips.
+
+    >>> from pcmc import Patch, Surface, cutting_pattern
+    >>> flat = Surface([[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
+    ...                [Patch("sail", 2.0, pressure=0.0)], fixed=range(4))
+    >>> drawings = pattern_drawings(cutting_pattern(flat, strips=2), "m", sheet="A3")
+    >>> [page.title for page in drawings.sheets]
+    ['Seams on the roof', 'Strips 1 to 2, outside up', 'Strips', 'Seams']
+    """
+    length = expect_length(as_units(units).length, "a cutting pattern")
+    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    curves = [SheetLine(seam.points, LAYER_OF[seam.kind], name=f"S{seam.number}") for seam in pattern.seams]
+    middles = [strip.areas @ strip.roof[strip.faces].mean(axis=1) / strip.area for strip in pattern.strips]
+    size = sheet, millimetres, None, decimals
+    sheets = [placed([_roof_view(pattern, curves, middles)], "Seams on the roof", *size)]
+    for first in range(0, len(pattern.strips), PER_SHEET):
+        group = pattern.strips[first : first + PER_SHEET]
+        title = f"Strips {group[0].number} to {group[-1].number}, outside up"
+        views = [_strip_view(pattern, strip) for strip in group]
+        sheets.append(placed(views, title, *size))
+    head = {"area": f"area, {length}²", "cut_area": f"cut area, {length}²", "strain_min": "strain from, %"}
+    head |= {"strain_max": "to, %", "strain_rms": "mean, %", "warp": "warp shorter, %", "weft": "weft, %"}
+    table = _texts(pattern.table, decimals, "length", "width")
+    sheets += table_sheets("Strips", table.rename(columns=head), sheet, 2)
+    sewn = pattern.seam_table.query("kind != 'rim'")[["seam", "kind", "strips", "length", "cut_length"]]
+    if len(sewn):
+        table = _texts(sewn, decimals, "length", "cut_length")
+        sheets += table_sheets("Seams", table.rename(columns={"cut_length": "cut length"}), sheet, 2)
+    add_frames(sheets, name, length, warning_mark(pattern.certificate))
+    points = pd.DataFrame(
+        [[str(s.number), *at, "strip"] for s, at in zip(pattern.strips, middles, strict=True)],
+        columns=["point", *"xyz", "on"],
+    )
+    about = pattern.surface, length, pattern.certificate, curves
+    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets)
+
+
+def table_paths(path: Path) -> list[Path]:
+    """The files that one of a pattern is: those of a .csv are the tables of strips and of seams."""
+    return (
+        [path, path.with_name(f"{path.stem}-seams{path.suffix}")] if path.suffix.lower() == ".csv" else [path]
+    )
+
+
+def pattern_files(
+    pattern: CuttingPattern,
+    paths: Iterable[str | os.PathLike[str]],
+    units: str | Units,
+    sheet: str = "A1",
+    name: str = "",
+) -> list[tuple[Path, Callable[[Path], Any]]]:
+    """Each file of a cutting pattern with the function that writes it; FileError for an unknown suffix."""
+    given = list(map(Path, paths))
+    drawn = [path for path in given if suffix_of(path, SUFFIXES, "a cutting pattern") != ".csv"]
+    jobs: list[tuple[Path, Callable[[Path], Any]]] = []
+    if drawn:
+        jobs += pattern_drawings(pattern, units, sheet=sheet, name=name).files(*drawn)
+    for path in given:
+        if path not in drawn:
+            tables = zip(table_paths(path), (pattern.table, pattern.seam_table), strict=True)
+            jobs += [(file, partial(table.to_csv, index=False)) for file, table in tables]
+    return jobs
+
+
+def _texts(table: pd.DataFrame, decimals: int, *lengths: str) -> pd.DataFrame:
+    """A table whose lengths are texts with so many decimals."""
+    return table.assign(**{key: [f"{x:.{decimals}f}" for x in table[key]] for key in lengths})
+
+
+def _roof_view(pattern: CuttingPattern, curves: list[SheetLine], middles: list[Floats]) -> DrawnView:
+    """The seams from above, with the numbers of strips, and the places of corners along both axes."""
+    axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
+    lines = [curve._replace(points=curve.points @ axes.T) for curve in curves]
+    texts = [(at @ axes.T, str(s.number), nowhere) for s, at in zip(pattern.strips, middles, strict=True)]
+    every = np.concatenate([line.points for line in lines])
+    ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
+    return DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
+
+
+def _strip_view(pattern: CuttingPattern, strip: Strip) -> DrawnView:
+    """A strip as it is cut, with its net length and width."""
+    lines, labels = strip_lines(pattern, strip)
+    texts = [(label.at, label.text, label.inward) for label in labels]
+    texts.append((_inside(strip), f"{strip.number}", np.zeros(2)))
+    title = f"strip {strip.number}, {strip.patch}"
+    stations = np.array([0.0, strip.length]), np.array([0.0, strip.width])
+    return DrawnView(title, lines, texts, stations=stations)
+
+
+def _inside(strip: Strip) -> Floats:
+    """(2,) a point in the middle of a cut strip."""
+    polygon = load_library("shapely", "cloth").Polygon(strip.cut[strip.outlines[0]])
+    return np.array(polygon.representative_point().coords[0])
+
+
+def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine], list[Label]]:
+    """What is drawn of a strip in its own coordinates, in the unit of the surface: the line to cut along, the
+    seam lines, notches and the arrow of the warp; and the labels of its sides: seam and neighbour."""
+    shapely = load_library("shapely", "cloth")
+    options = pattern.options
+    cloth = shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])
+    net = [SheetLine(strip.cut[loop], "PCMC-SEAM", True) for loop in strip.outlines]
+    marks: list[SheetLine] = []
+    labels = []
+    step = options.notches
+    if step is None:
+        step = float(np.mean([s.width for s in pattern.strips]))
+    for seam in pattern.seams:
+        added = options.rim_allowance if seam.kind == "rim" else options.allowance
+        for side in seam.sides:
+            if side.strip != strip.number:
+                continue
+            path = np.concatenate([strip.cut[side.edges[:, 0]], strip.cut[side.edges[-1:, 1]]])
+            if added > 0.0:
+                around = shapely.LineString(path).buffer(added, cap_style="square", join_style="mitre")
+                cloth = cloth.union(around)
+            places = _notches(seam, step) if seam.kind != "rim" and step > 0.0 else np.empty(0)
+            length = added or 0.02 * strip.width
+            for at, inward in (_along(seam, side, strip, place) for place in places):
+                marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
+            at, inward = _along(seam, side, strip, 0.5 * seam.length)
+            others = "+".join(str(s.strip) for s in seam.sides if s is not side)
+            labels.append(Label(at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
+    shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []
+    cut = [SheetLine(np.array(ring.coords[:-1]), "PCMC-CUT", True) for ring in shapes]
+    return [*cut, *net, *marks, *_arrow(strip)], labels
+
+
+def _notches(seam: Seam, step: float) -> Floats:
+    """Places along a seam, about ``step`` apart, the same for all of its sides."""
+    count = int(seam.length / step)
+    return seam.length * np.arange(1, count + 1) / (count + 1)
+
+
+def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:
+    """The point (2,) of a strip at a length along a seam on the roof, and the unit vector into the strip."""
+    total = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(seam.points, axis=0), axis=1)))
+    k = min(int(np.searchsorted(total, place, side="right")) - 1, len(total) - 2)
+    a, b = strip.cut[side.edges[k]]
+    share, (x, y) = (place - total[k]) / (total[k + 1] - total[k]), (b - a) / np.linalg.norm(b - a)
+    return a + share * (b - a), np.array([-y, x]) if side.forward else np.array([y, -x])
+
+
+def _arrow(strip: Strip) -> list[SheetLine]:
+    """The arrow along the warp, a tenth of the width below the strip's number."""
+    middle = _inside(strip) - np.array([0.0, 0.1 * strip.width])
+    half = 0.5 * ARROW * strip.length
+    tail, tip = middle - np.array([half, 0.0]), middle + np.array([half, 0.0])
+    barb = 0.1 * min(half, strip.width)
+    head = np.array([tip - [barb, -0.5 * barb], tip, tip - [barb, 0.5 * barb]])
+    return [SheetLine(np.array([tail, tip]), "PCMC-WARP"), SheetLine(head, "PCMC-WARP")]
+
+
+def _side_by_side(pattern: CuttingPattern, millimetres: float) -> Sheet:
+    """All strips above one another at true size, mm, on one sheet without an end: for the model space."""
+    sheet, top = Sheet("Strips", "A0", "1:1"), 0.0
+    for strip in pattern.strips:
+        lines, labels = strip_lines(pattern, strip)
+        every = millimetres * np.concatenate([line.points for line in lines])
+        low, high = every.min(axis=0), every.max(axis=0)
+        shift = np.array([-low[0], top - high[1]])
+        top -= high[1] - low[1] + GAP
+        sheet.lines += [line._replace(points=millimetres * line.points + shift) for line in lines]
+        height = min(LETTERS, 0.1 * millimetres * strip.width)
+        about: Any = {"layer": "PCMC-LABEL", "align": "C"}
+        for label in labels:
+            turn = float(np.degrees(np.arctan2(label.inward[1], label.inward[0]))) - 90.0
+            turn = (turn + 90.0) % 180.0 - 90.0
+            at = millimetres * label.at + height * label.inward + shift
+            sheet.texts.append(Text(at, label.text, height, turn=turn, **about))
+        title = f"{strip.number}  {strip.patch}"
+        sheet.texts.append(Text(millimetres * _inside(strip) + shift, title, 1.5 * height, **about))
+    return sheet

@@ -1,0 +1,62 @@
+"""A roof under load: its deflections, and its least membrane forces, case by case."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.errors import unknown
+from ..base.units import Units
+from .figure import Image, Path
+from .pictures import panel
+
+if TYPE_CHECKING:
+    from ..structure import Analysis
+
+MOST = 6  # cases of a picture
+SHOWN = ("deflection", "least force")
+
+
+def under_load(
+    analysis: Analysis,
+    path: Path | None = None,
+    *,
+    what: str = "deflection",
+    cases: tuple[str, ...] = (),
+    units: Units | None = None,
+    **options: Any,
+) -> Image:
+    """What a roof does under its cases, side by side; see ``pcmc.analyse``.
+
+    Parameters
+    ----------
+    what : "deflection", along Π's normal, or "least force", the smaller principal membrane force; grey where
+        it is not above 0, so that the membrane is slack and wrinkles.
+    cases : names of those to draw; by default those with the largest displacements, six at most.
+    units : of the scale; by default those of the model.
+    options : as of ``panel``, such as ``views`` and ``width``.
+    """
+    validate.choice("what", what, SHOWN)
+    units, surface = units or analysis.model.units, analysis.model.surface
+    names = [case.name for case in analysis.cases]
+    for name in cases:
+        if name not in names:
+            validate.refuse("cases", name, "names of cases", hint=unknown("case", name, names))
+    if not cases:
+        by_size = sorted(names[1:], key=lambda name: -analysis[name].results.largest_displacement)
+        cases = tuple(name for name in names if name in by_size[:MOST] or len(names) == 1)
+    chosen = [analysis[name] for name in cases]
+    if what == "deflection":
+        scalars = [case.results.deflections for case in chosen]
+        look: dict[str, Any] = {"label": f"deflection, {units.length or 'length'}"}
+    else:
+        scalars = [np.where(c.results.slack, np.nan, c.results.principal_forces[:, 0]) for c in chosen]
+        known = [values[np.isfinite(values)] for values in scalars]
+        most = max((float(values.max()) for values in known if len(values)), default=1.0)
+        look = {"label": f"least membrane force, {units.tension}; grey: slack", "limits": (0.0, most)}
+    titles = [c.name if c.carried else f"{c.name}, at {100.0 * c.share:.0f} % of it" for c in chosen]
+    look |= {"edges": False, "supports": False, "titles": titles}
+    look |= {"columns": 1} if len(chosen) == 1 else {}
+    return panel([surface] * len(chosen), path, scalars=scalars, **(look | options))

@@ -1,0 +1,54 @@
+"""The chapter of a report on a roof under load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from ..base.units import Units
+from ..plot import under_load
+from ..plot.figure import png
+from .tables import Block, Columns, Heading, Picture, column, columns_of, text_table, vectors_of
+
+if TYPE_CHECKING:
+    from ..structure import Analysis
+
+PIXELS = 1300  # width of a picture
+ABOUT = (
+    "Each case starts from the form-finding load and self-weight; combinations have the factors of the "
+    "project. Deflections are along the normal of the plane. Forces of the membrane are principal stresses "
+    "times the thickness; where the least of them is not above 0 the membrane is slack and wrinkles. A share "
+    "below 100 % is the part of the loads up to which CalculiX finds an equilibrium, taut that up to which "
+    "nothing is slack."
+)
+
+
+def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
+    """Cases, answers, pictures, and the tables of patches, supports and cables."""
+    force = units.force or "force"
+    yield Heading("Under load", new_page=True)
+    yield ABOUT
+    table = analysis.table
+    columns: Columns = {f"{key}, %": [f"{100.0 * v:.0f}" for v in table[key]] for key in ("share", "taut")}
+    columns |= columns_of(table, ["down", "up", "moved"], units.length)
+    columns |= columns_of(table, ["least_force", "largest_force"], units.tension)
+    columns |= columns_of(table, ["slack_area"], units.area)
+    if "pressure" in table:
+        columns |= columns_of(table, ["pressure"], units.pressure)
+    yield text_table("Cases and combinations", {"case": table["case"]}, columns)
+    yield from (f"{line[:1].upper()}{line[1:]}." for line in analysis.answers(units))
+    for what in ("deflection", "least force"):
+        yield Picture("", png(under_load(analysis, what=what, units=units, width=PIXELS)))
+    table = analysis.patches
+    columns = columns_of(table, ["least_force", "mean_force", "largest_force"], units.tension)
+    columns |= columns_of(table, ["slack_area"], units.area)
+    yield text_table("Membrane forces by patch", {"case": table["case"], "patch": table["patch"]}, columns)
+    table = analysis.supports
+    columns = {f"length, {units.length}": column(table["length"].where(table["length"] > 0.0))}
+    columns |= vectors_of(table, "force", "F", force)
+    words: Columns = {"case": table["case"], "": table["support"], "kind": table["kind"]}
+    yield text_table("Forces of the supports on the roof", words, columns)
+    table = analysis.cables
+    if len(table):
+        columns = columns_of(table, ["least", "largest"], force)
+        yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)

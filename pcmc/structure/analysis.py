@@ -1,0 +1,373 @@
+"""The answer of a structural model: each case and combination analysed as far as it is carried, in tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+
+import numpy as np
+import pandas as pd
+
+from ..base.arrays import Floats
+from ..base.units import Units
+from ..certificate.forces import Forces
+from ..certificate.supports import FORCE, support_table
+from ..surface.geometry import face_areas
+from .calculix import CalculixError, expect_program, run_as_far
+from .gas import balanced_pressure
+from .loads import Step
+from .model import StructuralModel, expect_model
+from .results import StepResults
+
+THROUGH = 1e-3  # of the size: a roof that has sunk farther below Π hangs through
+NOWHERE = 1e-9  # of the size: a smaller coordinate is 0
+STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
+FARTHER = 1.35  # each further factor over the one before
+TRIES = 4
+OnCase = Callable[[str], object]  # called with a few words before each case
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A case or combination of loads, as far as the roof carries it.
+
+    Attributes
+    ----------
+    name : of the step.
+    results : at the share of the load that was reached.
+    share : of the loads besides the form-finding load and self-weight: 1 if all of it is carried. Where
+        self-weight itself is not carried it is 0, and the results are those of the share of self-weight.
+    pressure, volume : of the enclosed gas, NaN without one.
+    """
+
+    name: str
+    results: StepResults
+    share: float
+    pressure: float = np.nan
+    volume: float = np.nan
+
+    @property
+    def carried(self) -> bool:
+        """Whether all of the load is carried."""
+        return self.share >= 1.0
+
+    @property
+    def taut(self) -> float:
+        """The share of its loads up to which no part of the membrane is slack."""
+        return min(self.results.taut, self.share)
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """What a roof does under each case and combination; see ``analyse``. ``print`` shows the main numbers.
+
+    Attributes
+    ----------
+    model : the model.
+    cases : the form-finding load first, then the loads and combinations.
+    remedy : a factor on all tensions and pressures, tried: with it the same shape carries all cases; 0 where
+        none of those tried is enough, None where none was tried.
+    """
+
+    model: StructuralModel
+    cases: tuple[Case, ...]
+    remedy: float | None = None
+
+    @property
+    def carried(self) -> bool:
+        """Whether each case is carried as a whole."""
+        return all(case.carried for case in self.cases)
+
+    def __getitem__(self, name: str) -> Case:
+        """The case of a name."""
+        return next(case for case in self.cases if case.name == name)
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """A row per case and combination.
+
+        Columns: ``case``; ``share`` of its loads that is reached; ``taut``, the share up to which nothing is
+        slack; ``down`` and ``up``, the largest
+        deflections along Π's normal; ``moved``, the largest displacement, at ``x``, ``y``, ``z``;
+        ``least_force`` and ``largest_force`` of the principal membrane forces, force/length, the least at
+        ``least_x``, …;
+        ``slack_area``, where one of them is not above 0, and ``slack_share``, that over the area;
+        ``force_x``, …, the sum of all reactions. With a gas ``pressure`` and ``volume``.
+        """
+        rows = []
+        for case in self.cases:
+            found, X = case.results, self.model.surface.vertices
+            size = np.linalg.norm(found.displacements, axis=1)
+            far, forces = int(np.nanargmax(size)), found.principal_forces
+            place = self.place_of_least(case)
+            area = self._areas[found.slack].sum()
+            row = {"case": case.name, "share": case.share, "taut": case.taut}
+            row |= {
+                "down": max(0.0, -np.nanmin(found.deflections)),
+                "up": max(0.0, np.nanmax(found.deflections)),
+            }
+            row |= {"moved": size[far]} | dict(zip("xyz", X[far], strict=True))
+            row |= {"least_force": np.nanmin(forces), "largest_force": np.nanmax(forces)}
+            row |= {f"least_{axis}": value for axis, value in zip("xyz", place, strict=True)}
+            row |= {"slack_area": area, "slack_share": area / self._areas.sum()}
+            row |= dict(zip(FORCE, found.reactions.sum(axis=0), strict=True))
+            if self.model.gas is not None:
+                row |= {"pressure": case.pressure, "volume": case.volume}
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def patches(self) -> pd.DataFrame:
+        """A row per case and patch: ``least_force``, ``mean_force`` and ``largest_force`` of the principal
+        membrane forces, force/length, and ``slack_area``."""
+        rows, patch_of = [], self.model.surface.patch_of_face
+        for case in self.cases:
+            forces = case.results.principal_forces
+            for k, patch in enumerate(self.model.surface.patches):
+                mine = (patch_of == k) & np.isfinite(forces).all(axis=1)
+                if mine.any():
+                    mean = float(self._areas[mine] @ forces[mine].mean(axis=1) / self._areas[mine].sum())
+                    row = {"case": case.name, "patch": patch.name, "least_force": forces[mine].min()}
+                    row |= {"mean_force": mean, "largest_force": forces[mine].max()}
+                    rows.append(row | {"slack_area": self._areas[mine & case.results.slack].sum()})
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def supports(self) -> pd.DataFrame:
+        """A row per case and support, numbered as in ``Certificate.supports``: ``support``, ``name``,
+        ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts."""
+        tables, columns = [], ["support", "name", "kind", "length", *"xyz", *FORCE]
+        for case in self.cases:
+            acting = Forces.of(self.model.standing, case.results.reactions)
+            table = support_table(acting)[columns]
+            table.insert(0, "case", case.name)
+            tables.append(table)
+        return pd.concat(tables, ignore_index=True)
+
+    @cached_property
+    def cables(self) -> pd.DataFrame:
+        """A row per case and cable: the ``least`` and ``largest`` tension along it, force; below 0 it is
+        slack."""
+        rows = []
+        for case in self.cases:
+            for name, along in case.results.cable_tensions.items():
+                rows.append({"case": case.name, "cable": name, "least": along.min(), "largest": along.max()})
+        return pd.DataFrame(rows, columns=["case", "cable", "least", "largest"])
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """All tables by name; that of cables only if there are any."""
+        tables = {"cases": self.table, "patches": self.patches, "supports": self.supports}
+        return tables | ({"cables": self.cables} if len(self.cables) else {})
+
+    def place_of_least(self, case: Case) -> Floats:
+        """(3,) the middle of the triangle whose least principal force is the smallest."""
+        face = int(np.nanargmin(case.results.principal_forces[:, 0]))
+        surface = self.model.surface
+        return np.asarray(surface.vertices[surface.faces[face]].mean(axis=0))
+
+    def sunk(self, case: Case) -> float:
+        """How far a roof that stood above Π has come below it, length; 0 if it has not."""
+        surface, moved = self.model.surface, np.nan_to_num(case.results.displacements)
+        before, after = (surface.plane.height(surface.vertices + by) for by in (0.0, moved))
+        above = before > THROUGH * surface.size
+        depth = -float(after[above].min(initial=np.inf))
+        return depth if depth > THROUGH * surface.size else 0.0
+
+    def answers(self, units: Units | None = None) -> list[str]:
+        """A sentence for each case that is not carried, or has slack parts, and what helps."""
+        units, lines = units or self.model.units, []
+        for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
+            smallest = NOWHERE * self.model.surface.size
+            at = [0.0 if abs(row[f"least_{c}"]) < smallest else row[f"least_{c}"] for c in "xyz"]
+            x, y, z = (f"{value:.3g}" for value in at)
+            face = int(np.nanargmin(case.results.principal_forces[:, 0]))
+            patch = self.model.surface.patches[self.model.surface.patch_of_face[face]].name
+            place = f"around ({x}, {y}, {z}) of {patch!r}"
+            least = f"the least force {row['least_force']:.3g}{units.behind('tension')} {place}"
+            area = f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}"
+            area += units.behind("area")
+            if row["slack_area"] > 0.0:
+                state = f"{area}, {least}"
+            else:
+                state = f"nothing is slack yet, {least}"
+            if not case.carried:
+                share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
+                lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
+            elif row["slack_area"] > 0.0:
+                lines.append(f"{case.name}: carried, but {state}: there it wrinkles")
+            if (depth := self.sunk(case)) > 0.0:
+                below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
+                lines.append(f"{case.name}: {below}, as a bag that gathers water")
+        if self.remedy:
+            factor = f"{self.remedy:.3g} times as large"
+            lines.append(
+                f"tried: with tensions, cables and pressures {factor} the same shape carries all cases"
+            )
+        elif self.remedy is not None:
+            lines.append("tried: larger tensions and pressures in the same ratio; they are not enough")
+        elif not self.carried:
+            lines.append("what may help: larger tensions and pressures, or less load (not tried)")
+        return lines
+
+    def __str__(self) -> str:
+        """The main columns of the table, and the answers."""
+        shown = ["case", "share", "taut", "down", "up", "least_force", "largest_force", "slack_area"]
+        shown += ["pressure"] if self.model.gas is not None else []
+        table = self.table[shown].rename(columns={"least_force": "least force", "largest_force": "largest"})
+        table = table.rename(columns={"slack_area": "slack area"})
+        for name in ("share", "taut"):
+            table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
+        return "\n".join([table.to_string(index=False, float_format=lambda v: f"{v:.4g}"), *self.answers()])
+
+    @cached_property
+    def _areas(self) -> Floats:
+        surface = self.model.surface
+        return face_areas(surface.vertices[surface.faces])
+
+
+def analyse(
+    model: StructuralModel,
+    *,
+    timeout: float | None = None,
+    remedy: bool = True,
+    progress: OnCase | None = None,
+) -> Analysis:
+    """Run CalculiX on a structural model: each case and combination on its own, as far as it is carried.
+
+    A case starts from the form-finding load and self-weight. Its loads grow until all of them act, or no
+    equilibrium is found: membranes whose prestress is used up carry nothing across. Then the case ends with
+    the share of its loads that was reached. With an enclosed gas its pressure is found, too.
+
+    Parameters
+    ----------
+    model : the model, with its loads and combinations.
+    timeout : seconds for each run of the program; by default none.
+    remedy : where a case is not carried, try the same shape with larger tensions and pressures.
+    progress : called with a few words before each case.
+
+    Raises
+    ------
+    CalculixError : the program is not installed, took too long, or finds the form not at rest.
+
+    >>> from pcmc import Material, Patch, Snow, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> model = StructuralModel(roof, Material(young=1e6), thickness=0.001, loads=[Snow(0.5)])
+    >>> print(analyse(model).table[["case", "share"]])  # doctest: +SKIP
+                case  share
+    0  form pressure    1.0
+    1           snow    1.0
+    """
+    expect_model(model)
+    expect_program()
+    say = progress or (lambda words: None)
+    permanent, others = _permanent(model)
+    start = run_as_far(model, [model.steps[0], *permanent], timeout)
+    form = _case_of(model, model.steps[0].name, start[:1], 1)
+
+    def one(step: Step) -> Case:
+        return analyse_step(model, permanent, step, timeout)
+
+    cases = [_case_of(model, step.name, start[: k + 2], k + 2) for k, step in enumerate(permanent)]
+    found = chain([form], cases, _in_parallel(one, others, say))
+    analysis = Analysis(model, tuple(found))
+    if analysis.carried or not remedy or _has_weight(model):
+        return analysis
+    return replace(analysis, remedy=_remedy(analysis, timeout, say))
+
+
+def analyse_step(
+    model: StructuralModel, permanent: Sequence[Step], step: Step, timeout: float | None = None
+) -> Case:
+    """One case, after the form-finding load and the ``permanent`` steps; with the gas in balance."""
+    before, gas = [model.steps[0], *permanent], model.gas
+    if gas is None:
+        return _case_of(model, step.name, run_as_far(model, [*before, step], timeout), len(before) + 1)
+    standing, outside = model.standing, gas.outside(model.units)
+    first, volume = gas.pressure(standing), gas.first_volume(standing)
+    signs = gas.signs(standing)[standing.patch_of_face]
+
+    def law(pressure: float) -> tuple[Case, float | None]:
+        acting = replace(step, pressures=step.pressures + (pressure - first) * signs)
+        case = _case_of(model, step.name, run_as_far(model, [*before, acting], timeout), len(before) + 1)
+        now = volume + gas.change(standing, np.nan_to_num(case.results.displacements))
+        case = replace(case, pressure=pressure, volume=now)
+        return case, (outside + first) * volume / now - outside if case.carried else None
+
+    case, _, agreed = balanced_pressure(first, law, outside)
+    if case.carried and not agreed:
+        text = f"{step.name}: the pressure of the gas does not settle, at {case.pressure:.4g} at last"
+        raise CalculixError(f"{text}; is Gas.ambient in the model's units?", what="gas", where=step.name)
+    return case
+
+
+def _permanent(model: StructuralModel) -> tuple[list[Step], list[Step]]:
+    """The steps of self-weight alone, which stay, and the others, combinations among them."""
+    form, *others = model.steps
+    alone = [
+        step
+        for step in others[: len(model.loads)]
+        if step.gravity and (step.forces == form.forces).all() and (step.pressures == form.pressures).all()
+    ]
+    return alone, [step for step in others if all(step is not one for one in alone)]
+
+
+def _case_of(model: StructuralModel, name: str, found: Sequence[StepResults], wanted: int) -> Case:
+    """The case from the results of its steps: of the last one that was begun."""
+    share = found[-1].share if len(found) == wanted else 0.0
+    gas = model.gas
+    if gas is None:
+        return Case(name, found[-1], share)
+    change = gas.change(model.standing, np.nan_to_num(found[-1].displacements))
+    return Case(
+        name, found[-1], share, gas.pressure(model.standing), gas.first_volume(model.standing) + change
+    )
+
+
+def _in_parallel(one: Callable[[Step], Case], steps: Sequence[Step], say: OnCase) -> Iterable[Case]:
+    """The cases of steps, in order; as many at a time as there are cores."""
+    with ThreadPoolExecutor(max_workers=max(1, min(len(steps), os.cpu_count() or 1))) as pool:
+        running = [pool.submit(one, step) for step in steps]
+        for k, (step, future) in enumerate(zip(steps, running, strict=True), 1):
+            say(f"{step.name}, case {k} of {len(steps)}")
+            yield future.result()
+
+
+def _has_weight(model: StructuralModel) -> bool:
+    """Whether weights belong to the form: then it does not stay the same under larger tensions."""
+    return bool(model.surface.heavy)
+
+
+def _remedy(analysis: Analysis, timeout: float | None, say: OnCase) -> float:
+    """A factor on tensions and pressures with which what was not carried is; 0 if none of some is enough."""
+    model, names = analysis.model, [case.name for case in analysis.cases if not case.carried]
+    factor = STRONGER / max(min(case.share for case in analysis.cases), 0.1)
+    for _ in range(TRIES):
+        factor = float(f"{factor:.2g}")
+        say(f"trying {factor:g} times the prestress")
+        stronger = prestressed(model, factor)
+        permanent, others = _permanent(stronger)
+        failed = [step for step in others if step.name in names]
+        cases = [analyse_step(stronger, permanent, step, timeout) for step in failed]
+        if all(case.carried for case in cases):
+            return factor
+        factor *= FARTHER
+    return 0.0
+
+
+def prestressed(model: StructuralModel, factor: float) -> StructuralModel:
+    """The same shape with all tensions and pressures ``factor`` times as large: it is at rest as before."""
+    s = model.surface
+    stronger = s.retensioned(
+        {patch.name: factor * patch.tension for patch in s.patches},
+        {patch.name: factor * (patch.pressure - patch.snow) + patch.snow for patch in s.patches},
+        [patch.name for patch in s.patches if patch.wall],
+        cables={cable.name: factor * cable.tension for cable in s.cables},
+    )
+    return replace(model, surface=stronger, anyway=True, certificate=None)

@@ -1,0 +1,288 @@
+"""Cutting patterns: closed forms, equal seams, and roofs that are cut."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from generators import joined_caps, spherical_cap
+from pcmc import Cable, Patch, Surface, cutting_pattern, solve
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.cloth import Pattern
+from pcmc.cloth.flattening import SewnEdges, flattened
+from pcmc.plan import Plan
+
+NONE = SewnEdges(np.empty((0, 2), dtype=int), np.empty((0, 2), dtype=int))
+
+
+def grid(rows, columns):
+    """Triangles of a grid of (rows + 1) (columns + 1) points."""
+    number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+    a, b, c, d = (
+        part.ravel() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    )
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def on_sphere(longitude, latitude):
+    """Points of the unit sphere on a grid of longitudes and latitudes."""
+    u, v = np.meshgrid(longitude, latitude, indexing="ij")
+    return np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1).reshape(-1, 3)
+
+
+def laid(X, F):
+    return flattened(X, F, np.zeros(len(X), dtype=int), NONE, np.ones((len(X), 2)))
+
+
+def orders(errors):
+    """The orders of convergence of errors where a step is halved each time."""
+    return np.log2(np.array(errors[:-1]) / errors[1:])
+
+
+@cache
+def cap():
+    return solve(spherical_cap()).surface
+
+
+@cache
+def caps():
+    return solve(joined_caps()).surface
+
+
+def test_a_cylinder_is_laid_flat_without_strain():
+    angle, z = np.meshgrid(np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 9), indexing="ij")
+    X = np.stack([np.cos(angle), np.sin(angle), z + 0.2 * angle], axis=-1).reshape(-1, 3)
+    flat = laid(X, grid(40, 8))
+    assert np.abs(flat.strain).max() < 1e-9
+    chord = 2.0 * np.sin(0.025)
+    size = np.hypot(40.0 * chord, 0.0), 1.0  # of the polygonal cylinder, before it is sheared along z
+    assert np.ptp(flat.points, axis=0).max() == pytest.approx(np.hypot(size[0], 1.4), rel=1e-3)
+
+
+def test_the_strain_of_a_strip_on_a_sphere_is_of_order_two_in_its_width():
+    """cos r - 1 = -r²/2 less its mean: w²/24 in the middle, -w²/12 at the edges, on the unit sphere."""
+    middle, edge = [], []
+    for width in (0.4, 0.2, 0.1):
+        X, F = on_sphere(np.linspace(0.0, 2.0, 161), np.linspace(-width / 2, width / 2, 17)), grid(160, 16)
+        strain = laid(X, F).strain
+        longitude, latitude = np.arctan2(*X[F].mean(axis=1)[:, [1, 0]].T), np.arcsin(X[F].mean(axis=1)[:, 2])
+        inner = np.abs(longitude - 1.0) < 0.3  # ends of the strip give way
+        middle.append(strain[inner & (np.abs(latitude) < width / 16), 1].mean())
+        edge.append(strain[inner & (np.abs(latitude) > width * 7 / 16), 0].mean())
+    assert middle == pytest.approx([w * w / 24 for w in (0.4, 0.2, 0.1)], rel=0.03)
+    assert edge == pytest.approx([-((15 / 16) ** 2 / 8 - 1 / 24) * w * w for w in (0.4, 0.2, 0.1)], rel=0.05)
+    assert (orders(middle) > 1.95).all()
+    assert (orders(np.abs(edge)) > 1.95).all()
+
+
+def test_gores_of_a_sphere_are_the_closed_form():
+    """A gore is π/n cos s wide on each side, up to second order in 1/n."""
+    errors = []
+    for n in (8, 16, 32):
+        X = on_sphere(np.linspace(-np.pi / n, np.pi / n, 9), np.linspace(-1.2, 1.2, 97))
+        flat = laid(X, grid(8, 96)).points.reshape(9, 97, 2)
+        along = flat[4, -1] - flat[4, 0]
+        c, s = along / np.linalg.norm(along)
+        turned = (flat - flat[4, 48]) @ np.array([[c, -s], [s, c]])
+        expected = np.pi / n * np.cos(turned[[0, 8], :, 0])
+        errors.append(np.abs(np.abs(turned[[0, 8], :, 1]) - expected).max() / (np.pi / n))
+    assert errors[-1] < 2e-3
+    assert (orders(errors) > 1.9).all()
+
+
+def test_a_sphere_is_cut_into_gores_along_drawn_seams():
+    """A zone of a sphere, closed around its axis, falls into gores that are alike."""
+    n, X = 12, on_sphere(np.arange(48) * 2.0 * np.pi / 48, np.linspace(-1.0, 1.0, 25))
+    F = grid(48, 24)
+    F %= len(X)
+    zone = Surface(X, F, np.zeros(len(F), dtype=int), [Patch("zone", 0.5)], fixed=np.abs(X[:, 2]) > 0.84)
+    ends = on_sphere(np.arange(n) * 2.0 * np.pi / n, np.array([-1.0, 1.0])).reshape(n, 2, 3)
+    pattern = cutting_pattern(zone, seams=ends.tolist(), anyway=True)
+    assert len(pattern.strips) == n
+    table = pattern.table
+    assert table["width"].to_numpy() == pytest.approx(2 * np.pi / n, abs=2 * np.pi / 48)  # an edge
+    assert table["length"].to_numpy() == pytest.approx(2.0, rel=0.03)
+    assert table["area"].sum() == pytest.approx(4.0 * np.pi * np.sin(1.0), rel=5e-3)
+    assert (pattern.seam_table["kind"] == "seam").sum() == n
+    assert pattern.largest_difference < 1e-6
+    with pytest.raises(OptionError, match="where it is laid flat: no cloth follows it"):
+        cutting_pattern(zone, strips=1, anyway=True)
+
+
+@pytest.mark.parametrize("width", [0.3, 0.5, 3.0])
+def test_strips_fit_the_cloth_and_cover_the_roof(width):
+    pattern = cutting_pattern(cap(), width=width, allowance=0.02)
+    table = pattern.table
+    assert table["width"].max() + 0.04 <= width
+    assert table["width"].max() + 0.04 > 0.75 * width or width == 3.0
+    assert len(table) == {0.3: 10, 0.5: 6, 3.0: 1}[width]
+    assert table["area"].sum() == pytest.approx(4.0 * np.pi * 0.6 * 0.5366750419, rel=5e-3)  # of the sphere
+    for strip in pattern.strips:
+        assert strip.cut_area == pytest.approx(strip.area, rel=float(np.abs(strip.strain).max()))
+        assert len(strip.outlines) == 1
+
+
+def test_the_strain_of_strips_is_of_order_two_in_their_width():
+    strains = [cutting_pattern(cap(), strips=count).table["strain_rms"].max() for count in (4, 8)]
+    assert orders(strains) == pytest.approx(2.0, abs=0.3)
+
+
+def test_sides_of_seams_are_equal_also_between_sheets():
+    pattern = cutting_pattern(caps(), width=3.0, compensation=(0.4, 1.5))
+    assert pattern.largest_difference < 1e-6
+    seams = pattern.seam_table
+    assert set(seams["kind"]) == {"seam", "junction", "rim"}
+    assert seams.loc[seams["kind"] != "rim", "difference"].max() < 1e-6
+    ends = {tuple(np.round(x, 9)) for x in seams.loc[seams["kind"] == "seam", ["x0", "y0", "z0"]].to_numpy()}
+    rim = np.array([point for s in pattern.seams if s.kind != "seam" for point in s.points]).round(9)
+    assert ends <= set(map(tuple, rim))
+    for seam in pattern.seams:
+        for side in seam.sides:
+            strip = pattern.strips[side.strip - 1]
+            assert strip.roof[side.edges[:, 0]] == pytest.approx(seam.points[:-1])
+            a, b = (strip.cut[side.edges[:, k]] for k in (0, 1))
+            left = np.array([[0.0, -1.0], [1.0, 0.0]])
+            inside = 0.5 * (a + b) + (1 if side.forward else -1) * 1e-3 * (b - a) @ left.T
+            assert (_winding(strip, inside) == 1).all()
+
+
+def _winding(strip, points):
+    """How often the outline of a strip goes around points."""
+    loop = strip.cut[strip.outlines[0]] - points[:, None]
+    angle = np.arctan2(loop[..., 1], loop[..., 0])
+    steps = np.angle(np.exp(1j * (np.roll(angle, -1, axis=1) - angle)))
+    return np.rint(steps.sum(axis=1) / (2.0 * np.pi)).astype(int)
+
+
+def test_compensation_shortens_cloth_along_warp_and_weft():
+    plain = cutting_pattern(cap(), strips=4, direction=30.0)
+    short = cutting_pattern(cap(), strips=4, direction=30.0, compensation=(1.0, 3.0))
+    assert short.table["length"].to_numpy() == pytest.approx(0.99 * plain.table["length"], rel=2e-3)
+    assert short.table["width"].to_numpy() == pytest.approx(0.97 * plain.table["width"], rel=2e-3)
+    alpha = cap().tensions[0]
+    stiff = cutting_pattern(cap(), strips=4, stiffness=(50.0 * alpha, 50.0 * alpha), poisson=0.2)
+    assert stiff.table[["warp", "weft"]].to_numpy() == pytest.approx(100.0 * (1.0 - 1.0 / 1.016))
+
+
+@given(angle=st.floats(-180.0, 180.0), shift=st.tuples(*[st.floats(-50.0, 50.0)] * 2))
+@settings(max_examples=5, deadline=None)
+def test_a_moved_roof_has_the_same_strips(angle, shift):
+    turn = Rotation.from_euler("z", angle, degrees=True)
+    here = cap()
+    there = here.rebuilt(vertices=turn.apply(here.vertices.copy()) + np.array([*shift, 0.0]), curves=())
+    before, after = (
+        cutting_pattern(surface, strips=3, direction=degrees).table.drop(columns="patch").to_numpy()
+        for surface, degrees in ((here, 20.0), (there, 20.0 + angle))
+    )
+    assert after == pytest.approx(before, rel=1e-5, abs=1e-5)
+
+
+@given(vector=st.tuples(*[st.floats(-3.0, 3.0)] * 3), shift=st.tuples(*[st.floats(-9.0, 9.0)] * 3))
+@settings(max_examples=20, deadline=None)
+def test_strain_does_not_change_under_rigid_motions(vector, shift):
+    X, F = on_sphere(np.linspace(0.0, 1.0, 9), np.linspace(-0.2, 0.2, 5)), grid(8, 4)
+    moved = Rotation.from_rotvec(vector).apply(X) + shift
+    assert laid(moved, F).strain == pytest.approx(laid(X, F).strain, abs=1e-8)
+
+
+def test_seams_can_be_moved():
+    """The ends that the table of seams lists are drawn again, and then elsewhere."""
+    pattern = cutting_pattern(cap(), strips=3, direction=0.0)
+    ends = pattern.seam_table.query("kind == 'seam'")[["x0", "y0", "z0", "x1", "y1", "z1"]].to_numpy()
+    again = cutting_pattern(cap(), seams=ends.reshape(-1, 2, 3).tolist())
+    assert sorted(again.table["area"]) == pytest.approx(sorted(pattern.table["area"]), rel=1e-6)
+    moved = cutting_pattern(cap(), seams=[[[-0.95, -0.1], [0.95, -0.1]]])  # in the plan; put on the rim
+    assert len(moved.strips) == 2
+    assert min(moved.table["area"]) < 0.47 * moved.table["area"].sum()
+
+
+def test_a_slit_that_reaches_no_rim_does_not_open():
+    with pytest.raises(OptionError, match="strip 1 of patch 'cap' lies over itself where it is laid flat"):
+        cutting_pattern(cap(), seams=[[[-0.5, -0.1], [0.5, -0.1]]])
+
+
+def test_a_line_that_ends_inside_a_sheet_is_a_dart():
+    pattern = cutting_pattern(cap(), seams=[[[0.0, -1.0], [0.0, 0.0]]])
+    (strip,) = pattern.strips
+    (dart,) = [seam for seam in pattern.seams if seam.kind == "seam"]
+    assert [side.strip for side in dart.sides] == [1, 1]
+    assert len(strip.outlines) == 1
+    assert pattern.largest_difference < 1e-6
+
+
+def test_cables_and_holes_are_cut_around():
+    lines = {"holes": [{"curve": [[3.0, 1.5], [5.0, 1.5], [5.0, 2.5], [3.0, 2.5]]}]}
+    hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], edge_length=0.5, tension=8.0, **lines).surface()
+    pattern = cutting_pattern(solve(hall).surface, width=1.2, anyway=True)
+    assert pattern.table["width"].max() <= 1.2
+    assert pattern.table["area"].sum() == pytest.approx(sum(pattern.certificate.patches["area"]), rel=1e-4)
+    seams = pattern.seam_table.query("kind == 'seam'")
+    assert len(pattern.strips) == 4
+    assert seams["strips"].tolist() == ["1 | 2", "2 | 3", "2 | 3", "3 | 4"]  # the middle one ends at the hole
+
+
+def test_a_cable_is_a_seam():
+    corners = np.array([[0, 0, 0], [4, 0, 0], [8, 0, 0], [8, 4, 0], [4, 4, 0], [0, 4, 0.0]])
+    faces = [[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4]]
+    flat = Surface(
+        corners, faces, [0] * 4, [Patch("sail", 2.0)], fixed=range(6), cables=[Cable("c", 1.0, [[1, 4]])]
+    )
+    pattern = cutting_pattern(flat, width=9.0, anyway=True)
+    assert pattern.table["area"].tolist() == [16.0, 16.0]
+    assert pattern.seam_table["kind"].tolist().count("junction") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "needs the width of the cloth, a number of strips, or seams; give --width"),
+        ({"width": 0.0}, "width: expected"),
+        ({"width": 1.0, "strips": 2}, "strips: the width gives their number; leave out one of both"),
+        ({"strips": 0}, "strips: expected"),
+        ({"width": 0.1, "allowance": 0.05}, "width: 0.1 leaves no cloth between two allowances of 0.05"),
+        (
+            {"seams": [[[0.0, 0.0], [9.0, 0.0]]]},
+            r"its point \(9, 0\) is off the roof, 8 from it; move it",
+        ),
+        ({"seams": [[[0.0, 0.0]]]}, "two or more points"),
+        ({"seams": [["a", "b"]]}, "two or more points"),
+        (
+            {"seams": [[[-1.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [0.0, 1.0]]]},
+            "seam 2: from .* it crosses another seam, a ridge or a cable; end it there",
+        ),
+        (
+            {"seams": [[[-1.0, 0.0], [1.0, 0.0]]], "width": 0.5},
+            "a strip of 'cap' is 1.* wide",
+        ),
+        ({"strips": 2, "compensation": (1.0,)}, "compensation: expected two numbers"),
+        ({"strips": 2, "compensation": (1.0, 50.0)}, "compensation: expected"),
+        ({"strips": 2, "compensation": (1.0, 1.0), "stiffness": (1.0, 1.0)}, "leave out one of both"),
+        ({"strips": {"dome": 2}}, "dome"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(options, message):
+    with pytest.raises(OptionError, match=message) as refused:
+        cutting_pattern(cap(), **options)
+    assert "\n" not in str(refused.value)
+
+
+def test_uncertified_and_closed_surfaces_are_refused():
+    raised = cap().moved(np.where(cap().fixed[:, None], cap().vertices, cap().vertices * [1.0, 1.0, 1.3]))
+    with pytest.raises(SurfaceError, match="not certified"):
+        cutting_pattern(raised, width=1.0)
+    assert "not certified" in str(cutting_pattern(raised, width=1.0, anyway=True))
+    corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    faces = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+    closed = Surface(corners, faces, [0] * 4, [Patch("bubble", 1.0)], fixed=range(4))
+    with pytest.raises(SurfaceError, match="patch 'bubble' is closed, without a rim"):
+        cutting_pattern(closed, width=1.0, anyway=True)
+
+
+def test_the_stretch_is_what_a_tension_undoes():
+    """The cloth pulled back by α (1 - ν) / S in the warp is as long as on the roof."""
+    warp, weft = Pattern(strips=1, stiffness=(200.0, 100.0), poisson=0.25).stretch(4.0)
+    assert warp * (1.0 + 4.0 * 0.75 / 200.0) == pytest.approx(1.0)
+    assert weft * (1.0 + 4.0 / 100.0 - 0.25 * 4.0 / 200.0) == pytest.approx(1.0)

@@ -1,0 +1,185 @@
+"""Cutting patterns in files: sheets, tables, the section of a project, the command."""
+
+import ezdxf
+import numpy as np
+import pandas as pd
+import pytest
+from shapely import Polygon
+
+from generators import joined_caps
+from pcmc import cutting_pattern, project, solve
+from pcmc.base.errors import MissingExtra, OptionError, PcmcError
+from pcmc.cli import main
+from pcmc.cloth import pattern_drawings
+from pcmc.cloth.sheets import strip_lines
+from pcmc.plot import strains
+
+PROJECT = """
+units = "m"
+[plan]
+edge_length = 0.8
+outline = [[0, 0], [8, 0], [8, 4], [0, 4]]
+dividers = [[[4, 0], [4, 4]]]
+patches = {west = {tension = 6.0}, east = {tension = 6.0}}
+"""
+
+
+@pytest.fixture(scope="module")
+def pattern():
+    options = {"allowance": 0.05, "hem": 0.15, "compensation": (0.5, 1.0), "notches": 1.0}
+    return cutting_pattern(solve(joined_caps()).surface, 3.0, **options)
+
+
+def test_allowances_surround_the_net_strip(pattern):
+    for strip in pattern.strips:
+        lines, labels = strip_lines(pattern, strip)
+        by_layer = {
+            layer: [line for line in lines if line.layer == layer] for layer in {x.layer for x in lines}
+        }
+        (outer,), (net,) = (
+            (Polygon(by_layer[layer][0].points) for layer in ("PCMC-CUT",)),
+            by_layer["PCMC-SEAM"],
+        )
+        inner = Polygon(net.points)
+        assert inner.area == pytest.approx(strip.cut_area)
+        assert outer.contains(inner)
+        hem = outer.boundary.distance(inner)
+        assert hem == pytest.approx(0.05, abs=1e-6)
+        added = sum(
+            (0.15 if seam.kind == "rim" else 0.05) * pattern.side_lengths(side).sum()
+            for seam in pattern.seams
+            for side in seam.sides
+            if side.strip == strip.number
+        )
+        assert outer.area - inner.area == pytest.approx(added, rel=0.15)  # and corners
+        assert len(labels) == sum(side.strip == strip.number for s in pattern.seams for side in s.sides)
+
+
+def test_notches_of_both_sides_lie_on_each_other(pattern):
+    """In as many places, as far along both sides as on the roof."""
+    for seam in pattern.seams:
+        if seam.kind == "rim":
+            continue
+        places = []
+        for side in seam.sides:
+            strip = pattern.strips[side.strip - 1]
+            notches = [x.points[0] for x in strip_lines(pattern, strip)[0] if x.layer == "PCMC-NOTCH"]
+            ends = strip.cut[side.edges]
+            start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+            lengths = np.linalg.norm(along, axis=1)
+            before = np.append(0.0, np.cumsum(lengths))[:-1]
+            found = []
+            for notch in notches:
+                t = ((notch - start) * along).sum(axis=1) / lengths**2
+                away = np.linalg.norm(start + np.clip(t, 0, 1)[:, None] * along - notch, axis=1)
+                if away.min() < 1e-9:
+                    k = int(away.argmin())
+                    found.append(before[k] + t[k] * lengths[k])
+            places.append(sorted(found))
+        assert len(places[0]) == len(places[1]) == int(seam.length)
+        assert places[0] == pytest.approx(places[1], rel=1e-4)
+
+
+def test_sheets_and_model_have_every_strip(pattern, tmp_path):
+    drawings = pattern_drawings(pattern, "m", sheet="A3", name="caps")
+    written = drawings.write(tmp_path / "caps.dxf", tmp_path / "caps.pdf", tmp_path / "caps.svg")
+    assert len(written) == 2 + len(drawings.sheets)
+    assert (tmp_path / "caps.pdf").read_bytes()[:4] == b"%PDF"
+    document = ezdxf.readfile(tmp_path / "caps.dxf")
+    model = document.modelspace()
+    outlines = model.query("LWPOLYLINE[layer=='PCMC-SEAM']")
+    areas = [Polygon([p[:2] for p in line.get_points()]).area for line in outlines]
+    assert areas == pytest.approx([strip.cut_area for strip in pattern.strips])  # true size, in metres
+    assert len(model.query("LWPOLYLINE[layer=='PCMC-CUT']")) == len(pattern.strips)
+    numbers = [text.dxf.text for text in model.query("TEXT[layer=='PCMC-POINT']")]
+    assert numbers == [str(strip.number) for strip in pattern.strips]
+    titles = [sheet.title for sheet in drawings.sheets]
+    assert titles[0] == "Seams on the roof"
+    assert titles[-2:] == ["Strips", "Seams"]
+
+
+def test_the_picture_shows_the_strain(pattern, tmp_path):
+    image = strains(pattern, tmp_path / "strain.png", view="plan", width=300)
+    assert image.shape[1] == 300
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+    of_face = pattern.strain_of_face
+    assert (np.isfinite(of_face) == pattern.surface.roof[pattern.surface.patch_of_face]).all()
+    assert np.nanmax(np.abs(of_face)) <= 100.0 * max(np.abs(strip.strain).max() for strip in pattern.strips)
+
+
+def test_a_project_writes_its_pattern(tmp_path):
+    path = tmp_path / "hall.toml"
+    path.write_text(
+        PROJECT
+        + '[pattern]\nwidth = 1.5\nallowance = 0.03\ncompensation = [0.5, 1.0]\n[output]\nsheet = "A3"\n'
+        'pattern = ["cloth.dxf", "cloth.csv"]\n'
+    )
+    outcome = project.run(path)
+    assert [file.name for file in outcome.files] == ["cloth.dxf", "cloth.csv", "cloth-seams.csv"]
+    table = pd.read_csv(tmp_path / "cloth.csv")
+    assert set(table["patch"]) == {"west", "east"}
+    assert table["width"].max() <= 1.44
+    assert table["area"].sum() == pytest.approx(sum(outcome.certificate.patches["area"][:2]), rel=0.01)
+    seams = pd.read_csv(tmp_path / "cloth-seams.csv")
+    assert seams["difference"].max() < 1e-6
+
+
+def test_the_command_cuts_a_project(tmp_path, capsys):
+    path = tmp_path / "hall.toml"
+    path.write_text(PROJECT + "[pattern]\nwidth = 3.0\nstiffness = [600, 400]\n")
+    files = [tmp_path / "cloth.pdf", tmp_path / "cloth.csv"]
+    options = ["--width", "1.5", "--allowance", "0.03", "--picture", str(tmp_path / "strain.png")]
+    options += ["--sheet", "A3", "--compensation", "0.5,1.0"]
+    assert main(["pattern", str(path), *options, "-o", str(files[0]), "-o", str(files[1])]) == 0
+    text = capsys.readouterr().out
+    assert "strips" in text
+    assert "written:" in text
+    table = pd.read_csv(files[1])
+    assert table["width"].max() <= 1.44
+    assert table["warp"].to_numpy() == pytest.approx(0.5)
+    assert main(["pattern", str(path), "--seam", "0,2,4,2", "--seam", "4,2,8,2", "-o", str(files[1])]) == 0
+    assert len(pd.read_csv(files[1])) == 4
+    assert main(["pattern", str(path), "--seam", "0,2,4", "-o", str(files[1])]) == 2
+    assert capsys.readouterr().err.startswith("pcmc: error: --seam: expected points X,Y,X,Y and so on")
+    assert main(["pattern", str(path), "--strips", "2", "-o", str(files[1])]) == 0
+    assert pd.read_csv(files[1])["patch"].tolist() == ["west", "west", "east", "east"]
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ("[pattern]\nwidth = -1\n", "pattern: width: expected"),
+        ("[pattern]\nwidht = 2\n", "did you mean 'width'"),
+        ("[pattern]\ncompensation = [1]\nstrips = 2\n", "pattern.compensation must be two numbers"),
+        ("[pattern]\nstrips = {wset = 2}\n[output]\npattern = ['a.csv']\n", "did you mean 'west'"),
+        ("[output]\npattern = ['a.csv']\n", "add \\[pattern\\] with width, strips or seams"),
+        ("[pattern]\nstrips = 2\n[output]\npattern = ['a.obj']\n", "the suffix of a cutting pattern is"),
+    ],
+)
+def test_bad_sections_are_refused_in_one_line(section, message, tmp_path):
+    path = tmp_path / "hall.toml"
+    path.write_text(PROJECT + section)
+    with pytest.raises(PcmcError, match=message) as refused:
+        project.run(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_units_and_the_library_are_asked_for(pattern, monkeypatch):
+    with pytest.raises(OptionError, match="a cutting pattern needs the unit of the lengths"):
+        pattern_drawings(pattern, "")
+    import pcmc.base.libraries as libraries
+
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(libraries, "import_module", missing)
+    with pytest.raises(MissingExtra, match=r"potpourri3d is not installed; .*pcmc-surfaces\[cloth\]"):
+        cutting_pattern(pattern.surface, 3.0, certificate=pattern.certificate)
+
+
+def test_a_roof_that_is_not_certified_is_marked(pattern):
+    s = pattern.surface
+    raised = s.moved(np.where(s.held[:, None], s.vertices, s.vertices * [1.0, 1.0, 1.1]))
+    drawings = pattern_drawings(cutting_pattern(raised, strips=2, anyway=True), "m", sheet="A3")
+    marks = [text.text for sheet in drawings.sheets for text in sheet.texts if text.layer == "PCMC-MARK"]
+    assert len(marks) == len(drawings.sheets)

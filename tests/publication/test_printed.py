@@ -1,0 +1,83 @@
+"""What pages show of a command's output is what the command prints for the roof of the notebooks."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import pcmc
+from pcmc.cli import main
+from pcmc.project import designed
+
+HOME = Path(__file__).resolve().parents[2]
+ROUNDING = 1e-9  # smaller numbers are rounding, and other on each machine
+NUMBER = re.compile(r"-?\d[\d.]*(?:e[-+]\d+)?")
+
+
+def shown(page, number=0):
+    """A block of output on a page, as words."""
+    text = (HOME / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(r"```text\n(.*?)```", text, re.S)[number].split()
+
+
+def is_printed(words, output):
+    """Whether these words stand in a row in the output, up to rounding and to the end "..." of the words."""
+    words = words[: words.index("...")] if "..." in words else words
+    printed = output.split()
+    starts = (k for k in range(len(printed)) if same(words[0], printed[k]))
+    return any(all(map(same, words, printed[k:])) and len(printed) - k >= len(words) for k in starts)
+
+
+def same(word, other):
+    if word == other:
+        return True
+    numbers = [NUMBER.fullmatch(each.rstrip(",;")) for each in (word, other)]
+    return all(number and abs(float(number[0])) < ROUNDING for number in numbers)
+
+
+@pytest.fixture
+def roof(tmp_path, monkeypatch):
+    """The roof of the notebooks as ``roof.toml``; called with an edge length, coarser."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PCMC_CACHE", str(tmp_path / "cache"))
+    text = (HOME / "notebooks" / "roof.toml").read_text(encoding="utf-8").partition("[output]")[0]
+
+    def with_edges(length):
+        Path("roof.toml").write_text(re.sub(r"(?<=edge_length = ).*", str(length), text), encoding="utf-8")
+        return "roof.toml"
+
+    return with_edges
+
+
+def test_words_in_a_row_up_to_rounding():
+    assert is_printed(["b", "2.7e-13", "..."], "a b 3.1e-15 c")
+    assert not is_printed(["b", "2.7"], "a b 2.8 c")
+    assert not is_printed(["b", "c"], "a b")
+
+
+@pytest.mark.nightly
+def test_the_mesh_check_of_the_roof(roof, capsys):
+    assert main(["solve", roof(0.7)]) == 0
+    assert is_printed(shown("how-to/mesh-check.md"), capsys.readouterr().out)
+
+
+@pytest.mark.nightly
+def test_the_accuracy_of_the_roof_on_the_mesh_and_in_the_limit(roof, capsys):
+    path = roof(1.2)
+    page = (HOME / "docs" / "how-to" / "accuracy.md").read_text(encoding="utf-8")
+    assert f"from {pcmc.project.build(path).m} triangles with `edge_length = 1.2`" in page
+    assert main(["solve", path, "--accuracy", "height=1e-2"]) == 0
+    assert is_printed(shown("how-to/accuracy.md"), capsys.readouterr().out)
+    assert main(["solve", path, "--accuracy", "height=1e-3", "--accuracy-of", "limit"]) == 0
+    triangles = re.search(r"\d+(?= triangles)", capsys.readouterr().out)[0]
+    assert f"within\n  0.001 it takes {triangles}." in page
+
+
+@pytest.mark.nightly
+def test_the_families_of_panels_and_the_theorem_of_the_roof(roof):
+    surface = designed(roof(0.7)).surface
+    fewer = pcmc.fewer_families(surface, tolerance=0.01, change=0.02)
+    assert is_printed(shown("how-to/panels-and-drawings.md"), str(fewer))
+    assert is_printed(shown("explanation/certificate.md"), str(pcmc.verify(surface)))
