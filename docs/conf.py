@@ -255,8 +255,11 @@ def escape_bars(*arguments: Any) -> None:
 
 def visit_math(self: SphinxTranslator, node: nodes.math) -> None:
     """Write a formula as MathML, which a browser shows without any script or network."""
-    formula = tex2mathml(node.astext(), as_block=isinstance(node, nodes.math_block))
-    self.body.append(BAR.sub(r'<mo stretchy="false" lspace="0" rspace="0">\1</mo>', formula))
+    block = isinstance(node, nodes.math_block)
+    formula = BAR.sub(
+        r'<mo stretchy="false" lspace="0" rspace="0">\1</mo>', tex2mathml(node.astext(), as_block=block)
+    )
+    self.body.append(f'<div class="formula">{formula}</div>' if block else formula)
     raise nodes.SkipNode
 
 

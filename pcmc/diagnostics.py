@@ -27,7 +27,11 @@ WITHIN = 0.15  # of the order: a slope that counts as right
 
 @dataclass(frozen=True, eq=False)
 class TaylorTest:
-    """Remainders of Taylor's formula at some steps, and the order at which they vanish."""
+    """Remainders of Taylor's formula at some steps, and the order at which they vanish.
+
+    >>> print(TaylorTest(np.array([0.5, 0.25]), np.array([0.4, 0.2]), order=2, slope=1.0))
+    wrong: the remainder falls as h^1.00, where h^2 is expected
+    """
 
     steps: Floats
     remainders: Floats
@@ -70,14 +74,28 @@ def taylor(
 
 
 def check_gradient(surface: Surface, seed: int = 0) -> TaylorTest:
-    """Taylor's test of ∇E at a surface, supports not applied, along random moves of its vertices."""
+    """Taylor's test of ∇E at a surface, supports not applied, along random moves of its vertices.
+
+    >>> from pcmc import Patch
+    >>> corners = [[1, 0, 0], [0, 1, 0], [-1, -1, 0], [0, 0, 1]]
+    >>> tent = Surface(corners, [[0, 1, 3], [1, 2, 3], [2, 0, 3]], [0] * 3, [Patch("roof", 1.0)], fixed=[0])
+    >>> check_gradient(tent).passed, check_hessian(tent).passed
+    (True, True)
+    """
     expect_surface(surface)
     first = energy_and_gradient(surface, supports=False)[1]
     return taylor(lambda X: energy_at(surface, X), surface.vertices, _move(surface, seed), first)
 
 
 def check_hessian(surface: Surface, seed: int = 0) -> TaylorTest:
-    """The same of ∂²E."""
+    """Taylor's test of ∂²E, in the same way; see ``check_gradient``.
+
+    >>> from pcmc import Patch
+    >>> corners = [[0, 0, 1], [1, 0, 1], [0, 1, 2]]
+    >>> triangle = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=[0])
+    >>> round(check_hessian(triangle).slope, 1)  # what remains is of third order
+    3.0
+    """
     expect_surface(surface)
     first, second = energy_and_gradient(surface, supports=False)[1], hessian(surface)
     return taylor(lambda X: energy_at(surface, X), surface.vertices, _move(surface, seed), first, second)

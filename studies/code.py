@@ -1,31 +1,48 @@
 """Which code a study's numbers come from, and hashes of it that comments and docstrings do not change.
 
-The code that matters for a study: of its own file what ``data`` reaches, and every module of this checkout
-that this imports, and so on. What only draws, keeps files or runs several cases at once does not count.
+The code that matters for a study: what its ``data`` reaches, in its own file and in every module of this
+checkout that it imports names of, and so on; a class counts whole. What only draws, keeps files or runs
+several cases at once does not count.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator
+import json
+import re
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections.abc import Iterator, Sequence
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 
 HOME = Path(__file__).resolve().parent.parent
 PACKAGES = ("pcmc", "generators", "studies")
 NO_MATTER = (  # module and all below it
-    "pcmc.drawings",
-    "pcmc.plot",
-    "pcmc.report",
-    "pcmc.sweep",
-    "studies.cases",
-    "studies.folder",
-    "studies.figure_panels",
-    "studies.study",
+    "pcmc.drawings.",
+    "pcmc.plot.",
+    "pcmc.report.",
+    "pcmc.sweep.",
+    "studies.cases.",
+    "studies.folder.",
+    "studies.figure_panels.",
+    "studies.study.",
 )
 PROJECTS = ("roof.toml",)  # files in notebooks/ that some studies solve
 START = "data"  # the step of a study that computes
+IMPORT = ast.Import | ast.ImportFrom
+ALL = "*"  # in place of a name: the whole module
+THERE = """
+import json, pathlib, sys
+from studies import code
+code.HOME = pathlib.Path(sys.argv[1])
+print(json.dumps({name: code.code_of(name) if code._exists(name) else {} for name in sys.argv[2:]}))
+"""  # a process of its own: what is read once is kept
+PRIVATE = re.compile(r"\b_(?=[a-z])")  # a name that becomes public is no other code
 DIGITS = 10  # of a hash, hexadecimal
 
 
@@ -45,17 +62,38 @@ def code_of(study: str) -> dict[str, str]:
     return {folder: _short("\n".join(lines)) for folder, lines in sorted(parts.items())}
 
 
+def code_at(commit: str, studies: Sequence[str]) -> dict[str, dict[str, str]]:
+    """``code_of`` of some studies' modules as it was at a commit; {} for a module that was not there.
+
+    Computed by the rules of today, so that these may change without every result being stale.
+    """
+    paths = [*PACKAGES, *(f"notebooks/{project}" for project in PROJECTS)]
+    words = ["git", "-C", str(HOME), "archive", commit, "--", *paths]
+    with tempfile.TemporaryDirectory() as folder:
+        packed = subprocess.run(words, capture_output=True, check=True).stdout
+        with tarfile.open(fileobj=BytesIO(packed)) as files:
+            files.extractall(folder, filter="data")
+        words = [sys.executable, "-c", THERE, folder, *studies]
+        found = subprocess.run(words, capture_output=True, check=True, cwd=HOME, text=True).stdout
+    return dict(json.loads(found))
+
+
 def files_of(study: str) -> dict[str, str]:
-    """The hash of each file that matters for a study's numbers, by its path."""
-    own = _reached(_tree(_path(study)), START)
-    found = {_name(_path(study)): _hash(own)}
-    waiting = list(_imports(own, study))
+    """The hash of what matters for a study's numbers of each file, by its path."""
+    wanted: dict[str, set[str]] = {}
+    waiting = [(study, START)]
     while waiting:
-        module = waiting.pop()
-        path = _path(module)
-        if _name(path) not in found and not module.startswith(NO_MATTER):
-            found[_name(path)] = _file_hash(path)
-            waiting += _file_imports(module)
+        module, name = waiting.pop()
+        names = wanted.setdefault(module, set())
+        if name not in names and not f"{module}.".startswith(NO_MATTER):
+            names.add(name)
+            waiting += _needs(module, name)
+    found = {
+        _name(_path(module)): _hash(_reached(_tree(_path(module)), frozenset(names)))
+        for module, names in wanted.items()
+        if names
+    }
+    own = _reached(_tree(_path(study)), frozenset({START}))
     words = {node.value for node in ast.walk(own) if isinstance(node, ast.Constant)}
     for project in words.intersection(PROJECTS):
         path = HOME / "notebooks" / str(project)
@@ -63,10 +101,37 @@ def files_of(study: str) -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
-def _reached(tree: ast.Module, start: str) -> ast.Module:
-    """A module's definitions that ``start`` uses, directly or through others; and its imports of them."""
+@cache
+def _needs(module: str, name: str) -> tuple[tuple[str, str], ...]:
+    """The names that a name of a module needs directly, of this module and of others."""
+    tree, named = _tree(_path(module)), _named(_path(module))
+    if name not in named:
+        return tuple(_imports(tree, module))
+    nodes = [node for node in (named[name], *filter(_runs, tree.body)) if not isinstance(node, IMPORT)]
+    used = {part.id for node in nodes for part in ast.walk(node) if isinstance(part, ast.Name)} | {name}
+    imports = [_with_names(node, used) for node in tree.body if isinstance(node, IMPORT)]
+    own = {other for other in used & named.keys() if not isinstance(named[other], IMPORT)}
+    return (*((module, other) for other in own), *_imports(ast.Module([*imports, *nodes], []), module))
+
+
+@cache
+def _named(path: Path) -> dict[str, ast.stmt]:
+    """The statements on top of a module by the names that they bind."""
+    return {name: node for node in _tree(path).body for name in _binds(node)}
+
+
+def _reached(tree: ast.Module, starts: frozenset[str]) -> ast.Module:
+    """A module's definitions that these names use, directly or through others; and its imports of them.
+
+    What runs whenever the module is imported belongs to them. A name that the module does not bind stands for
+    all of it, as ALL does.
+    """
     named = {name: node for node in tree.body for name in _binds(node)}
-    used, waiting = set(), [start]
+    if not starts <= named.keys():
+        return tree
+    loose = [node for node in tree.body if _runs(node)]
+    used: set[str] = set()
+    waiting = [*starts, *(part.id for node in loose for part in _run(node) if isinstance(part, ast.Name))]
     while waiting:
         name = waiting.pop()
         if name in named and name not in used:
@@ -74,15 +139,25 @@ def _reached(tree: ast.Module, start: str) -> ast.Module:
             waiting += [part.id for part in ast.walk(named[name]) if isinstance(part, ast.Name)]
     body: list[ast.stmt] = []
     for node in tree.body:
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            names = [alias for alias in node.names if (alias.asname or alias.name).split(".")[0] in used]
-            body += [_with_names(node, names)] if names else []
-        elif used.intersection(_binds(node)):
+        if isinstance(node, IMPORT):
+            kept = _with_names(node, used)
+            body += [kept] if kept.names else []
+        elif node in loose or used.intersection(_binds(node)):
             body.append(node)
     return ast.Module(body, [])
 
 
-def _with_names(node: ast.Import | ast.ImportFrom, names: list[ast.alias]) -> ast.Import | ast.ImportFrom:
+def _runs(node: ast.stmt) -> bool:
+    """Whether a statement on top of a module does more than give names to something."""
+    if isinstance(node, ast.Assign):
+        return any(not isinstance(target, ast.Name | ast.Tuple) for target in node.targets)
+    plain = ast.Import | ast.ImportFrom | ast.FunctionDef | ast.ClassDef | ast.AnnAssign
+    return not (isinstance(node, plain) or _is_words(node) or _for_types(node))
+
+
+def _with_names(node: ast.Import | ast.ImportFrom, used: set[str]) -> ast.Import | ast.ImportFrom:
+    """An import of those names alone that are used."""
+    names = [alias for alias in node.names if (alias.asname or alias.name).split(".")[0] in used]
     if isinstance(node, ast.Import):
         return ast.Import(names)
     return ast.ImportFrom(node.module, names, node.level)
@@ -92,30 +167,38 @@ def _binds(node: ast.stmt) -> list[str]:
     """The names that a statement on top of a module gives something to."""
     if isinstance(node, ast.FunctionDef | ast.ClassDef):
         return [node.name]
-    if isinstance(node, ast.Import | ast.ImportFrom):
+    if isinstance(node, IMPORT):
         return [(alias.asname or alias.name).split(".")[0] for alias in node.names]
     stored = (part for part in ast.walk(node) if isinstance(part, ast.Name))
     return [part.id for part in stored if isinstance(part.ctx, ast.Store)]
 
 
-def _imports(tree: ast.Module, module: str) -> Iterator[str]:
-    """The modules of this checkout that a module's code imports."""
+def _imports(tree: ast.Module, module: str) -> Iterator[tuple[str, str]]:
+    """The names of other modules of this checkout that a module's code imports: (module, name or ALL)."""
     package = module if _path(module).name == "__init__.py" else module.rpartition(".")[0]
-    aliases = {}
+    modules = {}  # by the name that stands for one here
     for node in _run(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 if alias.name.split(".")[0] in PACKAGES:
-                    aliases[alias.asname or alias.name] = alias.name
+                    modules[alias.asname or alias.name] = alias.name
         elif isinstance(node, ast.ImportFrom):
             source = _absolute(node, package)
             for alias in node.names if source.split(".")[0] in PACKAGES else ():
-                yield from _home(source, alias.name)
+                if _exists(f"{source}.{alias.name}"):
+                    modules[alias.asname or alias.name] = f"{source}.{alias.name}"
+                else:
+                    yield from _home(source, alias.name)
         elif isinstance(node, ast.Call) and _is_import_module(node):
-            yield from _imported_by_call(node, package)
+            yield from ((found, ALL) for found in _imported_by_call(node, package))
+    parts = set()
     for node in _run(tree):
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in aliases:
-            yield from _home(aliases[node.value.id], node.attr)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules:
+            parts.add(node.value)
+            yield from _home(modules[node.value.id], node.attr)
+    for node in _run(tree):  # a module handed on as it is
+        if isinstance(node, ast.Name) and node.id in modules and node not in parts:
+            yield modules[node.id], ALL
 
 
 def _run(tree: ast.AST) -> Iterator[ast.AST]:
@@ -123,7 +206,7 @@ def _run(tree: ast.AST) -> Iterator[ast.AST]:
     waiting = [tree]
     while waiting:
         node = waiting.pop()
-        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+        if _for_types(node):
             continue
         yield node
         waiting += ast.iter_child_nodes(node)
@@ -136,19 +219,24 @@ def _absolute(node: ast.ImportFrom, package: str) -> str:
     return ".".join([*base, *filter(None, [node.module])])
 
 
-def _home(source: str, name: str) -> Iterator[str]:
-    """The modules that ``from source import name`` needs: a package hands on what others define."""
+def _for_types(node: ast.AST) -> bool:
+    """Whether only a type checker reads this."""
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def _home(source: str, name: str) -> Iterator[tuple[str, str]]:
+    """Where ``from source import name`` finds it: a package hands on what others define."""
     below = f"{source}.{name}"
     if _exists(below):
-        yield below
+        yield below, ALL
     elif _path(source).name == "__init__.py" and name in _handed_on(source):
         module, original = _handed_on(source)[name]
         if module == source:
-            yield f"{source}.{original}"
+            yield f"{source}.{original}", ALL
         else:
             yield from _home(module, original)
     elif _exists(source):
-        yield source
+        yield source, name
 
 
 @cache
@@ -199,25 +287,19 @@ def _tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-@cache
-def _file_imports(module: str) -> tuple[str, ...]:
-    return tuple(_imports(_tree(_path(module)), module))
-
-
-@cache
-def _file_hash(path: Path) -> str:
-    return _hash(_tree(path))
-
-
 def _hash(tree: ast.Module) -> str:
-    """Of the code as it would be written without comments and docstrings."""
+    """Of the code as it would be written without comments and docstrings, and with all names public."""
     bare = ast.parse(ast.unparse(tree))
     for node in ast.walk(bare):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and node.body:
-            first = node.body[0]
-            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-                node.body = node.body[1:] or [ast.Pass()]
-    return _short(ast.unparse(bare))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            first, *rest = node.body or [ast.Pass()]
+            node.body = (rest or [ast.Pass()]) if _is_words(first) else node.body
+    return _short(PRIVATE.sub("", ast.unparse(bare)))
+
+
+def _is_words(node: ast.stmt) -> bool:
+    """Whether a statement is a docstring."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def _short(text: str) -> str:

@@ -14,10 +14,12 @@ from .forces import checks
 from .gallery import surfaces
 from .questions import (
     accuracy,
+    cloth,
     existence,
     margins,
     mesh_check,
     panel_families,
+    programs,
     refinement,
     solvers,
     stability,
@@ -46,9 +48,11 @@ MODULES = (
     margins,
     accuracy,
     panel_families,
+    cloth,
     surfaces,
     checks,
     structure,
+    programs,
     verify,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}

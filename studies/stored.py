@@ -15,7 +15,7 @@ from pandas.api.types import is_numeric_dtype
 
 from pcmc.base.arrays import Floats
 
-from .code import code_of
+from .code import code_at, code_of
 from .study import Study, git, perform
 
 # two runs give the same number if it differs by less than
@@ -51,20 +51,39 @@ class Age:
         return f"stale: other code in {', '.join(self.changed[:SHOWN])}{rest}{when}"
 
 
-def age(study: Study, results: Path) -> Age | None:
-    """The age of a study's result; None where there is none.
+def ages(studies: Iterable[Study], results: Path) -> dict[str, Age | None]:
+    """The age of each study's result by the study's name; None where there is none.
 
-    A part is other if its hash is: comments, docstrings and the layout of the code do not count.
+    A part is other if its hash is: comments, docstrings and the layout of the code do not count. The code at
+    the run is that of its commit, or where git does not have it, that of the hashes in the provenance.
     """
-    path = results / study.name / "provenance.json"
-    if not path.is_file():
-        return None
-    stored = json.loads(path.read_text(encoding="utf-8"))
-    counted = git("rev-list", "--count", f"{stored['commit']}..HEAD")
-    commits = int(counted) if counted else None
-    if "code" not in stored:
-        return Age(study.name, None, commits)
-    return Age(study.name, differing(stored["code"], code_of(study.data.__module__)), commits)
+    stored: dict[str, dict[str, Any]] = {}
+    modules: dict[str, list[str]] = {}  # by the commit of their run
+    studies = list(studies)
+    for study in studies:
+        path = results / study.name / "provenance.json"
+        if path.is_file():
+            stored[study.name] = json.loads(path.read_text(encoding="utf-8"))
+            modules.setdefault(_commit(stored[study.name]), []).append(study.data.__module__)
+    code = {commit: code_at(commit, names) for commit, names in modules.items() if commit}
+    found: dict[str, Age | None] = {}
+    for study in studies:
+        if study.name not in stored:
+            found[study.name] = None
+            continue
+        provenance, module = stored[study.name], study.data.__module__
+        at_run = code[commit][module] if (commit := _commit(provenance)) else provenance.get("code")
+        changed = None if at_run is None else differing(at_run, code_of(module))
+        counted = git("rev-list", "--count", f"{provenance['commit']}..HEAD")
+        found[study.name] = Age(study.name, changed, int(counted) if counted else None)
+    return found
+
+
+def _commit(provenance: Mapping[str, Any]) -> str:
+    """The commit whose code made a result; empty where git does not have it."""
+    if provenance.get("uncommitted_changes"):
+        return ""
+    return git("rev-parse", "--verify", "--quiet", f"{provenance['commit']}^{{commit}}")
 
 
 def differing(stored: Mapping[str, str], now: Mapping[str, str]) -> tuple[str, ...]:
@@ -158,8 +177,3 @@ def _apart(old: pd.Series[Any], new: pd.Series[Any]) -> Floats:
 
 def _shown(value: Any) -> str:
     return f"{value:.9g}" if isinstance(value, float) else f"{value!s}"
-
-
-def ages(studies: Iterable[Study], results: Path) -> dict[str, Age | None]:
-    """The age of each study's result by the study's name."""
-    return {study.name: age(study, results) for study in studies}

@@ -16,5 +16,5 @@ west = {tension = 5.0}
 east = {tension = 4.5}
 """
 Path("sweep.toml").write_text(HALL, encoding="utf-8")
-values = "tension=4,4.5,5,5.5,6"
-main(["sweep", "sweep.toml", f"west.{values}", f"east.{values}", "--plot", "sweep.png"])
+west, east = "west.tension=4,4.5,5,5.5,6", "east.tension=4,5,6"
+main(["sweep", "sweep.toml", west, east, "--plot", "sweep.png"])

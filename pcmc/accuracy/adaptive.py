@@ -52,7 +52,11 @@ Accuracy = Mapping[str, float] | str
 
 
 class AccuracyStatus(Enum):
-    """How a search for an accuracy ended. The value is a sentence."""
+    """How a search for an accuracy ended. The value is a sentence.
+
+    >>> AccuracyStatus.TRIANGLES.value
+    'accuracy not reached within the limit of triangles'
+    """
 
     REACHED = "accuracy reached"
     NO_LIMIT = "accuracy out of reach: there is no limit as the mesh gets finer"

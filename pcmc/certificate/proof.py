@@ -94,6 +94,9 @@ class Unheld:
 
     Without pressure its homotheties about Π's point have E(s) = s T, or s² T and cables s C, all of which
     grow with s. Of a part on no support E(X + t n) = E(X) + t Σ w A, where the pressures cancel.
+
+    >>> print(Unheld(vertex=7, falls=True))
+    nothing holds the part of the surface around vertex 7, and it has a weight: it falls
     """
 
     vertex: int  # one of its vertices

@@ -17,12 +17,12 @@ from ..base.errors import OptionError, unknown
 from ..forces.cables import pull_along
 from ..forces.rooms import refuse_varied_pressure
 from ..forces.volume_below import volumes_below
-from ..surface import Surface
+from ..surface import Surface, values
 from ..surface.values import part_index, part_values
 from .cables import chord
 from .certificate import Certificate
 
-KINDS = ("tension", "pressure", "volume", "weight", "snow", "cable")
+KINDS = ("tension", "pressure", "volume", "weight", "snow", "cable", "cable_weight")
 FACTOR = 20.0  # a parameter without bounds may change by this factor, up or down
 
 
@@ -63,7 +63,8 @@ _ROWS = (
 QUANTITIES = {quantity.name: quantity for quantity in _ROWS}
 """Every quantity by its name."""
 
-CHANGED = {"cable": "force"}  # kinds of parameters with the name of what they belong to
+CHANGED = {kind: values.KINDS[f"{kind}s"].dimension for kind in KINDS if kind not in QUANTITIES}
+"""The dimensions of kinds of parameters that are no quantities of a roof."""
 
 
 def dimension_of(name: str) -> str:
@@ -156,14 +157,15 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A tension, a pressure, a weight, snow, a cable's tension, or a room's prescribed volume, that may vary.
+    """A tension, a pressure, a weight, snow, a cable's tension or weight, or a room's volume, that may vary.
 
     Parameters
     ----------
     patch : name of the patch, or of the room or cable; or several names, which all get one value.
     kind : ``"tension"``, ``"pressure"``, ``"weight"`` or ``"snow"`` of a patch, ``"cable"``, the tension of a
-        cable, or ``"volume"`` of a room. Where the pressure of a room, or the snow over it, varies, that of
-        its walls, the difference between rooms, is updated, unless it is a parameter itself.
+        cable, ``"cable_weight"``, its weight per length, or ``"volume"`` of a room. Where the pressure of a
+        room, or the snow over it, varies, that of its walls, the difference between rooms, is updated, unless
+        it is a parameter itself.
     low, high : bounds; by default a twentieth of the present value and twenty times it.
 
     >>> Parameter("wall", low=0.0, high=3.0).label
@@ -202,8 +204,9 @@ class Parameter:
     def label(self) -> str:
         """The parameter in words."""
         names = " and ".join(self.names)
-        if self.kind == "cable":  # which may have the name "cable 1"
-            return f"tension of cable {names.removeprefix('cable ')}"
+        parts, field, _ = values.KINDS[self.key]
+        if parts == "cables":  # which may have the name "cable 1"
+            return f"{field} of cable {names.removeprefix('cable ')}"
         return f"{self.kind} of {names}"
 
     @property

@@ -14,11 +14,12 @@ from ..base.libraries import load_library
 from ..meshing.curve_cutting import cut_triangles, refined_round
 from ..meshing.quality import edge_lengths
 from ..surface import Surface
-from ..surface.geometry import bounding_size, segment_lengths
+from ..surface.geometry import angles, bounding_size, segment_lengths
 from ..surface.pieces import point_text
-from ..surface.topology import Topology, components, edge_places, topology
+from ..surface.topology import SIDES, Topology, components, edge_places, topology
 
-SNAP = 0.05  # of an edge: a seam that passes a vertex so near goes through it
+SNAP = 0.1  # of an edge: a seam that passes a vertex so near goes through it
+BESIDE = 0.3  # of an edge: such a seam crosses no other edge of that vertex so near to it
 MOST_TRIANGLES = 50_000  # beyond which triangles are not cut into four
 ON = 1e-9  # of the size: what lies so near an edge is on it
 
@@ -79,13 +80,32 @@ class CutMesh:
     def with_points(self, ends: Ints, points: Floats) -> CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
         number = len(self.X) + np.arange(len(ends))
-        F, source = cut_triangles(self.F, self.source, ends, number)
+        X = np.concatenate([self.X, points])
+        F, source = cut_triangles(self.F, self.source, ends, number, self._corner_cut_off(X, ends, number))
         split = edge_places(self.cuts, ends)
         halved = split >= 0
         halves = [np.stack([self.cuts[halved, side], number[split[halved]]], axis=1) for side in (0, 1)]
         cuts = np.concatenate([self.cuts[~halved], *halves])
         seam = np.concatenate([self.seam[~halved], self.seam[halved], self.seam[halved]])
-        return CutMesh(np.concatenate([self.X, points]), F, source, cuts, seam)
+        return CutMesh(X, F, source, cuts, seam)
+
+    def _corner_cut_off(self, X: Floats, ends: Ints, number: Ints) -> Ints:
+        """(m,) the corner that a line is to lead from where two sides of a triangle are cut,
+        so that the smallest angle is largest: two points of a seam and a corner may lie on a line."""
+        place = edge_places(self.F[:, SIDES], ends)
+        two = np.flatnonzero((place >= 0).sum(axis=1) == 2)
+        cut = place[two] >= 0
+        turn = np.where(cut[:, 0] & cut[:, 2], 2, cut.argmax(axis=1))
+        roll = (np.arange(3) + turn[:, None]) % 3
+        a, b, _ = np.take_along_axis(self.F[two], roll, axis=1).T
+        p, q, _ = number[np.take_along_axis(place[two], roll, axis=1)].T
+        from_a, from_b = (
+            np.minimum(*(angles(X[np.stack(corners, axis=1)]).min(axis=1) for corners in pair))
+            for pair in (((q, a, p), (a, b, p)), ((q, a, b), (q, b, p)))
+        )
+        first = np.zeros(len(self.F), dtype=np.int64)
+        first[two] = np.where(from_b > from_a, (turn + 1) % 3, turn)
+        return first
 
     def with_vertex(self, point: Floats, faces: Bools) -> tuple[CutMesh, int]:
         """The mesh with a vertex nearest to a point (3,) on chosen faces (m,), and its number."""
@@ -163,11 +183,12 @@ class CutMesh:
         nodes: list[int] = []
         new: list[list[int]] = []
         points: list[Floats] = []
-        last = len(path) - 1
-        for k, (pair, t, point) in enumerate(zip(place.tolist(), share.tolist(), path, strict=True)):
-            snap = 0.5 if k in (0, last) else SNAP
-            if min(t, 1.0 - t) <= snap:
-                vertex = pair[int(t > 0.5)]
+        nearest = np.where(share > 0.5, place[:, 1], place[:, 0])
+        gap = np.minimum(share, 1.0 - share)
+        met = np.unique(nearest[gap <= SNAP])  # both ends are among these
+        through = gap <= np.where(np.isin(nearest, met), BESIDE, SNAP)
+        for pair, vertex, meets, point in zip(place.tolist(), nearest.tolist(), through, path, strict=True):
+            if meets:
                 if not fixed[vertex]:
                     X[vertex], fixed[vertex] = point, True
             elif pair in new:

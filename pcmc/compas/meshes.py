@@ -121,6 +121,16 @@ def from_meshes(
     SurfaceError : for anything that is not such a mesh, or if the meshes form no surface; ``where`` is the
         mesh's name, or the number of the vertex or face in the surface.
     MissingExtra : without COMPAS.
+
+    Examples
+    --------
+    >>> from compas.datastructures import Mesh
+    >>> floor = Mesh.from_vertices_and_faces([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> floor.name = "floor"
+    >>> floor.attributes["tension"] = 2.0
+    >>> floor.vertices_attribute("is_support", True)
+    >>> from_meshes(floor).patches
+    (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
     named = mesh_arrays.named_meshes(meshes)
     validate.flag("weld", weld)

@@ -56,6 +56,13 @@ def certify(
     Options are those of ``pcmc.certify``. The answer has ``certified``, ``verdict``, ``detail``, the numbers
     of ``Certificate.numbers``, its tables ``patches``, ``junctions``, ``boundaries`` and ``supports`` as
     lists of rows, and ``warnings``. None stands for NaN.
+
+    >>> square = pcmc.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]],
+    ...                       [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                       [pcmc.Patch("film", 2.0, pressure=0.0)], fixed=range(4))
+    >>> answer = certify(to_meshes(square))
+    >>> answer["certified"], answer["verdict"]
+    (True, 'stable')
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -65,12 +72,32 @@ def certify(
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
-    """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``."""
+    """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``.
+
+    >>> import tempfile
+    >>> film = pcmc.Surface(
+    ...     [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [pcmc.Patch("film", 2.0)], fixed=range(3)
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(folder + "/film.pcmc", to_meshes(film))
+    ...     [mesh.name for mesh in read(folder + "/film.pcmc")]
+    ['film']
+    """
     return to_meshes(pcmc.read(path, **options))
 
 
 def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:
-    """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``."""
+    """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``.
+
+    >>> import tempfile
+    >>> film = pcmc.Surface(
+    ...     [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [pcmc.Patch("film", 2.0)], fixed=range(3)
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(folder + "/film.obj", to_meshes(film))
+    ...     pcmc.read(folder + "/film.obj").patches[0].tension
+    2.0
+    """
     pcmc.write(path, from_meshes(meshes, weld=weld), **options)
 
 

@@ -11,7 +11,11 @@ CONTROLS = ("arclength", "parameter", "volume", "height")
 
 
 class Ending(Enum):
-    """Why a branch ends."""
+    """Why a branch ends.
+
+    >>> Ending.FOLDS.value
+    'the branch passed the requested number of folds'
+    """
 
     REACHED = "the branch reached the requested value"
     FOLDS = "the branch passed the requested number of folds"
@@ -40,6 +44,15 @@ class FollowOptions:
         below that quality; None: never remesh.
     keep : store the surface of every ``keep``-th point; the last one is always stored.
     backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest one installed.
+
+    Examples
+    --------
+    >>> FollowOptions(step=-0.05, folds=1).control  # towards smaller λ, through one fold
+    'arclength'
+    >>> FollowOptions(step=0.0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    pcmc.base.errors.OptionError: step: expected a number ≠ 0, with the sign of...
     """
 
     control: str = "arclength"

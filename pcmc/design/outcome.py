@@ -16,7 +16,11 @@ from ..surface import Surface
 
 
 class DesignStatus(Enum):
-    """How a search for targets ended. The value is a sentence."""
+    """How a search for targets ended. The value is a sentence.
+
+    >>> DesignStatus.MET.value
+    'met: every target is reached'
+    """
 
     MET = "met: every target is reached"
     AT_BOUND = "out of reach: a bound on the parameters is in the way"

@@ -61,6 +61,14 @@ def target_curvature(surface: Surface) -> Floats:
 
     H̄ = p / (2 α), p net of snow, and with a weight H̄ = (p - w ⟨ν, n⟩) / (2 (α + w z)) at the vertex's
     height z over Π and its normal ν. A mesh at rest has the latter up to the square of its edge length.
+
+    >>> from pcmc import Patch
+    >>> angle = 2 * np.pi * np.arange(6) / 6
+    >>> corners = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> fan = [[k, (k + 1) % 6, 6] for k in range(6)]
+    >>> roof = Surface([*corners, [0, 0, 0.3]], fan, [0] * 6, [Patch("roof", 2.0, 1.0)], fixed=range(6))
+    >>> float(target_curvature(roof)[6])
+    0.25
     """
     expect_surface(surface)
     return _target_and_scale(surface)[0]
@@ -90,6 +98,14 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
     Relative, with sign: 0.01 is one percent too curved. Walls, whose target is zero, have no
     relative error; ``mean_curvature`` itself is their error. With a weight the error is relative to
     (|p| + |w|) / (2 |α + w z|), as H̄ itself may vanish somewhere.
+
+    >>> from pcmc import Patch, solve
+    >>> angle = 2 * np.pi * np.arange(6) / 6
+    >>> corners = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> fan = [[k, (k + 1) % 6, 6] for k in range(6)]
+    >>> roof = Surface([*corners, [0, 0, 0.3]], fan, [0] * 6, [Patch("roof", 2.0, 1.0)], fixed=range(6))
+    >>> bool(abs(curvature_error(solve(roof).surface, "variational")[6]) < 1e-9)  # at rest
+    True
     """
     H, (target, scale) = mean_curvature(surface, method), _target_and_scale(surface)
     return np.divide(H - target, scale, out=np.full(surface.n, np.nan), where=scale != 0.0)

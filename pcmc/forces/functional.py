@@ -50,7 +50,14 @@ def energy(surface: Surface) -> float:
 
 
 def energy_at(surface: Surface, X: Floats) -> float:
-    """E of the surface with its vertices at X (n,3)."""
+    """E of the surface with its vertices at X (n,3).
+
+    >>> from pcmc import Patch
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("film", 3.0, 0.0)], fixed=[0])
+    >>> energy_at(flat, 2.0 * flat.vertices)  # α A, of four times the area
+    6.0
+    """
     areas, volumes = areas_and_volumes(energy_mesh(surface), X)
     return total(surface.tensions, areas, surface.net_pressures, volumes) + add_forces(surface, X)
 
@@ -76,6 +83,14 @@ def energy_and_gradient(
     """E and ∇E (n,3) in one pass over the triangles, at X or at the surface's own vertices.
 
     ``supports=False`` keeps the forces at held vertices, which the supports must carry.
+
+    >>> from pcmc import Patch
+    >>> triangle = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    >>> film = Surface(triangle, [[0, 1, 2]], [0], [Patch("film", 2.0, 0.0)], fixed=[1, 2])
+    >>> energy_and_gradient(film)[1].tolist()
+    [[-1.0, -1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    >>> energy_and_gradient(film, supports=False)[1].sum(axis=0).tolist()  # the forces add up to nothing
+    [0.0, 0.0, 0.0]
     """
     X = surface.vertices if X is None else X
     areas, volumes, gradient = measure(energy_mesh(surface), X, workers)

@@ -23,6 +23,7 @@ from ..base.validate import choice
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
+from ..surface.values import KINDS, POWERS
 
 FREE, SLIDING, FIXED = 0, 1, 2
 HELD = {"fixed": FIXED, "sliding": SLIDING}  # names of groups and layers of supports
@@ -227,20 +228,27 @@ def in_new_unit(value: Any, factor: float) -> Any:
     match value:
         case tuple():
             return tuple(in_new_unit(part, factor) for part in value)
-        case Patch():
-            per_area = {key: getattr(value, key) / factor**2 for key in ("pressure", "weight", "snow")}
-            return replace(value, tension=value.tension / factor, **per_area)
-        case Cable():
-            return replace(value, weight=value.weight / factor)
+        case Patch() | Cable() | Room():
+            parts = {Patch: "patches", Cable: "cables", Room: "rooms"}[type(value)]
+            powers = {kind.field: POWERS[kind.dimension] for kind in KINDS.values() if kind.parts == parts}
+            old = {field: getattr(value, field) for field in powers}
+            new = {
+                f: x * factor ** powers[f] if powers[f] > 0 else x / factor ** -powers[f]
+                for f, x in old.items()
+            }
+            return replace(value, **new)
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():
             return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
         case HeldCurve():
             return value.mapped(factor * np.eye(3), np.zeros(3))
-        case Room():
-            return replace(value, volume=factor**3 * value.volume)
     return value
+
+
+def _times(value: float, factor: float, power: int) -> float:
+    """The value times factor^power, rounded once."""
+    return value * factor**power if power > 0 else value / factor**-power
 
 
 def _point(point: Vector, factor: float) -> Vector:

@@ -69,6 +69,19 @@ def read(
     FileError : for a file that is missing, cut off or not of its format; ``where`` is the line or element.
     SurfaceError : for a mesh that is not a surface.
     MissingExtra, OptionError : for a library that is not installed, and an unknown unit.
+
+    Examples
+    --------
+    A mesh in millimetres with a patch of one triangle:
+
+    >>> import tempfile, warnings
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = Path(folder.name, "flat.obj")
+    >>> _ = path.write_text("v 0 0 0\\nv 1000 0 0\\nv 0 1000 0\\ng roof\\nf 1 2 3\\n", encoding="utf-8")
+    >>> surface = read(path, tensions={"roof": 2.0}, pressures=0.0, fixed=[0, 1])
+    >>> surface.patches[0], surface.fixed.tolist()
+    (Patch(name='roof', tension=2.0, pressure=0.0), [True, True, False])
+    >>> folder.cleanup()
     """
     choice("units", units, tuple(MICROMETRES))
     return _surface(path, converted(load(path), units), (tensions, pressures, fixed, on_plane, plane))
@@ -78,6 +91,15 @@ def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") 
     """The Surface in a file and all its data; a note if it lacks supports, tensions or a unit.
 
     ``units`` is the unit of length wanted, by default the file's own; ``assumed`` that of a file without one.
+
+    >>> import tempfile
+    >>> from pcmc import Patch, write
+    >>> film = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("film", 2.0)], fixed=[0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(Path(folder, "film.pcmc"), film, units="m")
+    ...     surface, data = read_bare(Path(folder, "film.pcmc"))
+    >>> surface.patches, data.units.length
+    ((Patch(name='film', tension=2.0, pressure=1.0),), 'm')
     """
     data = converted(load(path), units, assumed or units)
     return _surface(path, data, ()), data
@@ -107,7 +129,17 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
 
 
 def load(path: str | os.PathLike[str]) -> MeshData:
-    """Everything in a file, scalars and certificate too. Errors as in ``read``."""
+    """Everything in a file, scalars and certificate too. Errors as in ``read``.
+
+    >>> import tempfile
+    >>> from pcmc import Patch, write
+    >>> film = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("film", 2.0)], fixed=[0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(Path(folder, "film.pcmc"), film, scalars={"height": film.vertices[:, 2]}, units="m")
+    ...     data = load(Path(folder, "film.pcmc"))
+    >>> data.scalars["height"].tolist(), data.units.length
+    ([0.0, 0.0, 0.0], 'm')
+    """
     path = as_path(path)
     with format_opened(path) as form:
         data = without_unused(checked_data(contents(form, path)))

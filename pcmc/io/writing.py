@@ -54,6 +54,17 @@ def write(
     -----
     LostWarning : once, naming what the format cannot carry.
     FileWarning : if the coordinates are written relative to another origin (.stl).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pcmc import Patch, Surface, read
+    >>> film = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("film", 2.0)], fixed=[0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(folder + "/film.pcmc", film, units="m")
+    ...     again = read(folder + "/film.pcmc")
+    >>> again.patches == film.patches
+    True
     """
     path = as_path(path)
     check_name(path)

@@ -43,7 +43,11 @@ BEYOND = 0.01  # of λ: how far beyond the last point of a lost branch the surfa
 
 
 class MarginEnd(Enum):
-    """What ends the stability. The value is a few words."""
+    """What ends the stability. The value is a few words.
+
+    >>> MarginEnd.FOLD.value
+    'fold: beyond it this equilibrium is gone'
+    """
 
     FOLD = "fold: beyond it this equilibrium is gone"
     BIFURCATION = "bifurcation: beyond it the equilibrium is a saddle"

@@ -36,6 +36,13 @@ class Divider:
 
     Only its course in plan counts: the height is that of the surface.
 
+    >>> from pcmc.plan import Plan
+    >>> bays = [PatchSpec("west", 5.0, at=[1, 1]), PatchSpec("east", 4.0, at=[3, 1])]
+    >>> line = Divider([[2, 0], [2, 2]], wall=2.0, name="ridge wall")
+    >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [line], patches=bays).surface()
+    >>> [(patch.name, patch.tension) for patch in hall.patches]
+    [('west', 5.0), ('east', 4.0), ('ridge wall', 2.0)]
+
     Attributes
     ----------
     curve : the line. Each end is on the outline, a hole or another divider; parts outside the outline
@@ -70,6 +77,12 @@ class Divider:
 class Hole:
     """An opening in the plan.
 
+    >>> from pcmc.plan import Plan
+    >>> ring = Hole({"circle": {"centre": [3, 3, 1], "radius": 1}}, name="oculus")
+    >>> roof = Plan([[0, 0], [6, 0], [6, 6], [0, 6]], holes=[ring], tension=3.0).surface()
+    >>> float(roof.vertices[roof.fixed, 2].max())  # its edge is held at the height 1
+    1.0
+
     Attributes
     ----------
     curve : its closed edge.
@@ -90,6 +103,12 @@ class Hole:
 @dataclass(frozen=True, eq=False)
 class CableLine:
     """A part of the outline or of a hole that is free and carries a cable, whatever ``edge`` is elsewhere.
+
+    >>> from pcmc.plan import Plan
+    >>> front = CableLine([[0, 0], [6, 0]], tension=9.0, name="front")
+    >>> sail = Plan([[0, 0], [6, 0], [6, 6], [0, 6]], cables=[front], tension=1.0, pressure=0.0).surface()
+    >>> [(cable.name, cable.tension) for cable in sail.cables]
+    [('front', 9.0)]
 
     Attributes
     ----------
@@ -125,6 +144,11 @@ class RoomData:
 @dataclass(frozen=True)
 class PatchSpec:
     """A patch of the plan.
+
+    >>> from pcmc.plan import Plan
+    >>> roof = PatchSpec("roof", 3.0, pressure=1.0, weight=0.1)
+    >>> Plan([[0, 0], [4, 0], [4, 4], [0, 4]], patches=[roof]).surface().weights.tolist()
+    [0.1]
 
     Attributes
     ----------

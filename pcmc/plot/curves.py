@@ -46,6 +46,9 @@ def lines(
     curves that lie on each other all stay visible; ``levels`` are values of y by label, such as
     bounds, drawn as horizontal lines. A curve whose label is in ``fits`` is drawn as points, and its fit as
     a line of its colour.
+
+    >>> lines({"rise": ([1.0, 2.0, 3.0], [2.0, 1.2, 0.9])}, x="tension", width=300, height=200).shape
+    (200, 300, 3)
     """
     for scale in (xscale, yscale):
         validate.choice("scale", scale, SCALES)
@@ -95,6 +98,11 @@ def histories(
     ``y`` is a column of each frame ("energy", "gradient_squared", ...); ``x`` another one, or the
     row number (iteration) when None. The scale is logarithmic unless y has values ≤ 0 or is the
     energy. ``options`` are those of ``lines``: title, dashes, width, height.
+
+    >>> import pandas as pd
+    >>> solve = pd.DataFrame({"energy": [3.0, 2.0, 1.5], "residual": [1.0, 1e-3, 1e-9]})
+    >>> histories({"a solve": solve}, y="residual", width=300, height=200).shape
+    (200, 300, 3)
     """
     curves = {}
     for name, frame in frames.items():
@@ -121,7 +129,11 @@ def convergence(
     width: int = 900,
     height: int = 640,
 ) -> Image:
-    """Errors against edge lengths on logarithmic axes, with the least-squares slope of each."""
+    """Errors against edge lengths on logarithmic axes, with the least-squares slope of each.
+
+    >>> convergence({"energy": ([0.4, 0.2, 0.1], [0.16, 0.04, 0.01])}, width=300, height=200).shape
+    (200, 300, 3)
+    """
     figure, axes = new_axes(width, height, title, x, y, "log", "log")
     for k, (name, (xs, ys)) in enumerate(curves.items()):
         color, label = CURVES[k % len(CURVES)], name
@@ -162,6 +174,9 @@ def heatmap(
 
     ``marks`` are (len(y), len(x)) bools per title: an × in these squares (the paper's "diverged" in
     Fig. 16). Values that are not finite, or ≤ 0 when ``log``, stay grey.
+
+    >>> heatmap([1.0, 2.0], [3.0, 4.0], {"rise": [[1.0, 0.8], [0.9, np.nan]]}, width=300).shape[1:]
+    (300, 3)
     """
     xs, ys = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     shape = (len(ys), len(xs))

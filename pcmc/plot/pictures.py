@@ -72,6 +72,14 @@ def draw(
     ------
     OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
     MissingExtra : when pyvista or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    >>> film = Surface(corners, [[0, 1, 2]], [0], [Patch("film", 1.0)], fixed=[0, 1])
+    >>> draw(film, view="plan", width=300, renderer="matplotlib").shape[1:]
+    (300, 3)
     """
     given = {"views": view, "scalars": scalars, "numbers": numbers}
     one: dict[str, Any] = {name: None if value is None else [value] for name, value in given.items()}

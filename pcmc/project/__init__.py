@@ -25,22 +25,7 @@ from .file import Project, is_project, load, project_of, read_data, with_rise
 from .keys import json_schema, reference, sections
 from .outcome import MOST_CHECKED, OnStep, Outcome
 from .planning import drawing_reference, project_text, proposal_text
-from .running import (
-    analysis_jobs,
-    certified_files,
-    check_outputs,
-    designed,
-    draw_picture,
-    model_job,
-    opened,
-    paint_families,
-    paint_strain,
-    run,
-    run_project,
-    schedule_jobs,
-    surface_files,
-    write_all,
-)
+from .running import designed, opened, run, run_project
 from .settings import (
     AccuracyWanted,
     Output,
@@ -52,6 +37,18 @@ from .settings import (
 from .solving import solve_project
 from .start import build, start_of, surface_of
 from .varied import check_varied, digest, varied, with_loads
+from .writing import (
+    analysis_jobs,
+    certified_files,
+    check_outputs,
+    draw_picture,
+    model_job,
+    paint_families,
+    paint_strain,
+    schedule_jobs,
+    surface_files,
+    write_all,
+)
 
 __all__ = ["AccuracyWanted", "MOST_CHECKED", "OnStep", "Outcome", "Output", "Project", "Remeshing"]
 __all__ += ["Structure", "analysis_jobs", "build", "cache_folder", "cached_files", "certified_files"]

@@ -108,6 +108,16 @@ def load(path: PathLike, *, units: str = "") -> Project:
     -----
     FileWarning : for what was changed and left out of a drawing, a plan whose size is unlikely in its unit,
         and a roof held at single points inside.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> text = 'units = "mm"\\n[plan]\\noutline = [[0, 0], [6000, 0], [6000, 4000]]\\ntension = 3.0'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "hall.toml").write_text(text, encoding="utf-8")
+    ...     project = load(Path(folder, "hall.toml"))
+    >>> project.units.length, project.output.files
+    ('mm', ())
     """
     path = as_path(path)
     if not is_project(path):

@@ -2,41 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import warnings
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from .. import io
-from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, PcmcError
-from ..base.files import PathLike, atomic_writes, check_name, system_error, writing
+from ..base.files import PathLike
 from ..base.files import folder as output_folder
-from ..base.interrupts import defer_interrupts
-from ..base.units import NO_UNITS, Units
-from ..certificate.certificate import Certificate
-from ..cloth import CuttingPattern
-from ..cloth.sheets import pattern_files
-from ..forces.curvature import curvature_error, mean_curvature
-from ..panelling import Panels
-from ..structure import Analysis, StructuralModel, write_structure
-from ..surface import Surface, unfolded
 from . import cache
-from .checking import in_file
 from .file import Project, load
 from .outcome import OnStep, Outcome, ignore
-from .settings import check_picture, schedule_paths
 from .solving import Changed, solve_from_start
 from .start import start_of
-
-FileJobs = list[tuple[Path, Callable[[Path], Any]]]  # each file with the function that writes it
-CONTENTS = {".csv": "panels", ".inp": "structural model", ".svg": "drawing"}
-CONTENTS |= {".dxf": "drawings", ".pdf": "drawings"}
+from .writing import check_outputs, project_files, write_all
 
 
 def opened(
@@ -130,6 +106,18 @@ def run(
     Warns
     -----
     BalanceWarning : before solving, if the tensions at a junction cannot balance.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> plan = "[plan]\\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\\ntension = 3.0\\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "hall.toml")
+    ...     _ = path.write_text(plan + '[output]\\nfiles = ["hall.pcmc"]', encoding="utf-8")
+    ...     outcome = run(path)
+    >>> outcome.good, outcome.certificate.verdict.name, [file.name for file in outcome.files]
+    (True, 'STABLE', ['hall.pcmc'])
     """
     project = load(path)
     project = project if out_dir is None else project.in_folder(out_dir)
@@ -161,7 +149,7 @@ def run_project(
     for what in project.margin if outcome.certified else ():
         outcome.margin(what, progress)
     if outputs and (outcome.good or anyway):
-        jobs = _output_jobs(project, outcome, anyway, progress)
+        jobs = project_files(project, outcome, anyway, progress)
         with output_folder(project.folder or Path()):
             outcome = replace(outcome, files=write_all(jobs, progress))
     if use_cache and changed is None:
@@ -169,209 +157,3 @@ def run_project(
     if check_after and project.mesh_check and outcome.wants_mesh_check():
         outcome.check_mesh(progress)
     return outcome
-
-
-def _output_jobs(project: Project, outcome: Outcome, anyway: bool, progress: OnStep) -> FileJobs:
-    """The project's files, each with the function that writes it; documents tell if it is not certified."""
-    output, jobs = project.output, surface_files(outcome, project.output.files)
-    if output.picture is not None:
-        painting = partial(draw_picture, views=output.all_views, colour=output.colour, units=outcome.units)
-        jobs.append((Path(output.picture), partial(painting, outcome.shown.surface)))
-    if not output.documents:
-        return jobs
-    if output.report is not None and outcome.wants_mesh_check():
-        outcome.check_mesh(progress)
-    progress("drawing, sorting panels, modelling")
-    with in_file(project.path):
-        documents = FileJobs()
-        if output.drawings:
-            documents += outcome.drawing_set(output, anyway=anyway).files(*output.drawings)
-        if output.panels is not None and output.tolerance is not None:
-            schedule = outcome.panels(output.tolerance, anyway=anyway)
-            documents += schedule_jobs(Path(output.panels), schedule)
-        if output.structure is not None and project.structure is not None:
-            model = outcome.model(project.structure, anyway)
-            documents.append(model_job(Path(output.structure), model))
-        cloth = FileJobs()
-        if output.pattern and project.pattern is not None:
-            progress("cutting strips")
-            pattern = outcome.cutting_pattern(project.pattern, anyway)
-            cloth = pattern_files(pattern, output.pattern, outcome.units, output.sheet, outcome.name)
-        analysis = outcome.analysis(anyway, progress) if output.structure or output.report else None
-        loaded = FileJobs()
-        if output.structure is not None and analysis is not None:
-            loaded = analysis_jobs(Path(output.structure), analysis)
-        if output.report is not None:
-            listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
-            listed[project.path.name] = "project"
-            listed |= {path.name: "surface" for path, _ in jobs}
-            listed |= {} if output.picture is None else {Path(output.picture).name: "picture"}
-            listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in documents}
-            listed |= {path.name: "under load" for path, _ in loaded}
-            listed |= {path.name: "cutting pattern" for path, _ in cloth}
-            report = outcome.report(output, files=listed, anyway=anyway)
-            documents.append((Path(output.report), report.write))
-        documents += [*loaded, *cloth]
-    return jobs + documents
-
-
-def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
-    """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
-
-    Scalars of a surface that was not solved are those of its file.
-    """
-    if outcome.result is not None:
-        return certified_files(*outcome.shown, files, outcome.units, colour)
-    data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
-    about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
-    if outcome.unfold:
-        unfold, half = unfolded(outcome.surface), outcome.surface
-        place = {half.m: unfold.face, half.n: unfold.vertex}
-        carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
-        about |= {"scalars": carried, "certificate": None}
-    return [(Path(file), partial(io.write, surface=outcome.shown.surface, **about)) for file in files]
-
-
-def certified_files(
-    surface: Surface, certificate: Certificate, files: Iterable[PathLike], units: Units, colour: str = ""
-) -> FileJobs:
-    """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, and size of the reactions at supports (force)."""
-    scalars: dict[str, Floats] = {
-        "mean curvature": mean_curvature(surface),
-        "error": curvature_error(surface),
-        "reaction": np.linalg.norm(certificate.reactions, axis=1),
-    }
-    jobs: FileJobs = []
-    for file in map(Path, files):
-        form = io.FORMATS[file.suffix.lower()]
-        coloured = {name: values for name, values in scalars.items() if name == colour}
-        about: dict[str, Any] = {"units": units, "colour": colour}
-        about["scalars"] = form.carried(surface, scalars) | coloured
-        about["certificate"] = certificate if form.certificate else None
-        jobs.append((file, partial(io.write, surface=surface, **about)))
-    return jobs
-
-
-def write_all(jobs: FileJobs, progress: OnStep = ignore) -> list[Path]:
-    """Write files, each by its own function of a path: all appear together, or none."""
-    paths = [path for path, _ in jobs]
-    check_outputs(paths)
-    with atomic_writes(paths) as temporaries:
-        for (path, write), temporary in zip(jobs, temporaries, strict=True):
-            progress(f"writing {path.name}")
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always", FileWarning)
-                try:
-                    with writing(temporary), defer_interrupts():
-                        write(temporary)
-                except PcmcError as error:
-                    text = str(error).replace(f"{temporary}: ", "")
-                    raise FileError(f"{path}: {text}", what=str(path)) from None
-            for warning in caught:
-                text = str(warning.message).replace(str(temporary), str(path))
-                warnings.warn(text, warning.category, stacklevel=2)
-    return paths
-
-
-def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
-    """The files of a schedule, each with the function that writes it."""
-    tables = (schedule.panels, schedule.families, schedule.edges)
-    paths = schedule_paths(path)
-    return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
-
-
-def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:
-    """The file of a structural model, with the function that writes it."""
-    return path, partial(write_structure, model=model)
-
-
-def analysis_paths(path: Path) -> dict[str, Path]:
-    """The files of an analysis beside the structural model, by what they hold."""
-    names = {name: f"{path.stem}-{name}.csv" for name in ("cases", "patches", "supports", "cables")}
-    return {name: path.with_name(file) for name, file in names.items()} | {
-        "picture": path.with_name(f"{path.stem}-cases.png")
-    }
-
-
-def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
-    """The tables and the picture of an analysis beside the structural model."""
-    from ..plot import under_load  # needs the extra plot
-
-    paths = analysis_paths(path)
-    jobs: FileJobs = [
-        (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
-    ]
-    return [*jobs, (paths["picture"], partial(under_load, analysis))]
-
-
-def paint_families(path: Path, schedule: Panels, view: Any) -> None:
-    """Draw panels, coloured by family."""
-    from ..plot import families  # needs the extra plot
-
-    families(schedule, path, view=view)
-
-
-def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
-    """Draw the strips on the roof, coloured by the strain of the cloth."""
-    from ..plot import strains  # needs the extra plot
-
-    strains(pattern, path, view=view)
-
-
-def draw_picture(
-    surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
-) -> None:
-    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
-    # needs the extra plot, which a project without a picture does not
-    from ..plot import draw, panel, reactions
-
-    check_picture(views, colour)
-    if colour == "reactions":
-        reactions(surface, path, view=views[0], units=units)
-        return
-    look: dict[str, Any] = {"legend": True}
-    if colour == "curvature":
-        look = {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
-    elif colour == "error":
-        look = {"scalars": curvature_error(surface), "label": "curvature error"}
-    if len(views) == 1:
-        draw(surface, path, view=views[0], **look)
-    else:
-        look |= {"scalars": [look["scalars"]] * len(views)} if "scalars" in look else {}
-        panel([surface] * len(views), path, views=views, **look)
-
-
-def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
-    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``, also
-    by links and other ways to write them. The folder ``made`` may be missing."""
-    seen, read = set(), [path for path in inputs if path.exists()]
-    if made is not None and made.exists() and not made.is_dir():
-        raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
-    for path in paths:
-        check_name(path)
-        place = os.path.normcase(path.resolve())
-        folder = path.parent
-        try:
-            is_folder = path.is_dir()
-            there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
-        except OSError as error:  # a name that is too long
-            raise system_error(path, "written", error) from None
-        problem = None
-        if is_folder:
-            problem = "is a folder; give the name of a file"
-        elif path.exists() and any(path.samefile(one) for one in read):
-            problem = "is read here, and is not written over; name another file"
-        elif path.exists() and not path.is_file():
-            problem = "is a pipe or a device; name a file"
-        elif place in seen:
-            problem = "is named twice; name two files for the output"
-        elif folder != made and not folder.is_dir():
-            problem = f"there is no folder {folder}; create it first"
-        elif not there.is_dir():
-            problem = f"{there} is a file; the output needs a folder"
-        elif not os.access(there, os.W_OK):
-            problem = f"cannot be written (the folder {folder if folder.is_dir() else there} is read-only)"
-        if problem:
-            raise FileError(f"{path}: {problem}", what=str(path))
-        seen.add(place)

@@ -59,7 +59,18 @@ def surface_of(project: Project) -> Surface:
 
 
 def build(path: PathLike) -> Surface:
-    """The start shape of the project in a file. Errors as in ``load``."""
+    """The start shape of the project in a file. Errors as in ``load``.
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "hall.toml")
+    ...     text = "[plan]\\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\\ntension = 3.0"
+    ...     _ = path.write_text(text, encoding="utf-8")
+    ...     start = build(path)
+    >>> [patch.tension for patch in start.patches], start.size > 6.0
+    ([3.0], True)
+    """
     return surface_of(load(path))
 
 

@@ -22,7 +22,7 @@ from .start import surface_of
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written
-KEYS = {kind: field for kind, (parts, field) in KINDS.items() if parts == "patches"}
+KEYS = {kind: field for kind, (parts, field, _) in KINDS.items() if parts == "patches"}
 LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
 NO_POINTS = ("axes", "weights", "radius")  # of a curve
 WEIGHT_KEYS = {"cable": "cable_weight", "tension": "weight"}  # of a cable, by the key of its tension
@@ -256,7 +256,6 @@ class _Writer(NamedTuple):
                 raise OptionError(text, what="cable", where=name)
             curve = [[float(f"{x:.9g}") for x in point] for point in tips.tolist()]
             line = {"name": name, "curve": curve, "tension": _number(values["cables", name])}
-            line |= {"weight": _number(w)} if (w := values["cable_weights", name]) else {}
             self.plan.setdefault("cables", []).append(line)
 
     def line(self, source: Source) -> dict[str, Any]:

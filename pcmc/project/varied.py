@@ -79,8 +79,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     project = (start and start.project) or project
     found_by_search: dict[str, str] = {}  # with what each is
     for parameter in project.vary:
-        cable, table = parameter.kind == "cable", "mesh" if project.plan is None else "plan"
-        kind = "tension" if cable else parameter.kind
+        parts, kind, _ = KINDS[parameter.key]
+        cable, table = parts == "cables", "mesh" if project.plan is None else "plan"
         for one in parameter.names:
             bare = one.removeprefix(CABLE) if cable else one
             names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]

@@ -44,7 +44,13 @@ def _of_patches(field: str) -> cached_property[Any]:
 
 
 def expect_surface(value: object) -> None:
-    """Refuse anything but a Surface."""
+    """Refuse anything but a Surface.
+
+    >>> expect_surface("roof.toml")
+    Traceback (most recent call last):
+        ...
+    pcmc.base.errors.SurfaceError: surface: expected a Surface, found 'str'
+    """
     if not isinstance(value, Surface):
         validate.refuse("surface", type(value).__name__, "a Surface", error=SurfaceError)
 

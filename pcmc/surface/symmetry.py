@@ -171,7 +171,15 @@ def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> S
 
 
 def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> Whole:
-    """As ``mirrored``, with the vertex and the face that each of the whole is an image of."""
+    """As ``mirrored``, with the vertex and the face that each of the whole is an image of.
+
+    >>> from pcmc import Patch
+    >>> side = Plane(normal=(1, 0, 0), mirror=True, name="x = 0")
+    >>> half = Surface([[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 2, 1]], [0], [Patch("film", 1.0)],
+    ...                fixed=[2], on_planes={side: [0, 1]})
+    >>> unfolded(half).surface.m
+    2
+    """
     expect_surface(surface)
     mirrors = _chosen(surface, planes)
     masks = np.array([mask for _, mask in mirrors])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,26 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.tolerances import SAME_PRESSURE
 
+
+class ValueKind(NamedTuple):
+    """A kind of values: the parts of a surface that have one each, their field, and its dimension."""
+
+    parts: str
+    field: str
+    dimension: str  # a key of ``POWERS``
+
+
 KINDS = {
-    **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
-    "cables": ("cables", "tension"),
-    "cable_weights": ("cables", "weight"),
-    "volumes": ("rooms", "volume"),
+    "tensions": ValueKind("patches", "tension", "tension"),
+    "pressures": ValueKind("patches", "pressure", "pressure"),
+    "snows": ValueKind("patches", "snow", "pressure"),
+    "weights": ValueKind("patches", "weight", "pressure"),
+    "cables": ValueKind("cables", "tension", "force"),
+    "cable_weights": ValueKind("cables", "weight", "tension"),
+    "volumes": ValueKind("rooms", "volume", "volume"),
 }
-"""The kinds of values, as ``Surface.retensioned`` takes them: the parts of the surface, and their field."""
+"""The kinds of values, as ``Surface.retensioned`` takes them."""
+POWERS = {"force": 0, "tension": -1, "pressure": -2, "volume": 3}  # of a length, beside one of a force
 PARTS = {"patches": "patch", "cables": "cable", "rooms": "room"}
 SHARE = 0.3  # of the smaller tension: the wall's tension above the difference of its neighbours'
 
@@ -33,13 +46,13 @@ def all_values(surface: Any) -> dict[str, dict[str, float]]:
     """The values of a Surface by kind and name, as ``Surface.retensioned`` takes them."""
     return {
         kind: {part.name: getattr(part, field) for part in getattr(surface, parts)}
-        for kind, (parts, field) in KINDS.items()
+        for kind, (parts, field, _) in KINDS.items()
     }
 
 
 def part_values(surface: Any, kind: str) -> Floats:
     """The values of one kind, in the order of the patches, cables or rooms."""
-    parts, field = KINDS[kind]
+    parts, field, _ = KINDS[kind]
     return np.array([getattr(part, field) for part in getattr(surface, parts)], dtype=float)
 
 
@@ -58,7 +71,7 @@ def with_values(
     for kind, values in given.items():
         if not isinstance(values or {}, Mapping):
             validate.refuse(kind, values, "a mapping from names to numbers", error=SurfaceError)
-        parts, field = KINDS[kind]
+        parts, field, _ = KINDS[kind]
         changes[parts][field] = dict(values or {})
     if isinstance(walls, str) or not isinstance(walls, Iterable):
         validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)

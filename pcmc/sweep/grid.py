@@ -121,7 +121,17 @@ class Sweep:
 
 
 def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorator of a function with ``**arguments``: ``check`` refuses a bad case before any case is run."""
+    """Decorator of a function with ``**arguments``: ``check`` refuses a bad case before any case is run.
+
+    >>> def known(arguments):
+    ...     if "wall" not in arguments:
+    ...         raise ValueError("a wall is needed")
+    >>> @checked(known)
+    ... def case(**arguments):
+    ...     return {"rise": 1.0 / arguments["wall"]}
+    >>> case(wall=2.0)
+    {'rise': 0.5}
+    """
 
     def mark(function: Callable[..., Any]) -> Callable[..., Any]:
         function.__dict__["check"] = check

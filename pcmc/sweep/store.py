@@ -110,6 +110,14 @@ def read_store(path: str | os.PathLike[str]) -> list[Record]:
     """The records of a store, in the order of the last sweep's grid; a sweep may be running on it.
 
     FileError if the file cannot be read, or is no store.
+
+    >>> import tempfile
+    >>> from pcmc.sweep import Sweep, run
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     case = Sweep("fractions:Fraction", {"numerator": [1], "denominator": [0]})  # raises
+    ...     _ = run(case, folder + "/bad.store", workers=1)
+    ...     [record.message for record in read_store(folder + "/bad.store")]
+    ['ZeroDivisionError: Fraction(1, 0)']
     """
     with _connected(Path(path), "rw") as database:
         database.execute("BEGIN")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import MissingExtra, OptionError
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units
+from ..surface.values import KINDS
 from .case_script import WORDS
 from .store import Record
 
@@ -26,7 +27,7 @@ GOOD = ("stable", "neutral")
 DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
 # of numbers of a project that are no quantities of a roof
 DIMENSIONS |= {"wall": "tension", "cable_weight": "tension"}
-OF_CABLES = {"tension": "force", "weight": "tension"}
+OF_CABLES = {kind.field: kind.dimension for kind in KINDS.values() if kind.parts == "cables"}
 
 
 def table(records: Iterable[Record]) -> pd.DataFrame:
@@ -42,7 +43,13 @@ def table(records: Iterable[Record]) -> pd.DataFrame:
 
 
 def provenance(records: Iterable[Record]) -> pd.DataFrame:
-    """One row per case: wall time in seconds, when and where, versions, output of failures."""
+    """One row per case: wall time in seconds, when and where, versions, output of failures.
+
+    >>> from pcmc.sweep import Record
+    >>> done = Record(0, {"wall": 1.0}, "converged", "stable", "", {"rise": 1.5}, 0.2, {"computer": "mine"})
+    >>> provenance([done]).to_dict("list"), table([done])["rise"].tolist()
+    ({'wall_time': [0.2], 'computer': ['mine']}, [1.5])
+    """
     return _frame({"case": r.case, "wall_time": r.wall_time} | r.provenance for r in records)
 
 
@@ -59,6 +66,16 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     Floats are written with the digits that give the same float back. In Parquet, which has one type per
     column, a column of mixed types is written as text. FileError for another suffix, or a file that cannot be
     written; MissingExtra for ``.parquet`` without pyarrow.
+
+    >>> import tempfile
+    >>> import pandas as pd
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_table(folder + "/walls.csv", pd.DataFrame({"wall": [1.0, 2.0], "rise": [1.5, 1.25]}))
+    ...     print(Path(folder, "walls.csv").read_text(encoding="utf-8"))
+    ,wall,rise
+    0,1.0,1.5
+    1,2.0,1.25
+    <BLANKLINE>
     """
     path = Path(path)
     suffix = suffix_of(path, TABLES, "a table")
@@ -145,6 +162,11 @@ def draw_sweep(
     ``labels`` are the names of columns as they are shown, such as ``with_units`` gives; ``show`` is what is
     drawn, as of ``columns_of``; over two numbers the last of its columns. By default it is the apexes over
     one number, the rise over two. OptionError if not one or two numbers vary, or no case has a shape.
+
+    >>> import pandas as pd
+    >>> rows = {"wall": [1.0, 2.0], "verdict": ["stable", "stable"], "roof.apex": [1.5, 1.2]}
+    >>> draw_sweep(pd.DataFrame(rows), ["wall"]).shape[2]
+    3
     """
     from ..plot import heatmap, lines
 
@@ -163,13 +185,13 @@ def draw_sweep(
     if len(varied) == 1:
         frame = certified.set_index(table[varied[0]]).sort_index().dropna(axis="columns", how="all")
         x = frame.index.to_numpy(float)
-        curves = {str(c).rpartition(".")[0] or "roof": (x, y.to_numpy()) for c, y in frame.items()}
+        curves = {str(c).rpartition(".")[0]: (x, y.to_numpy()) for c, y in frame.items()}
         if not show:
-            curves.pop("roof", None)  # the highest of the others
+            curves.pop("", None)  # that of the roof, the highest of the others
         if not curves:
             raise OptionError("no case of this sweep is certified; see its table", what="plot", found=0)
         label = names.get(last, last).removeprefix(f"{last.rpartition('.')[0]}.")
-        return lines(curves, path, x=shown[0], y=label, markers=True)
+        return lines({of or "roof": y for of, y in curves.items()}, path, x=shown[0], y=label, markers=True)
     places = [table[name] for name in reversed(varied)]
     value = certified[last].groupby(places).mean().unstack()
     lost = (~good).groupby(places).any().unstack(fill_value=True)

@@ -95,6 +95,12 @@ def test_the_limit_and_its_bar_are_those_of_the_table(values, limit, bar):
     assert found.error[0] == pytest.approx(abs(limit - values[0]) + bar, rel=1e-12)
 
 
+def test_two_meshes_of_one_value_leave_rounding():
+    found = extrapolate(np.array([[2.0], [2.0 + 1e-13]]), np.array([1e-12]))
+    assert (found.limit[0], found.limit_error[0]) == (2.0 + 1e-13, 1e-12)
+    assert np.isnan(found.order[0])
+
+
 def test_heights_in_mirror_planes_are_read_with_the_images():
     """The crown of a barrel of nine squares lies between vertices, the highest of them in mirror planes."""
     case = next(c for c in coverage_weights.barrels() if c.name == "α 2, p 1, w 0.3, 9 squares")

@@ -16,6 +16,7 @@ from generators import (
     two_squares,
 )
 from pcmc import MeshVerdict, Patch, Surface, certify, check_mesh, cli, read, solve
+from pcmc.accuracy import mesh_check
 from pcmc.accuracy.persistence import compared
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.meshing.held_curves import smooth_midpoints
@@ -85,6 +86,22 @@ def test_a_stable_surface_that_turns_into_a_saddle_changes():
     assert found.verdict is MeshVerdict.CHANGES
     assert "saddle of index 1" in found.detail
     assert "hold the bottom of 'wall'" in found.advice
+
+
+def test_what_changes_on_the_second_mesh_changes_though_the_third_is_lost(monkeypatch):
+    solved, starts = mesh_check._solved, []
+
+    def tired(start, callback):
+        starts.append(start)
+        if len(starts) == 2:
+            return solve_once(start, "newton", target="stationary", iterations=1)
+        return solved(start, callback)
+
+    monkeypatch.setattr(mesh_check, "_solved", tired)
+    found = check_mesh(solve(two_squares(6, alpha_aux=2.0)), boundary="polygon")
+    assert [len(starts), len(found.surfaces)] == [2, 2]
+    assert found.verdict is MeshVerdict.CHANGES
+    assert np.isnan(found.row("height", "left").limit)
 
 
 @pytest.mark.parametrize("edge", [1.2, 0.6], ids=["drifts", "collapses"])

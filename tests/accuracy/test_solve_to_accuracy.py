@@ -12,11 +12,12 @@ import pcmc
 from pcmc import Patch, Surface, Target, cli, solve, solve_to_accuracy
 from pcmc.accuracy import adaptive, check_mesh, estimator
 from pcmc.accuracy.adaptive import AccuracyStatus, goals_in
-from pcmc.accuracy.estimator import _edge_shares, _held_vertices, _slope, error_shares, size_field
+from pcmc.accuracy.estimator import _along, _edge_shares, _held_vertices, _slope, error_shares, size_field
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.certificate.forces import reactions
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy, volume
+from pcmc.forces.second_variation import hessian
 from pcmc.meshing.held_curves import onto_held_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
@@ -175,6 +176,19 @@ def test_the_lowest_eigenvalue_has_shares(roof, fine_roof):
     shares = error_shares(roof, fine_roof, {("lowest eigenvalue", ""): 1.0})
     assert (shares >= 0.0).all()
     assert shares.max() > 0.0
+
+
+def test_the_change_of_forces_along_a_field_is_that_of_the_hessian():
+    """And the second one is how the Hessian's product changes."""
+    cap = generators.spherical_cap(0.6)
+    field = np.random.default_rng(0).normal(size=cap.vertices.shape)
+
+    def product(step):
+        return (hessian(cap.moved(cap.vertices + step * field)) @ field.ravel()).reshape(-1, 3)
+
+    np.testing.assert_allclose(_along(cap, field), product(0.0), rtol=1e-5, atol=1e-6)
+    bent = (product(1e-4) - product(-1e-4)) / 2e-4
+    np.testing.assert_allclose(_along(cap, field, second=True), bent, atol=3e-3 * np.abs(bent).max())
 
 
 def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():

@@ -21,6 +21,7 @@ from pcmc.io.mesh_data import in_new_unit, scaled_surface
 from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
 from pcmc.surface import Room
+from pcmc.surface.colours import patch_colors
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +141,13 @@ def test_a_rhino_file_in_any_unit_has_the_size_that_its_unit_says(tmp_path, syst
         roof = pcmc.read(path, units="m")
     size = RHINO[system] * np.array([12000.0, 12000.0, 3000.0])
     np.testing.assert_allclose(np.ptp(roof.vertices, axis=0), size, rtol=1e-9)
+
+
+def test_layers_of_a_rhino_file_have_the_colours_of_their_patches(tmp_path, roof):
+    pcmc.write(tmp_path / "a.3dm", roof)
+    layers = {layer.Name: layer.Color for layer in rhino3dm.File3dm.Read(str(tmp_path / "a.3dm")).Layers}
+    for patch, color in zip(roof.patches, patch_colors(roof), strict=True):
+        assert layers[patch.name] == (*(255.0 * color).round(), 255)
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,20 @@ def test_a_roof_at_rest(squares):
     assert len(found.pinched) == 0
 
 
+def test_the_middle_of_a_curve_is_0_where_it_is_rounding(squares):
+    """The junction is x = 0 and symmetric in y = 0; so are the heights of its two ends."""
+    (row,) = squares.certificate.junctions.to_dict("records")
+    assert (row["middle_x"], row["middle_y"]) == (0.0, 0.0)
+    apex = squares.surface.vertices[squares.surface.topology.junctions[0].vertices, 2].max()
+    assert row["middle_z"] == pytest.approx(apex, rel=1e-12)
+
+
+def test_a_wall_that_is_pinched_all_along_has_no_bad_triangle():
+    found = solve(two_squares(4, alpha=2.0, alpha_aux=6.0), target="stationary").certificate
+    (quality,) = found.patches.quality[found.patches.patch == "wall"]
+    assert (found.verdict, quality) == (Verdict.STABLE, 1.0)
+
+
 def test_the_rows_of_the_patches(squares):
     surface, table = squares.surface, squares.certificate.patches.set_index("patch")
     assert list(table.index) == ["left", "right", "wall"]

@@ -138,6 +138,16 @@ def test_cables_of_a_flat_sail_need_a_tension(corners):
     assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM
 
 
+def test_a_held_edge_of_a_sail_turns_by_nothing():
+    """A square whose first side is one held edge: at the corner between two others θ + θ' ≤ 2 · 90° holds."""
+    corners, middles = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], [[1.9, 1, 0], [1, 1.9, 0], [0.1, 1, 0]]
+    ring = [[0, 1], [1, 4], [4, 2], [2, 5], [5, 3], [3, 6], [6, 0]]
+    faces, patch = [[*edge, 7] for edge in ring], Patch("sail", 1.0, 0.0)
+    cables = [Cable("rope", 1.2, ring[1:])]
+    found = Surface([*corners, *middles, [1, 1, 0]], faces, [0] * 7, [patch], fixed=range(4), cables=cables)
+    assert weak_cable(found).least == pytest.approx(2.0**0.5)
+
+
 def test_of_a_sail_that_is_not_flat_a_weak_cable_proves_nothing():
     weak = sail(0.5)
     assert weak_cable(weak) is not None

@@ -8,6 +8,7 @@ import pcmc
 from generators import spherical_cap, two_squares
 from pcmc import Parameter, Patch, Plane, Surface, Target
 from pcmc.certificate.forces import Forces
+from pcmc.certificate.measures import largest_pull
 from pcmc.certificate.quantities import figures
 from pcmc.design.targets import measure
 from pcmc.meshing.refinement import refine
@@ -16,6 +17,23 @@ from pcmc.plan import Divider, Plan
 PULL = ["pull_x", "pull_y", "pull_z"]
 SQUARE = [[0, 0], [6, 0], [6, 6], [0, 6]]
 ELL = [[0, 0], [8, 0], [8, 4], [4, 4], [4, 8], [0, 8]]
+
+
+def test_the_pull_of_two_sheets_along_a_held_ridge_has_its_slopes():
+    """|Σ α n| of sheets that meet at an angle also changes as they turn about their common edge."""
+    corners = [[0, 0, 1], [2, 0.1, 1.2], [0.3, 2, 0], [1.7, -1.5, 0.2]]
+    tent = Surface(
+        corners, [[0, 1, 2], [1, 0, 3]], [0, 1], [Patch("a", 1.0, 0.0), Patch("b", 2.0, 0.0)], fixed=range(4)
+    )
+    edge = ~tent.topology.boundary_edge
+
+    def pull(surface):
+        return largest_pull(Forces.of(surface), edge)
+
+    found, way = pull(tent), np.random.default_rng(0).normal(size=(4, 3))
+    step = 1e-6 * way
+    difference = pull(tent.moved(tent.vertices + step)).value - pull(tent.moved(tent.vertices - step)).value
+    assert (found.by_position * way).sum() == pytest.approx(difference / 2e-6, rel=1e-6)
 
 
 def refined(surface, times=3):

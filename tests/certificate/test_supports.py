@@ -8,10 +8,11 @@ from pictures import near
 from support_cases import cables_between_walls, half_with_mirror
 
 import pcmc
-from generators import spherical_cap, two_squares
+from generators import catenoid, spherical_cap, two_squares
 from pcmc import Plane, Target, cut, plot
 from pcmc.base.units import Units
 from pcmc.certificate.quantities import figures
+from pcmc.certificate.supports import balance_sentence
 from pcmc.design.targets import measure
 from pcmc.forces.pinching import standing_part
 from pcmc.meshing.refinement import refine
@@ -109,6 +110,24 @@ def test_the_rows_add_up_to_the_loads(solved):
     np.testing.assert_allclose(found.remainder, rows + loads, atol=1e-12 * size)
     assert 0.0 < found.balance["force_share"].iloc[-1] < 0.05
     assert "the supports carry the loads" in str(found)
+
+
+def test_the_sentence_of_balance_tells_whether_there_are_loads():
+    """Of a film without loads the forces of its supports cancel, up to what the solver leaves of them."""
+    film = pcmc.solve(catenoid(0.4, half_distance=0.5), tolerance=1e-6).certificate
+    table = film.balance
+    assert table.iloc[1][FORCE].any()
+    sentence = balance_sentence(table)
+    assert sentence.startswith("the forces of the supports cancel to ")
+    assert sentence.endswith(f" of them in x, y and z, and to {table.moment_share.iloc[-1]:.1g} in moments")
+    assert sentence in str(film)
+
+
+def test_the_sentence_of_balance_names_the_place_of_moments_without_signs_of_zero():
+    table = pcmc.certify(hall_of_upright_walls()).balance
+    table[["x", "y", "z"]] = [-0.0, 2.0, -0.0]
+    assert " in moments about (0, 2, 0)" in balance_sentence(table)
+    assert "loads of the piece between the mirror planes to" in balance_sentence(table, ["plane x = 0"])
 
 
 def test_what_remains_falls_with_the_mesh():

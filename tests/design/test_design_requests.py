@@ -105,6 +105,17 @@ def test_parameters_and_walls_of_no_tension():
         Parameter("wall", low=-1.0, high=1.0).bounds(surface)
 
 
+def test_a_tension_may_be_0_only_where_nothing_presses_or_weighs():
+    surface = joined_caps(2.0, alpha_aux=3.0)
+    assert Parameter("wall", low=0.0, high=1.0).bounds(surface) == (0.0, 1.0)
+    unloaded = surface.retensioned(None, {"left": 0.0})
+    assert Parameter("left", low=0.0, high=1.0).bounds(unloaded) == (0.0, 1.0)
+    for loaded in (surface, unloaded.retensioned(weights={"left": 0.1})):
+        assert Parameter("left", low=1e-6, high=1.0).bounds(loaded) == (1e-6, 1.0)
+        with refused(OptionError, what="low", where="tension of left", found=0.0):
+            Parameter("left", low=0.0, high=1.0).bounds(loaded)
+
+
 def test_nothing_held_has_no_reaction():
     with refused(OptionError, what="of", found="left"):
         measure(double_bubble(1.0), Target("reaction", "left"))

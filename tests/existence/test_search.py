@@ -1,5 +1,7 @@
 """The search for an equilibrium beyond the first start, and the proofs that there is none."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from random_meshes import random_surface
@@ -7,7 +9,7 @@ from shapes import pyramid, tube
 from starts import sphere, spherical_cap, two_caps, two_squares
 
 from generators import spherical_cap_exact
-from pcmc import Circle, Patch, Verdict, certify, solve, write
+from pcmc import Cable, Circle, Patch, Verdict, certify, solve, write
 from pcmc.certificate.balance import unheld
 from pcmc.certificate.diagnosis import narrowest_neck
 from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
@@ -253,6 +255,8 @@ def test_a_part_that_nothing_holds_falls_under_its_weight():
     result = solve(heavy)
     assert result.proofs == certify(heavy).proofs == (Unheld(0, falls=True),)
     assert unheld(heavy.rebuilt(fixed=[0])) is None
+    lifting = dataclasses.replace(heavy, cables=[Cable("balloon", 0.1, heavy.topology.edges[:1], -0.1)])
+    assert unheld(lifting) is None
 
 
 def test_a_way_that_crawls_ends_at_the_saddle_and_names_the_ends_that_slip():

@@ -166,6 +166,37 @@ def test_along_a_free_edge_the_cable_balances_the_sheet():
     assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2.0, abs=0.35)
 
 
+def test_a_cable_where_nothing_else_acts_is_named():
+    X = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
+    faces, patches = (
+        [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]],
+        [Patch("a", 1.0, 0.0), Patch("off", 0.0, 0.0)],
+    )
+    rope = Cable("rope", 2.0, [[1, 2], [4, 5]])
+    surface = Surface(X, faces, [0, 0, 1, 1], patches, fixed=[0, 3, 4], cables=[rope])
+    for use in (solve, pcmc.certify):
+        with refused(SurfaceError, what="cables", where=(4, 5)):
+            use(surface)
+    kept = dataclasses.replace(surface, cables=[Cable("rope", 2.0, [[0, 1], [1, 2]])])
+    assert len(pcmc.certify(kept).cables) == 1
+
+
+def test_a_cable_around_a_disc_has_a_row_without_ends():
+    """τ κ = 3/2 along a polygon on a circle of radius 2, where the sheet pulls with α = 1."""
+    angle = 2.0 * np.pi * np.arange(12) / 12
+    X = [[0, 0, 0], *np.stack([2.0 * np.cos(angle), 2.0 * np.sin(angle), 0.0 * angle], axis=1)]
+    faces = [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)]
+    rim = Cable("rim", 3.0, [face[1:] for face in faces])
+    disc = Surface(X, faces, [0] * 12, [Patch("disc", 1.0, 0.0)], fixed=[0], cables=[rim])
+    certificate = pcmc.certify(disc)
+    (row,) = certificate.cables.to_dict("records")
+    assert (row["cable"], row["tension"], len(certificate.cable_ends)) == ("rim", 3.0, 0)
+    assert row["length"] == pytest.approx(48.0 * np.sin(np.pi / 12), rel=1e-12)
+    assert row["sheet_pull"] == pytest.approx(1.0, rel=1e-12)
+    assert row["cable_pull"] == pytest.approx(1.5, rel=1e-12)
+    assert [row[f"middle_{axis}"] for axis in "xyz"] == [0.0, 0.0, 0.0]
+
+
 def test_a_ridge_cable_between_equal_sheets_pulls_them_down():
     """A cable along the middle of a dome, its ends fixed: it is a curve where the sheet has a crease."""
     side = np.linspace(-1.0, 1.0, 9)

@@ -70,6 +70,21 @@ def test_a_standing_wall_that_is_held_pinches_only_when_asked():
     assert (walls.foot[walls.corner] == np.flatnonzero(walls.corner)).all()
 
 
+def test_the_first_vertex_may_be_a_foot():
+    """Beside the resting ones a top leans over its foot: ℓ is that of the bottom, be the foot's number 0."""
+    full, walls, resting, _ = pressed()
+    tops = np.flatnonzero(walls.held & ~resting)
+    top = tops[np.argsort(full.vertices[tops, 1])][0]
+    leaning = full.moved(
+        full.vertices + np.where(np.arange(full.n) == top, 0.7, 0.0)[:, None] * [1.0, 0.0, 0.0]
+    )
+    order = np.concatenate([[walls.foot[top]], np.delete(np.arange(full.n), walls.foot[top])])
+    faces = np.argsort(order)[full.faces]
+    other = Surface(leaning.vertices[order], faces, full.patch_of_face, full.patches, fixed=full.fixed[order])
+    for here, there in zip(contact(leaning), contact(other), strict=True):
+        np.testing.assert_allclose(there, here[order], rtol=1e-12, atol=1e-14)
+
+
 def test_walls_that_cannot_pair_their_vertices_cannot_pinch():
     assert not find_walls(held(four_fans(4)), held=True).pinchable.any()  # four walls meet at one vertex
     line = [[0, -2, 0], [0, -1, 1], [0, 0, 2], [0, 1, 1], [0, 2, 0]]

@@ -9,7 +9,7 @@ from refusals import refused
 from shapes import cap, octahedron, pyramid, rotation, shaken, three_patches
 
 from pcmc import Patch, Surface, curvature_error, gradient, mean_curvature, solve, target_curvature
-from pcmc.base.errors import OptionError
+from pcmc.base.errors import OptionError, SurfaceError
 
 METHODS = ["cotangent", "variational"]
 
@@ -136,3 +136,9 @@ def test_a_wall_without_tension_has_no_target():
     assert (inside & wall).sum() == 1
     assert np.isnan(target_curvature(split)[inside & wall]).all()
     assert np.isnan(curvature_error(split)[inside & wall]).all()
+
+
+@pytest.mark.parametrize("quantity", [mean_curvature, target_curvature, curvature_error])
+def test_what_is_no_surface_is_refused(quantity):
+    with refused(SurfaceError, what="surface", found="list", expected="a Surface"):
+        quantity([[0.0, 0.0, 0.0]])

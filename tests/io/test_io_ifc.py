@@ -141,6 +141,9 @@ def test_forces_have_units_if_they_are_given(tmp_path, force):
         for unit in model.by_type("IfcDerivedUnit")
     }
     assert powers == {"LINEARFORCEUNIT": [1, -1], "PLANARFORCEUNIT": [1, -2]}
+    dimensions = {unit.UnitType: tuple(unit.Dimensions) for unit in model.by_type("IfcConversionBasedUnit")}
+    assert dimensions.pop("LENGTHUNIT") == (1, 0, 0, 0, 0, 0, 0)  # length, mass, time, and four more
+    assert set(dimensions.values()) <= {(1, 1, -2, 0, 0, 0, 0)}
 
 
 def test_unknown_units_are_refused(tmp_path):

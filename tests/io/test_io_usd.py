@@ -41,6 +41,8 @@ def test_each_patch_is_a_mesh_with_its_material(tmp_path):
         shader = material.ComputeSurfaceSource()[0]
         color = tuple(shader.GetInput("diffuseColor").Get())
         assert color == pytest.approx(tuple(mesh.GetDisplayColorAttr().Get()[0]))
+        assert mesh.GetDoubleSidedAttr().Get()  # a roof is seen from below, too
+        assert 0.0 < shader.GetInput("roughness").Get() <= 1.0
         colors.add(color)
     assert len(colors) == 3
 

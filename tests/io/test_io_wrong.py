@@ -7,6 +7,7 @@ from refusals import refused
 
 import pcmc
 from pcmc.base.errors import FileError, SurfaceError
+from pcmc.io.mesh_data import within
 from tests.io.test_io_foreign import PLY, X, expected
 
 meshio = pytest.importorskip("meshio")
@@ -99,3 +100,9 @@ def test_a_name_that_no_file_can_have_is_refused(name):
         pcmc.read(name)
     with refused(FileError, what=name):
         pcmc.write(name, expected())
+
+
+def test_an_index_that_is_outside_is_named_with_what_is_inside():
+    with refused(FileError, what="faces", where=1, found=[2, 3], expected=(0, 2)) as caught:
+        within([[0, 1], [2, 3]], "faces", 3)
+    assert str(caught.value).endswith("faces: entry 1 is 2, 3, outside 0..2")

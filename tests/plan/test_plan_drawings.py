@@ -187,6 +187,50 @@ def test_blocks_layers_that_are_off_and_other_entities(tmp_path):
     assert "'divider old' (1)" in plan.notes[0]
 
 
+def rhino_outline(path, curve, *corners):
+    """A drawing in metres whose outline is a curve and a polyline."""
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    layer, attributes = rhino3dm.Layer(), rhino3dm.ObjectAttributes()
+    layer.Name = "Outline"
+    attributes.LayerIndex = model.Layers.Add(layer)
+    model.Objects.AddCurve(curve, attributes)
+    if corners:
+        line = rhino3dm.Polyline([rhino3dm.Point3d(x, y, 0.0) for x, y in corners])
+        model.Objects.AddPolyline(line, attributes)
+    model.Write(str(path), 7)
+    return read_drawing(path, "m").outline
+
+
+def test_a_free_curve_of_rhino_is_the_curve_drawn(tmp_path):
+    points = [rhino3dm.Point3d(x, y, 0.0) for x, y in ((0, 0), (2, -2), (5, 1), (7, -1), (10, 0))]
+    curve = rhino3dm.NurbsCurve.Create(False, 3, points)
+    outline = rhino_outline(tmp_path / "a.3dm", curve, (10, 0), (10, 6), (0, 6), (0, 0))
+    ends = np.linspace(curve.Domain.T0, curve.Domain.T1, 2001)
+    drawn_points = np.array([(p.X, p.Y) for p in map(curve.PointAt, ends)])
+    length = np.linalg.norm(np.diff(drawn_points, axis=0), axis=1).sum()
+    assert outline.closed
+    assert outline.length == pytest.approx(length + 22.0, rel=1e-4)
+    assert sum(len(piece.points) == 4 for piece in outline.pieces) == 2  # as exact Bézier curves
+    found = np.array(outline.at(outline.dense))[:, :2]
+    low = found[(found[:, 1] < 0.3) & (found[:, 0] > 1e-6) & (found[:, 0] < 10.0 - 1e-6)]
+    away = np.linalg.norm(low[:, None] - drawn_points, axis=2).min(axis=1)
+    assert len(low) > 10
+    assert away.max() < 0.01
+
+
+def test_an_ellipse_of_rhino_is_an_ellipse(tmp_path):
+    """Its curve is rational: points have weights."""
+    curve = rhino3dm.NurbsCurve.CreateFromCircle(rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 1.0))
+    for k in range(len(curve.Points)):
+        p = curve.Points[k]
+        curve.Points[k] = rhino3dm.Point4d(3.0 * p.X, 2.0 * p.Y, p.Z, p.W)
+    outline = rhino_outline(tmp_path / "a.3dm", curve)
+    x, y = np.array(outline.at(outline.dense))[:, :2].T
+    assert np.ptp(x) == pytest.approx(6.0, rel=1e-3)
+    np.testing.assert_allclose((x / 3.0) ** 2 + (y / 2.0) ** 2, 1.0, atol=1e-6)
+
+
 def test_curves_of_rhino_stay_exact(tmp_path):
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters

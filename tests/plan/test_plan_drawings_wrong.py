@@ -14,6 +14,7 @@ from pcmc import project
 from pcmc.base.errors import FileError, OptionError, PlanError, SurfaceError
 from pcmc.plan.drawing import read_drawing
 from pcmc.plan.proposal import proposed
+from pcmc.plan.reading_drawings import dxf_entities
 from pcmc.plan.strokes import read_strokes
 
 WRONG = {
@@ -154,6 +155,19 @@ def test_blocks_of_blocks_of_blocks_end(tmp_path):
     with refused(FileError, what=str(file)) as caught:
         read_strokes(file)
     assert "entities" in str(caught.value)
+
+
+@pytest.mark.parametrize(("levels", "found"), [(8, {"LINE"}), (9, set())])
+def test_blocks_in_blocks_are_read_to_a_depth(tmp_path, levels, found):
+    document, space = drawn.new()
+    document.blocks.new("B0").add_line((0, 0), (1, 0))
+    for level in range(1, levels):
+        document.blocks.new(f"B{level}").add_blockref(f"B{level - 1}", (0, 0))
+    space.add_blockref(f"B{levels - 1}", (0, 0), dxfattribs=drawn.on("outline"))
+    document.saveas(tmp_path / "a.dxf")
+    contents = dxf_entities(str(tmp_path / "a.dxf"))
+    assert {entity["kind"] for entity in contents["entities"]} == found
+    assert bool(contents["others"]) == (not found)
 
 
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")

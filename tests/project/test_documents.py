@@ -97,7 +97,7 @@ def test_all_documents_appear_together_or_none(tmp_path, monkeypatch):
         Path(path).write_text("half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pcmc.project.running.write_structure", fail)
+    monkeypatch.setattr("pcmc.project.writing.write_structure", fail)
     with refused(FileError, what=str(tmp_path / "roof.inp")):
         project.run(tmp_path / "roof.toml")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["roof.dxf", "roof.toml"]

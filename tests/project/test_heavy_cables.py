@@ -142,6 +142,19 @@ def test_a_branch_follows_it(sail):
     assert np.abs(again.vertices - reached.vertices).max() < 1e-6
 
 
+def test_targets_find_it(sail):
+    ropes = weights_of(surface_of(load(sail)))
+    heavy = designed(sail, changed=lambda s: s.retensioned(cable_weights=dict.fromkeys(ropes, 0.3)))
+    meet = f"meet = [{{quantity = 'volume', value = {heavy.certificate.volume}}}]"
+    vary = f"vary = [{{patch = {list(ropes)}, kind = 'cable_weight'}}]"
+    sail.write_text(f"{SAIL}[targets]\n{meet}\n{vary}\n", encoding="utf-8")
+    roof = designed(sail, use_cache=False)
+    assert roof.good, roof
+    (found,) = set(weights_of(roof.surface).values())
+    assert found == pytest.approx(0.3, rel=1e-5)
+    assert roof.values_found.endswith(f"weight of {' and '.join(ropes)} {found:.6g} kN/m")
+
+
 def test_the_page_has_a_slider_for_it(sail):
     session = Session(solved_start(surface_of(load(sail))))
     state = session.settle({"cable_weights": {"cable 1": 0.3}})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from pathlib import Path
 
@@ -17,12 +18,13 @@ HOME = Path(__file__).resolve().parents[2]
 # other lists: years and pages of books; what was true at the time; made from the code by a test
 ELSEWHERE = {"docs/bibliography.md", "docs/history.md", "docs/how-to/project-keys.md"}
 MADE = {"docs/gallery.md", "docs/reference/command-line.md"}  # at each build of the site
-PAGES = sorted(
-    {"README.md", *(path.relative_to(HOME).as_posix() for path in HOME.glob("docs/**/*.md"))}
-    - {path.relative_to(HOME).as_posix() for path in HOME.glob("docs/_build/**/*.md")}
-    - ELSEWHERE
-    - MADE
-)
+FOUND = {
+    path.relative_to(HOME).as_posix()
+    for pattern in ("README.md", "docs/**/*.md", "notebooks/*.ipynb")
+    for path in HOME.glob(pattern)
+    if "_build" not in path.parts
+}
+PAGES = sorted(FOUND - ELSEWHERE - MADE)
 SMALL = {"0", "1", "-1"}  # ends of ranges, indices, exit codes
 SENTENCES = defaultdict(list)
 for sentence in stated.sentences():
@@ -30,7 +32,12 @@ for sentence in stated.sentences():
 
 
 def text_of(page):
-    return prose((HOME / page).read_text(encoding="utf-8"))
+    """The prose of a page; of a notebook, its words between the cells that run."""
+    text = (HOME / page).read_text(encoding="utf-8")
+    if page.endswith(".ipynb"):
+        cells = json.loads(text)["cells"]
+        text = "\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    return prose(text)
 
 
 def strange(text, page):

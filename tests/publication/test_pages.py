@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import re
 import shutil
@@ -73,6 +74,46 @@ def test_a_script_draws_its_picture_again(name, tmp_path):
 def test_the_stored_page_of_keys_is_of_today():
     stored = (DOCS / "how-to" / "project-keys.md").read_text(encoding="utf-8")
     assert stored == "# The keys of a project file\n\n" + reference(), "run: sphinx-build docs docs/_build"
+
+
+# of which users call functions; the others are reached by the command or by pcmc itself
+SUBPACKAGES = [
+    "accuracy",
+    "certificate",
+    "compas",
+    "continuation",
+    "design",
+    "diagnostics",
+    "drawings",
+    "existence",
+]
+SUBPACKAGES += [
+    "forces",
+    "io",
+    "margins",
+    "meshing",
+    "panelling",
+    "plan",
+    "report",
+    "solvers",
+    "stability",
+    "surface",
+]
+SUBPACKAGES += ["sweep"]
+
+
+def test_every_public_function_of_the_subpackages_has_an_example():
+    """In its docstring, or in a page that is run."""
+    code = "".join(text for page in PAGES for _, kind, text in parts(HOME / page) if kind == "python")
+    without = [
+        f"{name}.{public}"
+        for name in SUBPACKAGES
+        for public in getattr(importlib.import_module(f"pcmc.{name}"), "__all__", ())
+        if inspect.isfunction(value := getattr(importlib.import_module(f"pcmc.{name}"), public))
+        and ">>>" not in (inspect.getdoc(value) or "")
+        and not re.search(rf"\b{public}\b", code)
+    ]
+    assert without == []
 
 
 def test_every_public_name_has_an_example():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -81,3 +82,23 @@ def test_the_families_of_panels_and_the_theorem_of_the_roof(roof):
     fewer = pcmc.fewer_families(surface, tolerance=0.01, change=0.02)
     assert is_printed(shown("how-to/panels-and-drawings.md"), str(fewer))
     assert is_printed(shown("explanation/certificate.md"), str(pcmc.verify(surface)))
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(not shutil.which("ccx"), reason="ccx is not installed")
+def test_how_far_the_hall_carries_a_drift_and_on_which_meshes():
+    """The shares of the page under load, on four meshes; the table is that of the third."""
+    script = (HOME / "docs" / "pictures" / "under_load.py").read_text(encoding="utf-8")
+    script = script.partition("print(analysis)")[0].replace("from pcmc.plot import under_load\n", "")
+    carried, taut = [], []
+    for edge_length in (0.8, 0.6, 0.4, 0.3):
+        names = {}
+        exec(script.replace("edge_length=0.4", f"edge_length={edge_length}"), names)
+        drift = next(case for case in names["analysis"].cases if case.name == "drift in the valley")
+        carried.append(f"{100 * drift.share:.0f}")
+        taut.append(f"{100 * drift.taut:.0f}")
+        if edge_length == 0.4:
+            assert is_printed(shown("how-to/under-load.md"), str(names["analysis"]))
+    page = " ".join((HOME / "docs" / "how-to" / "under-load.md").read_text(encoding="utf-8").split())
+    assert f"gives way at {', '.join(carried[:3])} and {carried[3]} % with edges of 0.8, 0.6, 0.4" in page
+    assert f"Taut it is up to {', '.join(taut[:3])} and {taut[3]} %" in page

@@ -25,6 +25,12 @@ for (const one of document.querySelectorAll("pre, .pst-scrollable-table-containe
     found.push([one.textContent.trim().slice(0, 60), one.scrollWidth, one.clientWidth]);
   }
 }
+for (const one of document.querySelectorAll("math")) {
+  const right = one.getBoundingClientRect().right;
+  if (right > window.innerWidth && !one.closest(".formula, .pst-scrollable-table-container")) {
+    found.push(["formula " + one.textContent.trim().slice(0, 40), Math.round(right), window.innerWidth]);
+  }
+}
 const without = [...document.images].filter((one) => one.complete && one.naturalWidth === 0);
 return found.concat(without.map((one) => ["no picture " + one.src, 0, 0]));
 """
