@@ -19,6 +19,7 @@ from .questions import (
     margins,
     mesh_check,
     panel_families,
+    programs,
     refinement,
     solvers,
     stability,
@@ -51,6 +52,7 @@ MODULES = (
     surfaces,
     checks,
     structure,
+    programs,
     verify,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}

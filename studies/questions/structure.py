@@ -17,10 +17,11 @@ import numpy as np
 import pandas as pd
 
 from generators import bezier_hall, spherical_cap, two_caps
-from pcmc import Material, Snow, StructuralModel, Surface, certify, project, solve
+from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, analyse, certify, project, solve
 from pcmc.base.arrays import Floats
 from pcmc.certificate.forces import Forces
 from pcmc.certificate.supports import boundary_view, support_table
+from pcmc.plan import Divider, Plan
 from pcmc.structure import StepResults, calculix
 from pcmc.surface.geometry import face_areas
 
@@ -50,6 +51,7 @@ SHAPES: dict[str, tuple[Callable[[float], Surface], tuple[float, float, float]]]
     "L-shaped roof": (roof, (1.4, 0.7, 0.35)),
 }
 MESHES = ("coarse", "middle", "fine")
+DRIFT = (0.8, 0.6, 0.4, 0.3)  # edge lengths of the hall under a drift of snow
 
 
 def data(folder: Folder, short: bool) -> None:
@@ -73,6 +75,19 @@ def data(folder: Folder, short: bool) -> None:
     folder.write_table("records", rounded(records))
     folder.write_table("patches", rounded(patches))
     folder.write_table("supports", rounded(supports))
+    folder.write_table("drift", rounded([overloaded(edge) for edge in DRIFT[: 1 if short else None]]))
+
+
+def overloaded(edge: float) -> Row:
+    """A hall of two bays under a drift of snow in its valley: the share carried, and that without slack."""
+    patches = {name: {"tension": 1.5, "pressure": 0.3} for name in ("west", "east")}
+    wall = Divider([[6, 0], [6, 8]], wall=0.6)
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [wall], edge_length=edge, patches=patches)
+    drift = Snow(0.5, area=[[4, 0], [8, 0], [8, 8], [4, 8]])
+    cloth = Material(young=5e5, poisson=0.3, density=1.2)
+    model = StructuralModel(solve(plan.surface()).surface, cloth, 0.001, [SelfWeight(), drift])
+    snow = analyse(model, remedy=False)["snow"]
+    return {"edge_length": edge, "share": snow.share, "taut": snow.taut}
 
 
 def structural_model(surface: Surface) -> StructuralModel:

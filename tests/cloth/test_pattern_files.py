@@ -4,7 +4,7 @@ import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
-from shapely import Polygon
+from shapely import Point, Polygon
 
 from generators import joined_caps
 from pcmc import cutting_pattern, project, solve
@@ -43,6 +43,8 @@ def test_allowances_surround_the_net_strip(pattern):
         inner = Polygon(net.points)
         assert inner.area == pytest.approx(strip.cut_area)
         assert outer.contains(inner)
+        ends = [line.points[1] for line in lines if line.layer == "PCMC-NOTCH"]
+        assert not any(inner.contains(Point(end)) for end in ends)  # outward
         hem = outer.boundary.distance(inner)
         assert hem == pytest.approx(0.05, abs=1e-6)
         added = sum(
@@ -77,6 +79,8 @@ def test_notches_of_both_sides_lie_on_each_other(pattern):
                     found.append(before[k] + t[k] * lengths[k])
             places.append(sorted(found))
         assert len(places[0]) == len(places[1]) == int(seam.length)
+        even = np.arange(1, len(places[0]) + 1) / (len(places[0]) + 1)
+        assert np.array(places[0]) / lengths.sum() == pytest.approx(even, abs=0.02)
         assert places[0] == pytest.approx(places[1], rel=1e-4)
 
 

@@ -1,6 +1,7 @@
 """CalculiX runs our structural models: what it finds under the form-finding load is what pcmc says."""
 
 from functools import cache, partial
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from pcmc.structure import calculix
 from pcmc.structure.calculix import CalculixError
 from pcmc.surface.geometry import face_areas
 from studies.questions import structure
+from studies.reference import kratos
 from tests.surface.test_circles import roofs
 from tests.surface.test_lines import squares
 
@@ -176,6 +178,17 @@ def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch,
     with refused(CalculixError) as caught:
         structure.data(None, True)
     assert "\n" not in str(caught.value)
+
+
+def test_without_kratos_the_comparison_says_what_to_install(monkeypatch):
+    monkeypatch.delenv(kratos.PYTHON, raising=False)
+    if find_spec("KratosMultiphysics") is None:
+        with pytest.raises(kratos.KratosError, match="install Kratos") as caught:
+            kratos.run(model_of(pyramid()))
+        assert "\n" not in str(caught.value)
+    cable = model_of(square(2, cable=1.0), cable_area=1e-4, anyway=True)
+    with pytest.raises(kratos.KratosError, match="one material"):
+        kratos.run(cable)
 
 
 def test_shells_carry_the_same_load_and_bend_less():
