@@ -22,6 +22,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    # each worker has a processor: a second thread of BLAS would only wait, and twice as much time is spent
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if config.getoption("--superlu"):
         sys.modules["pypardiso"] = None  # found by no import
 

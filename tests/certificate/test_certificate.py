@@ -3,6 +3,7 @@
 from unittest import mock
 
 import numpy as np
+import pandas as pd
 import pytest
 from shapes import pyramid, shaken, three_patches
 from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap, two_squares
@@ -11,6 +12,7 @@ from generators import spherical_cap_exact
 from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
 from pcmc.certificate import Verdict
 from pcmc.certificate.forces import Forces, sheet_pulls
+from pcmc.certificate.tables import lean_texts
 from pcmc.forces.functional import patch_areas, volume
 from pcmc.forces.pinching import standing_part
 from pcmc.meshing.quality import triangle_quality
@@ -51,6 +53,13 @@ def test_a_wall_that_is_pinched_all_along_has_no_bad_triangle():
     found = solve(two_squares(4, alpha=2.0, alpha_aux=6.0), target="stationary").certificate
     (quality,) = found.patches.quality[found.patches.patch == "wall"]
     assert (found.verdict, quality) == (Verdict.STABLE, 1.0)
+
+
+def test_walls_that_lean_are_told_the_worst_first():
+    rows = [["a", 3.0, 0, 0, 1], ["b", 0.04, 0, 0, 1], ["c", 7.25, 1.5, 0, 2]]
+    table = pd.DataFrame(rows, columns=["wall", "lean", *"xyz"])
+    assert lean_texts(table) == ["'c' by 7.2° near [1.5, 0, 2]", "'a' by 3.0° near [0, 0, 1]"]
+    assert lean_texts(table.iloc[:0]) == []
 
 
 def test_the_rows_of_the_patches(squares):
