@@ -108,7 +108,7 @@ def panels_(
         if picture is not None:
             works.append((picture, partial(projects.paint_families, schedule=schedule, view=seen)))
         written = projects.write_all(works, progress)
-    print(schedule)
+    print(schedule.text(roof.units))
     if change is not None:
         print(f"\n{fewer}")
     if written:

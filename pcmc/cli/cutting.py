@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from .. import project as projects
 from ..base import validate
-from ..cloth import Pattern
+from ..cloth import CuttingOptions
 from ..cloth.sheets import pattern_files
 from . import NOT_CERTIFIED, OK, arguments
 from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, count, option, real
@@ -42,7 +42,7 @@ class Cutting:
     hem: Annotated[float | None, real("LENGTH", HEM)] = None
     notches: Annotated[float | None, real("LENGTH", NOTCHES)] = None
 
-    def of(self, own: Pattern | None) -> Pattern:
+    def of(self, own: CuttingOptions | None) -> CuttingOptions:
         """The pattern of a project with these values."""
         values: dict[str, Any] = {} if own is None else dict(vars(own))
         given = {name: value for name, value in vars(self).items() if value not in (None, [])}
@@ -60,7 +60,7 @@ class Cutting:
                 if len(line) % 2 or len(line) < 4:
                     validate.refuse("--seam", ",".join(map(str, line)), "points X,Y,X,Y and so on")
             given["seams"] = [[line[k : k + 2] for k in range(0, len(line), 2)] for line in lines]
-        return Pattern(**(values | given))
+        return CuttingOptions(**(values | given))
 
 
 def _numbers(text: str, flag: str) -> list[float]:
@@ -109,7 +109,7 @@ def pattern(
         if picture is not None:
             jobs.append((picture, partial(projects.paint_strain, pattern=cloth, view=seen)))
         written = projects.write_all(jobs, progress)
-    print(cloth)
+    print(cloth.text(roof.units))
     if written:
         print(f"written: {', '.join(map(str, written))}")
     return OK if roof.good else NOT_CERTIFIED

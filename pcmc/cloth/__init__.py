@@ -4,18 +4,18 @@ Gives ``cutting_pattern`` and its values to pictures, projects and the command. 
 the subpackages below it.
 """
 
-from .pattern import cutting_pattern, pattern_of
-from .settings import Pattern
+from .pattern import cutting_pattern, cutting_pattern_of
+from .settings import CuttingOptions
 from .sheets import pattern_drawings
 from .strips import CuttingPattern, Seam, Side, Strip
 
 __all__ = [
     "CuttingPattern",
-    "Pattern",
+    "CuttingOptions",
     "Seam",
     "Side",
     "Strip",
     "cutting_pattern",
     "pattern_drawings",
-    "pattern_of",
+    "cutting_pattern_of",
 ]

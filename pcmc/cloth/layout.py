@@ -21,7 +21,7 @@ NARROWER = 0.98  # of the width square to x or y: another direction must do bett
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class ClothSheet:
     """A sheet between curves and cables, cut into strips at equal steps of their width."""
 
     number: int
@@ -87,7 +87,7 @@ def level_ends(mesh: CutMesh, faces: Bools, height: Floats, level: float) -> Ite
             yield ends[0], ends[1]
 
 
-def with_levels(mesh: CutMesh, sheets: Sequence[Sheet], sheet_of_source: Ints) -> CutMesh:
+def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: Ints) -> CutMesh:
     """The mesh cut along geodesics between the ends of each sheet's levels; ends of several sheets meet."""
     number = int(mesh.seam.max(initial=-1)) + 1
     ends: list[tuple[int, int]] = []  # the sheet and the vertex of each

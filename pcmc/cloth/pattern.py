@@ -17,8 +17,8 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from .cut_mesh import CutMesh, cut_mesh
 from .flattening import FOLDED, Flat
-from .layout import Sheet, sheet_axes, with_levels, with_lines
-from .settings import Pattern
+from .layout import ClothSheet, sheet_axes, with_levels, with_lines
+from .settings import CuttingOptions
 from .sewing import Cloth, loops, seams_of
 from .strips import CuttingPattern, Strip
 
@@ -49,7 +49,7 @@ def cutting_pattern(
     width : of the cloth: no strip is wider, with its allowances.
     anyway : cut a surface that is not certified.
     certificate : of the surface, where it is known; by default it is computed.
-    options : of ``pcmc.cloth.Pattern``: ``strips``, ``seams``, ``direction``, ``compensation``,
+    options : of ``pcmc.cloth.CuttingOptions``: ``strips``, ``seams``, ``direction``, ``compensation``,
         ``stiffness``, ``poisson``, ``allowance``, ``hem``, ``notches``.
 
     Raises
@@ -67,11 +67,11 @@ def cutting_pattern(
     >>> len(pattern.strips), bool(pattern.largest_difference < 1e-6)
     (2, True)
     """
-    return pattern_of(surface, Pattern(width=width, **options), anyway, certificate)
+    return cutting_pattern_of(surface, CuttingOptions(width=width, **options), anyway, certificate)
 
 
-def pattern_of(
-    surface: Surface, options: Pattern, anyway: bool = False, certificate: Certificate | None = None
+def cutting_pattern_of(
+    surface: Surface, options: CuttingOptions, anyway: bool = False, certificate: Certificate | None = None
 ) -> CuttingPattern:
     """The cutting pattern that ``options`` ask for; the rest as of ``cutting_pattern``."""
     expect_surface(surface)
@@ -95,7 +95,7 @@ def pattern_of(
     return _pattern(surface, certificate, options, cloth, flat)
 
 
-def _narrowest(surface: Surface, options: Pattern) -> float:
+def _narrowest(surface: Surface, options: CuttingOptions) -> float:
     """About the width of the narrowest strips, length."""
     area = np.bincount(
         surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
@@ -110,14 +110,14 @@ def _narrowest(surface: Surface, options: Pattern) -> float:
     return min(widths, default=np.inf)
 
 
-def _sheets(surface: Surface, base: CutMesh, options: Pattern) -> tuple[list[Sheet], Ints]:
+def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> tuple[list[ClothSheet], Ints]:
     """The sheets without drawn seams, at even levels; the sheet of each face of the surface, or -1."""
     pieces, topo = base.pieces, base.topology
     drawn = np.zeros(len(topo.edges), dtype=bool)
     drawn[topo.edge_numbers(base.cuts[base.seam >= 0])] = True
     with_seams = set(pieces.piece[drawn[topo.edge_of_face].any(axis=1)].tolist())
     sheet_of_source = np.full(surface.m, -1)
-    sheets: list[Sheet] = []
+    sheets: list[ClothSheet] = []
     for piece in range(pieces.piece.max() + 1):
         mine = pieces.piece == piece
         name = surface.patches[surface.patch_of_face[base.source[mine][0]]].name
@@ -129,7 +129,9 @@ def _sheets(surface: Surface, base: CutMesh, options: Pattern) -> tuple[list[She
         low, high = (P @ across).min(), (P @ across).max()
         number = count if net is None else int(np.ceil((high - low) / net - 1e-9))
         sheet_of_source[base.source[mine]] = len(sheets)
-        sheets.append(Sheet(len(sheets), name, along, across, np.linspace(low, high, max(number, 1) + 1)))
+        sheets.append(
+            ClothSheet(len(sheets), name, along, across, np.linspace(low, high, max(number, 1) + 1))
+        )
     return sheets, sheet_of_source
 
 
@@ -144,8 +146,8 @@ def _refuse_closed(surface: Surface, mesh: CutMesh) -> None:
 
 
 def _moved_levels(
-    cloth: Cloth, flat: Flat, sheets: Sequence[Sheet], options: Pattern, number: int
-) -> list[Sheet] | None:
+    cloth: Cloth, flat: Flat, sheets: Sequence[ClothSheet], options: CuttingOptions, number: int
+) -> list[ClothSheet] | None:
     """Sheets with levels between which strips are equally wide, more of them where they were too wide.
 
     None where all fit: then the levels may stay as they are. OptionError for a strip that will not fit.
@@ -188,7 +190,7 @@ def _moved_levels(
 
 
 def _pattern(
-    surface: Surface, certificate: Certificate, options: Pattern, cloth: Cloth, flat: Flat
+    surface: Surface, certificate: Certificate, options: CuttingOptions, cloth: Cloth, flat: Flat
 ) -> CuttingPattern:
     """The strips and seams of a cloth laid flat."""
     mesh, sides = cloth.mesh, cloth.sides

@@ -17,7 +17,7 @@ LARGEST_COMPENSATION = 20.0  # percent
 
 
 @dataclass(frozen=True)
-class Pattern:
+class CuttingOptions:
     """How the cloth of a roof is cut.
 
     Attributes
@@ -131,9 +131,10 @@ class Pattern:
         With the stiffnesses S and T of warp and weft, the strains of the cloth are α (1 - ν) / S and
         α (1 / T - ν / S), as the contraction of the one is that of the other times T / S.
 
-        >>> [round(part, 6) for part in Pattern(width=2.0, stiffness=(500, 250), poisson=0.2).stretch(4.0)]
+        >>> cloth = CuttingOptions(width=2.0, stiffness=(500, 250), poisson=0.2)
+        >>> [round(part, 6) for part in cloth.stretch(4.0)]
         [0.993641, 0.985804]
-        >>> Pattern(width=2.0, compensation=(0.5, 2.0)).stretch(4.0)
+        >>> CuttingOptions(width=2.0, compensation=(0.5, 2.0)).stretch(4.0)
         (0.995, 0.98)
         """
         if self.stiffness is not None:

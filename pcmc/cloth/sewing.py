@@ -15,14 +15,14 @@ from ..surface import Surface
 from ..surface.geometry import face_areas
 from .cut_mesh import CutMesh
 from .flattening import Flat, SewnEdges, flattened
-from .layout import Sheet
+from .layout import ClothSheet
 from .strips import Seam, Side
 
 KINDS = ("seam", "junction", "rim")  # in the order of their numbers
 
 
-class Sides(NamedTuple):
-    """Sides of triangles along cuts, sorted by edge."""
+class StripSides(NamedTuple):
+    """StripSides of triangles along cuts, sorted by edge."""
 
     edge: Ints  # (b,) of the mesh
     ends: Ints  # (b,2) vertices of pieces, first the lower one in the mesh
@@ -41,7 +41,9 @@ class Cloth:
     along: Sequence[Floats | None]  # (k) the direction (3,) of each strip's warp, None for its longer side
 
     @classmethod
-    def of(cls, surface: Surface, mesh: CutMesh, sheets: Sequence[Sheet], sheet_of_source: Ints) -> Cloth:
+    def of(
+        cls, surface: Surface, mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: Ints
+    ) -> Cloth:
         """Strips in the order of their patches, then of their places across the sheet."""
         piece = mesh.pieces.piece
         count = int(piece.max()) + 1
@@ -80,7 +82,7 @@ class Cloth:
         return np.bincount(self.strip_of_face, area * pulls) / np.bincount(self.strip_of_face, area)
 
     @cached_property
-    def sides(self) -> Sides:
+    def sides(self) -> StripSides:
         """The sides of triangles along cuts and rims."""
         edge = self.mesh.topology.edge_of_face.ravel()
         chosen = np.flatnonzero(self.mesh.cut_edge[edge])
@@ -90,7 +92,7 @@ class Cloth:
         forward = corner[start] < corner[end]
         low, high = np.where(forward, start, end), np.where(forward, end, start)
         ends = np.stack([own[low], own[high]], axis=1)
-        return Sides(edge[chosen], ends, forward, self.strip_of_face[chosen // 3])
+        return StripSides(edge[chosen], ends, forward, self.strip_of_face[chosen // 3])
 
     @cached_array
     def seam_of_edge(self) -> Ints:
@@ -143,7 +145,7 @@ def _turned(points: Floats, axis: Floats) -> Floats:
     return points @ np.array([[c, -s], [s, c]])
 
 
-def loops(local: Ints, sides: Sides, mine: Bools) -> list[Ints]:
+def loops(local: Ints, sides: StripSides, mine: Bools) -> list[Ints]:
     """The outlines of a strip: vertices in the order of its triangles, the longest first."""
     ends = local[np.where(sides.forward[mine, None], sides.ends[mine], sides.ends[mine, ::-1])]
     after = dict(ends.tolist())

@@ -30,7 +30,7 @@ LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips 
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
 
-class Label(NamedTuple):
+class StripLabel(NamedTuple):
     """A text beside an edge of a strip."""
 
     at: Floats  # (2,)
@@ -142,7 +142,7 @@ def _inside(strip: Strip) -> Floats:
     return np.array(polygon.representative_point().coords[0])
 
 
-def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine], list[Label]]:
+def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine], list[StripLabel]]:
     """What is drawn of a strip in its own coordinates, in the unit of the surface: the line to cut along, the
     seam lines, notches and the arrow of the warp; and the labels of its sides: seam and neighbour."""
     shapely = load_library("shapely", "cloth")
@@ -169,7 +169,7 @@ def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine],
                 marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
             at, inward = _along(seam, side, strip, 0.5 * seam.length)
             others = "+".join(str(s.strip) for s in seam.sides if s is not side)
-            labels.append(Label(at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
+            labels.append(StripLabel(at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
     shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []
     cut = [SheetLine(np.array(ring.coords[:-1]), "PCMC-CUT", True) for ring in shapes]
     return [*cut, *net, *marks, *_arrow(strip)], labels

@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints, cached_array
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..surface import Surface
 from ..surface.geometry import cross_2d, face_areas, segment_lengths
-from .settings import Pattern
+from .settings import CuttingOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +121,7 @@ class CuttingPattern:
 
     surface: Surface
     certificate: Certificate
-    options: Pattern
+    options: CuttingOptions
     strips: Sequence[Strip]
     seams: Sequence[Seam] = field(repr=False)
 
@@ -181,6 +182,10 @@ class CuttingPattern:
         return np.divide(total, area, out=np.full(len(area), np.nan), where=area > 0.0)
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """Totals and the table of strips, with the units of the numbers if they are given."""
         table, seams = self.table, self.seam_table
         sewn = seams[seams["kind"] != "rim"]
         rows = [
@@ -196,6 +201,8 @@ class CuttingPattern:
                 f"{self.largest_difference:.1g} of the length",
             ),
         ]
+        if units:
+            rows.insert(0, ("units", units.sentence))
         if not self.certificate.certified:
             rows.insert(0, ("not certified", self.certificate.verdict.value))
         head = "\n".join(f"{name:>13}  {text}" for name, text in rows)

@@ -13,6 +13,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..solvers.result import Result
 from ..surface import Surface
+from ..surface.pieces import two_digits
 
 
 class DesignStatus(Enum):
@@ -113,7 +114,7 @@ class Design:
                 reached = f"nearest reachable {limit:.6g}{unit}"
             if wanted and not math.isnan(limit):
                 away = 100.0 * (limit - wanted) / abs(wanted)
-                reached += f", {abs(away):.2g} % {'more' if away > 0.0 else 'less'}"
+                reached += f", {two_digits(abs(away)):g} % {'more' if away > 0.0 else 'less'}"
             text += f"; {label}: wanted {wanted:.6g}{unit}, {reached}"
         if len(missed):
             text += f" ({values_text(self.parameters, units)})"

@@ -10,6 +10,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
@@ -97,6 +98,10 @@ class Panels:
         return family
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """Totals and the largest families, with the units of the numbers if they are given."""
         total = self.edge_totals
         lengths = ", ".join(f"{r.kind} {r.length:.6g} ({r['count']})" for _, r in total.iterrows())
         angles = self.edges["dihedral"].dropna()
@@ -110,6 +115,8 @@ class Panels:
         ]
         if len(angles):
             rows.append(("angles", f"{angles.min():.1f} to {angles.max():.1f} degrees between neighbours"))
+        if units:
+            rows.insert(0, ("units", units.sentence))
         if not self.certificate.certified:
             rows.insert(0, ("not certified", self.certificate.verdict.value))
         head = "\n".join(f"{name:>14}  {text}" for name, text in rows)

@@ -203,7 +203,10 @@ class _Reader:
             one, two = (ends[k] for k in sorted((place, int(nearest[place]))))
             gap = float(apart[place])
             between = f"between {one[0]} at {point_text(one[1])} and {two[0]} at {point_text(two[1])}"
-            allow = f"draw what is missing, or close it with gap = {two_digits(gap, math.ceil):g}"
+            enough = two_digits(gap, math.ceil)
+            allow = (
+                f"draw what is missing, or close it: gap = {enough:g} in [plan], pcmc plan --gap {enough:g}"
+            )
             text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
             raise PlanError(text, what=where, where=(_plain(one[1]), _plain(two[1])), found=gap)
         return paths

@@ -18,7 +18,7 @@ from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
-from ..cloth.settings import Pattern
+from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..structure.section import Structure
@@ -59,7 +59,7 @@ class Project:
     vary: Sequence[Parameter] = ()
     target_tolerance: float | None = None  # ``tolerance`` of ``pcmc.meet``; None for the default
     structure: Structure | None = None
-    pattern: Pattern | None = None
+    pattern: CuttingOptions | None = None
     output: Output = field(default_factory=Output)
     folder: Path | None = None  # made for the output if it is missing; None if the names include theirs
     drawing: Drawing | None = None  # that the plan refers to, or that ``path`` is
@@ -203,7 +203,7 @@ def project_of(
         values = _solving(data.get("solve", {}))
         output, units = _output(data.get("output", {})), Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
-        pattern = section_of(Pattern, "pattern", data["pattern"]) if "pattern" in data else None
+        pattern = section_of(CuttingOptions, "pattern", data["pattern"]) if "pattern" in data else None
         output.check(units, structure, pattern)
         values |= {"output": output, "units": units, "drawing": drawing}
         values |= {"structure": structure, "pattern": pattern}

@@ -13,7 +13,7 @@ from typing import Any
 from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
-from ..cloth.settings import Pattern
+from ..cloth.settings import CuttingOptions
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
@@ -217,7 +217,7 @@ def main_sections() -> tuple[Section, ...]:
         Section("structure", help_of["structure"], _of_class(Structure)),
         Section("structure.patches.NAME", help_of["material"], _of_class(PatchMaterial)),
         Section("structure.zones", help_of["zone"], _of_class(Zone)),
-        Section("pattern", help_of["pattern"], _of_class(Pattern)),
+        Section("pattern", help_of["pattern"], _of_class(CuttingOptions)),
         Section("output", help_of["output"], _of_class(Output)),
     )
 

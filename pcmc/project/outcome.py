@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..certificate.quantities import Figure
     from ..certificate.theorem import Theorem
-    from ..cloth import CuttingPattern, Pattern
+    from ..cloth import CuttingOptions, CuttingPattern
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
@@ -271,12 +271,12 @@ class Outcome:
         """The structural model of what is shown."""
         return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
 
-    def cutting_pattern(self, wanted: Pattern, anyway: bool = False) -> CuttingPattern:
+    def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
         """The cutting pattern of what is shown."""
-        from ..cloth import pattern_of
+        from ..cloth import cutting_pattern_of
 
         surface, certificate = self.shown
-        return pattern_of(surface, wanted, anyway, certificate)
+        return cutting_pattern_of(surface, wanted, anyway, certificate)
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:
         """What is shown under load, found once by CalculiX; None where the project does not run it."""

@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.files import PathLike, suffix_of
 from ..base.units import LENGTHS, Units, expect_length
-from ..cloth.settings import Pattern
+from ..cloth.settings import CuttingOptions
 from ..cloth.sheets import SUFFIXES as PATTERNS
 from ..cloth.sheets import table_paths
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
@@ -227,7 +227,7 @@ class Output:
         lists: dict[str, Any] = {name: [folder / path for path in getattr(self, name)] for name in LISTS}
         return replace(self, **lists, **single)
 
-    def check(self, units: Units, structure: Structure | None, pattern: Pattern | None) -> None:
+    def check(self, units: Units, structure: Structure | None, pattern: CuttingOptions | None) -> None:
         """Refuse documents that need a unit of length or a section which the project does not have."""
         if self.drawings:
             expect_length(units.length, "a drawing")

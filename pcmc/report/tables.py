@@ -101,9 +101,9 @@ def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
     pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]
-    columns = columns_of(table, ["tension"], units.tension) | columns_of(table, pressures, units.pressure)
-    columns |= columns_of(table, ["area"], units.area)
-    columns |= columns_of(table, ["mean curvature"], f"1/{units.length}")
+    columns = columns_in(table, ["tension"], units.tension) | columns_in(table, pressures, units.pressure)
+    columns |= columns_in(table, ["area"], units.area)
+    columns |= columns_in(table, ["mean curvature"], f"1/{units.length}")
     columns["its largest error"] = map(small, table["variational_max"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
@@ -117,18 +117,18 @@ def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     table, force = certificate.junctions, units.force or "force"
     if len(table):
         words: Columns = {"": [f"J{k + 1}" for k in range(len(table))], "between": table["junction"]}
-        columns = columns_of(table, ["length", *MIDDLE], units.length)
+        columns = columns_in(table, ["length", *MIDDLE], units.length)
         columns[f"force left, {units.tension}"] = map(small, table["force_left"])
         yield text_table("Junctions", words, columns)
     table = certificate.leaning
     if len(table):
         leans: Columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
-        columns = leans | columns_of(table, "xyz", units.length)
+        columns = leans | columns_in(table, "xyz", units.length)
         yield text_table("Walls: the largest angle from the vertical", {"wall": table["wall"]}, columns)
     table = certificate.supports
     if len(table):
         own = table["name"].where(table["name"] != table["support"], "")
-        columns = columns_of(table, "xyz", units.length)
+        columns = columns_in(table, "xyz", units.length)
         columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
         columns |= vectors_of(table, "force", "R", force)
         columns[f"largest, {units.tension}"] = column(table["per_length_max"])
@@ -146,8 +146,8 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     if len(table):
         columns: Columns = {f"force, {force}": column(table["tension"])}
         if "weight" in table:
-            columns |= columns_of(table, ["weight"], units.tension)
-        columns |= columns_of(table, ["length", *MIDDLE], units.length)
+            columns |= columns_in(table, ["weight"], units.tension)
+        columns |= columns_in(table, ["length", *MIDDLE], units.length)
         yield text_table("Cables", {"cable": table["cable"]}, columns)
     table = certificate.cable_ends
     if len(table):
@@ -155,12 +155,12 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
             "cable": table["cable"],
             "end": ["held" if held else "free" for held in table["held"]],
         }
-        columns = columns_of(table, "xyz", units.length) | vectors_of(table, "force", "F", force)
+        columns = columns_in(table, "xyz", units.length) | vectors_of(table, "force", "F", force)
         yield text_table("Ends of cables, and the forces on them", words, columns)
     table = certificate.rooms
     if len(table):
-        columns = columns_of(table, ["volume", "prescribed"], units.volume)
-        columns |= columns_of(table, ["pressure"], units.pressure)
+        columns = columns_in(table, ["volume", "prescribed"], units.volume)
+        columns |= columns_in(table, ["pressure"], units.pressure)
         yield text_table("Rooms of prescribed volume", {"room": table["room"]}, columns)
 
 
@@ -192,7 +192,7 @@ def family_table(schedule: Panels, units: Units) -> Table:
     """The first families of panels, the largest first."""
     table = schedule.families.head(MOST_FAMILIES)
     columns: Columns = {"panels": table["count"], "turned over": table["mirrored"]}
-    columns |= columns_of(table, "abc", units.length) | columns_of(table, ["area"], units.area)
+    columns |= columns_in(table, "abc", units.length) | columns_in(table, ["area"], units.area)
     return text_table("", {"family": [f"F{k}" for k in table["family"]]}, columns)
 
 
@@ -209,7 +209,7 @@ def vectors_of(table: pd.DataFrame, kind: str, letter: str, unit: str) -> Column
     return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
-def columns_of(table: pd.DataFrame, keys: Iterable[str], unit: str) -> Columns:
+def columns_in(table: pd.DataFrame, keys: Iterable[str], unit: str) -> Columns:
     return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key in keys}
 
 

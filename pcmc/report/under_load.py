@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..base.units import Units
 from ..plot import under_load
 from ..plot.figure import png
-from .tables import Block, Columns, Heading, Picture, column, columns_of, text_table, vectors_of
+from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
 
 if TYPE_CHECKING:
     from ..structure import Analysis
@@ -30,18 +30,18 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield ABOUT
     table = analysis.table
     columns: Columns = {f"{key}, %": [f"{100.0 * v:.0f}" for v in table[key]] for key in ("share", "taut")}
-    columns |= columns_of(table, ["down", "up", "moved"], units.length)
-    columns |= columns_of(table, ["least_force", "largest_force"], units.tension)
-    columns |= columns_of(table, ["slack_area"], units.area)
+    columns |= columns_in(table, ["down", "up", "moved"], units.length)
+    columns |= columns_in(table, ["least_force", "largest_force"], units.tension)
+    columns |= columns_in(table, ["slack_area"], units.area)
     if "pressure" in table:
-        columns |= columns_of(table, ["pressure"], units.pressure)
+        columns |= columns_in(table, ["pressure"], units.pressure)
     yield text_table("Cases and combinations", {"case": table["case"]}, columns)
     yield from (f"{line[:1].upper()}{line[1:]}." for line in analysis.answers(units))
     for what in ("deflection", "least force"):
         yield Picture("", png(under_load(analysis, what=what, units=units, width=PIXELS)))
     table = analysis.patches
-    columns = columns_of(table, ["least_force", "mean_force", "largest_force"], units.tension)
-    columns |= columns_of(table, ["slack_area"], units.area)
+    columns = columns_in(table, ["least_force", "mean_force", "largest_force"], units.tension)
+    columns |= columns_in(table, ["slack_area"], units.area)
     yield text_table("Membrane forces by patch", {"case": table["case"], "patch": table["patch"]}, columns)
     table = analysis.supports
     columns = {f"length, {units.length}": column(table["length"].where(table["length"] > 0.0))}
@@ -50,5 +50,5 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield text_table("Forces of the supports on the roof", words, columns)
     table = analysis.cables
     if len(table):
-        columns = columns_of(table, ["least", "largest"], force)
+        columns = columns_in(table, ["least", "largest"], force)
         yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)

@@ -222,7 +222,9 @@ class Analysis:
         table = table.rename(columns={"slack_area": "slack area"})
         for name in ("share", "taut"):
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
-        return "\n".join([table.to_string(index=False, float_format=lambda v: f"{v:.4g}"), *self.answers()])
+        units = [self.model.units.sentence] if self.model.units else []
+        numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
+        return "\n".join([*units, numbers, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:

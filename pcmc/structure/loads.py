@@ -95,7 +95,7 @@ class Snow:
         plan[~(np.isin(surface.patch_of_face, carrying) & _in_zone(self, surface))] = 0.0
         if self.slides:
             whole, none = self.slides
-            plan *= np.clip((none - slopes(surface)) / (none - whole), 0.0, 1.0)
+            plan *= np.clip((none - roof_slopes(surface)) / (none - whole), 0.0, 1.0)
         snow = -self.load / 3.0 * vertex_sums(plan[:, None] * normal, surface.faces, surface.n)
         return replace(step, forces=step.forces + snow)
 
@@ -245,7 +245,7 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
     return checked
 
 
-def slopes(surface: Surface) -> Floats:
+def roof_slopes(surface: Surface) -> Floats:
     """(m,) the angle between each face and Π, degrees: 90 if it is upright, above 90 if it overhangs.
 
     The side of a patch that looks away from Π is the one of the larger part of its plan.
@@ -260,7 +260,7 @@ def slopes(surface: Surface) -> Floats:
 def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
     """(m,) the faces whose slope is a load's, and whose middle is in its area."""
     least, most = load.slopes
-    slope = slopes(surface)
+    slope = roof_slopes(surface)
     chosen: Bools = (slope >= least - 1e-9) & (slope <= most + 1e-9)
     if len(load.area):
         x, y = surface.vertices[surface.faces].mean(axis=1)[:, :2].T

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from generators import joined_caps, spherical_cap
 from pcmc import Cable, Patch, Surface, cutting_pattern, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.cloth import Pattern
+from pcmc.cloth import CuttingOptions
 from pcmc.cloth.flattening import SewnEdges, flattened
 from pcmc.plan import Plan
 
@@ -283,6 +283,6 @@ def test_uncertified_and_closed_surfaces_are_refused():
 
 def test_the_stretch_is_what_a_tension_undoes():
     """The cloth pulled back by α (1 - ν) / S in the warp is as long as on the roof."""
-    warp, weft = Pattern(strips=1, stiffness=(200.0, 100.0), poisson=0.25).stretch(4.0)
+    warp, weft = CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson=0.25).stretch(4.0)
     assert warp * (1.0 + 4.0 * 0.75 / 200.0) == pytest.approx(1.0)
     assert weft * (1.0 + 4.0 / 100.0 - 0.25 * 4.0 / 200.0) == pytest.approx(1.0)

@@ -137,6 +137,7 @@ def test_the_command_cuts_a_project(tmp_path, capsys):
     assert main(["pattern", str(path), *options, "-o", str(files[0]), "-o", str(files[1])]) == 0
     text = capsys.readouterr().out
     assert "strips" in text
+    assert "units  lengths in m," in text
     assert "written:" in text
     table = pd.read_csv(files[1])
     assert table["width"].max() <= 1.44

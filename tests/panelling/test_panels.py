@@ -297,7 +297,9 @@ def test_the_command_writes_schedule_surface_and_picture(tmp_path, squares, caps
     pcmc.write(roof, squares)
     options = ["--tolerance", "0.02", "--change", "0.02", "-o", str(table), "-o", str(fewer)]
     assert main(["panels", str(roof), *options, "--picture", str(tmp_path / "s.png")]) == 0
-    assert "families" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "families" in said
+    assert "units" not in said
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"roof.pcmc", "s.csv", "s-families.csv", "s-edges.csv", "fewer.pcmc", "s.png"}
     written = np.loadtxt(table, delimiter=",", skiprows=1, usecols=(5, 6, 7))
