@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from .. import io
 from ..accuracy.adaptive import ACCURACY_OF, TRIANGLES, accuracies
 from ..advice.rises import Rise
@@ -236,11 +238,29 @@ class Output:
         if self.pattern and pattern is None:
             text = "a cutting pattern needs the width of the cloth; add [pattern] with width, strips or seams"
             raise OptionError(text, what="pattern", expected="a table")
+        if self.pattern and pattern is not None and structure is not None:
+            _refuse_another_cloth(pattern, structure)
         if self.report is not None:
             expect_length(units.length, "a report")
         if self.structure is not None and structure is None:
             text = "a structural model needs material and thickness; add [structure] with young and thickness"
             raise OptionError(text, what="structure", expected="a table")
+
+
+def _refuse_another_cloth(pattern: CuttingOptions, structure: Structure) -> None:
+    """Refuse a stiffness of the strips that is not that of the structural model: one roof has one cloth."""
+    young, thickness = structure.young, structure.thickness
+    if pattern.stiffness is None or young is None or not isinstance(thickness, int | float):
+        return
+    model = young * thickness, (structure.weft or young) * thickness, structure.poisson
+    strips = *pattern.stiffness, pattern.poisson
+    if not np.allclose(model, strips, rtol=1e-6, atol=0.0):
+        of_strips, of_model = (" and ".join(f"{x:g}" for x in one[:2]) for one in (strips, model))
+        text = (
+            f"stiffness: [pattern] has {of_strips} with poisson {strips[2]:g}, and young times thickness in"
+        )
+        text += f" [structure] gives {of_model} with poisson {model[2]:g}; make both the same cloth"
+        raise OptionError(text, what="stiffness", found=list(strips[:2]), expected=list(model[:2]))
 
 
 def schedule_paths(path: Path) -> list[Path]:

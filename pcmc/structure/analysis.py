@@ -336,9 +336,12 @@ def _in_parallel(one: Callable[[Step], Case], steps: Sequence[Step], say: OnCase
     """The cases of steps, in order; as many at a time as there are cores."""
     with ThreadPoolExecutor(max_workers=max(1, min(len(steps), os.cpu_count() or 1))) as pool:
         running = [pool.submit(one, step) for step in steps]
-        for k, (step, future) in enumerate(zip(steps, running, strict=True), 1):
-            say(f"{step.name}, case {k} of {len(steps)}")
-            yield future.result()
+        try:
+            for k, (step, future) in enumerate(zip(steps, running, strict=True), 1):
+                say(f"{step.name}, case {k} of {len(steps)}")
+                yield future.result()
+        finally:  # after Ctrl-C or an error no other case begins
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _has_weight(model: StructuralModel) -> bool:

@@ -142,6 +142,10 @@ def test_the_command_cuts_a_project(tmp_path, capsys):
     table = pd.read_csv(files[1])
     assert table["width"].max() <= 1.44
     assert table["warp"].to_numpy() == pytest.approx(0.5)
+    path.write_text(path.read_text() + "[structure]\nyoung = 6e5\nthickness = 0.001\n")
+    assert main(["pattern", str(path), "--width", "1.5", "-o", str(files[1])]) == 2
+    assert "600 and 400 with poisson 0.3, and young times thickness" in capsys.readouterr().err
+    path.write_text(path.read_text() + "weft = 4e5\nshear = 1e5\n")
     assert main(["pattern", str(path), "--seam", "0,2,4,2", "--seam", "4,2,8,2", "-o", str(files[1])]) == 0
     assert len(pd.read_csv(files[1])) == 4
     assert main(["pattern", str(path), "--seam", "0,2,4", "-o", str(files[1])]) == 2

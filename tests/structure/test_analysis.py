@@ -1,5 +1,6 @@
 """Cases and combinations under CalculiX, against closed forms; what is overloaded is answered."""
 
+import doctest
 import re
 from dataclasses import replace
 from functools import cache
@@ -40,6 +41,14 @@ def test_a_flat_membrane_sinks_as_a_paraboloid():
         off.append(np.sqrt(np.mean((found / (1e-3 / 8.0) - (1.0 - x**2 - y**2)) ** 2)))
     assert np.polyfit(np.log([0.2, 0.1, 0.05]), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.25)
     assert off[-1] < 2e-3
+
+
+@needs_ccx
+def test_the_example_of_analyse_prints_what_it_says():
+    """Doctests leave it out, as they run where the program is missing, too."""
+    example = analyse.__doc__.replace("# doctest: +SKIP", "")
+    test = doctest.DocTestParser().get_doctest(example, dict(vars(analysis)), "analyse", None, 0)
+    assert doctest.DocTestRunner(verbose=False).run(test).failed == 0
 
 
 @cache
