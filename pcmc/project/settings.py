@@ -256,10 +256,8 @@ def _refuse_another_cloth(pattern: CuttingOptions, structure: Structure) -> None
     strips = *pattern.stiffness, pattern.poisson
     if not np.allclose(model, strips, rtol=1e-6, atol=0.0):
         of_strips, of_model = (" and ".join(f"{x:g}" for x in one[:2]) for one in (strips, model))
-        text = (
-            f"stiffness: [pattern] has {of_strips} with poisson {strips[2]:g}, and young times thickness in"
-        )
-        text += f" [structure] gives {of_model} with poisson {model[2]:g}; make both the same cloth"
+        text = f"stiffness: [pattern] has {of_strips} with poisson {strips[2]:g}, and young times thickness"
+        text += f" in [structure] gives {of_model} with poisson {model[2]:g}; make both the same cloth"
         raise OptionError(text, what="stiffness", found=list(strips[:2]), expected=list(model[:2]))
 
 
