@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from .io import read, write
     from .io.repairing import Repaired, repair
     from .margins import Margin, margin
-    from .panelling import FewerFamilies, Panels, fewer_families, panels
+    from .panelling import FewerFamilies, PanelNet, Panels, fewer_families, panel_net, panels
     from .structure import (
         Gas,
         Material,
@@ -75,6 +75,7 @@ __all__ = [
     "Material",
     "MeshCheck",
     "MeshVerdict",
+    "PanelNet",
     "Panels",
     "Parameter",
     "Patch",
@@ -105,8 +106,9 @@ __all__ = [
     "margin",
     "mean_curvature",
     "meet",
-    "panels",
     "mirrored",
+    "panel_net",
+    "panels",
     "read",
     "repair",
     "read_results",
@@ -148,7 +150,7 @@ _NAMES = {
         "write_structure",
     ),
     "margins": ("Margin", "margin"),
-    "panelling": ("FewerFamilies", "Panels", "fewer_families", "panels"),
+    "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
     "certificate.theorem": ("Theorem", "verify"),
 }

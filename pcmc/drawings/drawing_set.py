@@ -22,7 +22,7 @@ from ..certificate.certificate import certified, warning_mark
 from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
 from . import dxf, pdf, views
-from .panel_sheets import flat_panels
+from .panel_sheets import flat_panels, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
 from .sheet import FORMATS, Sheet, SheetLine, add_frames, table_sheets
 
@@ -179,8 +179,9 @@ def drawing_set(
     for title, table in tables.items():
         sheets += table_sheets(title, table, sheet, decimals, forces)
     if schedule is not None and panel_sheets:
-        flat = flat_panels(schedule, millimetres)
-        sheets += panels_at_true_size(schedule, sheet, millimetres)
+        triangles = triangles_at_true_size(schedule, millimetres)
+        flat = flat_panels(triangles)
+        sheets += panels_at_true_size(triangles, sheet)
     part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
     add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]

@@ -6,7 +6,7 @@ With a path every function writes a picture; each returns it as an (h,w,3) array
 from .cloth import strains
 from .curves import convergence, diagram, heatmap, histories, lines
 from .loads import under_load
-from .pictures import draw, families, panel, reactions, vectors
+from .pictures import draw, families, panel, panel_planarity, reactions, vectors
 
 __all__ = [
     "convergence",
@@ -17,6 +17,7 @@ __all__ = [
     "histories",
     "lines",
     "panel",
+    "panel_planarity",
     "reactions",
     "strains",
     "under_load",

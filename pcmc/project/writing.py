@@ -21,7 +21,7 @@ from ..certificate.certificate import Certificate
 from ..cloth import CuttingPattern
 from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
-from ..panelling import Panels
+from ..panelling import PanelNet, Panels
 from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
@@ -169,6 +169,13 @@ def paint_families(path: Path, schedule: Panels, view: Any) -> None:
     from ..plot import families  # needs the extra plot
 
     families(schedule, path, view=view)
+
+
+def paint_net(path: Path, net: PanelNet, view: Any) -> None:
+    """Draw quads or hexagons, coloured by planarity."""
+    from ..plot import panel_planarity  # needs the extra plot
+
+    panel_planarity(net, path, view=view)
 
 
 def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
