@@ -195,7 +195,7 @@ class _Search:
     def first(self) -> None:
         """The surface given, solved if necessary, and the minimum from a low start."""
         surface = self.surface
-        certificate = certify(surface, modes=MODES)
+        certificate = certify(surface, modes=min(MODES, surface.n))
         if certificate.index is not None and certificate.residual <= AT_REST:
             self.add(surface, "given", certificate)
         else:

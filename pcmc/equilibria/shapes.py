@@ -79,8 +79,9 @@ def shape_distance(one: Surface, other: Surface) -> float:
 
     >>> from pcmc import Patch
     >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    >>> one = Surface(square, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("film", 1.0)])
-    >>> shape_distance(one, Surface(square, [[0, 1, 3], [1, 2, 3]], [0, 0], [Patch("film", 1.0)]))
+    >>> one, other = (Surface(square, faces, [0, 0], [Patch("film", 1.0)], fixed=[0])
+    ...               for faces in ([[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]))
+    >>> shape_distance(one, other)
     0.0
     >>> round(shape_distance(one, one.moved(one.vertices + [0.0, 0.0, 0.5])), 12)
     0.5
