@@ -32,6 +32,7 @@ COMMANDS = [
     "structure",
     "panels",
     "draw",
+    "equilibria",
     "sweep",
     "explore",
     "cache",
