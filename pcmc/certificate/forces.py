@@ -23,7 +23,8 @@ from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import add_values
 from ..forces.pinching import standing_part
-from ..forces.triangles import add_weights, energy_mesh, measure
+from ..forces.mesh import energy_mesh
+from ..forces.triangles import add_weights, measure
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums

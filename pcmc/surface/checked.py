@@ -11,6 +11,7 @@ from ..base.errors import SurfaceError
 from . import checks
 from .guides import Plane
 from .held_curve import checked_curves
+from .lagrange import checked_order
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes
 from .topology import topology
@@ -52,6 +53,7 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     checks.mesh(X, F, patch, topo, patches, bound, plane.height(X))
     check_on([(plane, resolved["on_plane"]), *planes], X, size)
     return {
+        "order": checked_order(given["order"], F, patch),
         "vertices": X,
         "faces": F,
         "patch_of_face": patch,

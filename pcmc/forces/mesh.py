@@ -1,0 +1,44 @@
+"""The elements that areas and volumes are summed over, with the weights of their energy."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints, read_only
+from ..surface import Surface
+from ..surface.lagrange import Shapes, shapes
+
+
+class Mesh(NamedTuple):
+    """Elements with the weights of their energy, as one argument of compiled loops; positions are another."""
+
+    faces: Ints  # (e,k) nodes: of flat triangles the corners
+    patch: Ints  # (e,) of each element
+    origin: Floats  # (3,) the reference point of volumes
+    tension: Floats  # (k,) α of each patch; p and w below
+    pressure: Floats
+    weight: Floats
+    ground: Floats  # (3,) a point of Π, and its normal: weights act along it
+    normal: Floats
+    shapes: Shapes  # of curved elements
+
+    @property
+    def curved(self) -> bool:
+        """Whether the elements are no flat triangles."""
+        return self.faces.shape[1] > 3
+
+    def without(self, *weights: str) -> Mesh:
+        """With zeros for some of ``tension``, ``pressure`` and ``weight``."""
+        return self._replace(**{name: read_only(np.zeros_like(self.tension)) for name in weights})
+
+
+def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
+    """All elements of a surface, with its own tensions and pressures (k,) or with others."""
+    tension = surface.tensions if tension is None else read_only(tension)
+    pressure = surface.net_pressures if pressure is None else read_only(pressure)
+    plane = np.array(surface.plane.point), np.array(surface.plane.normal)
+    patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
+    weights = tension, pressure, surface.weights
+    return Mesh(surface.nodes, patch, surface.origin, *weights, *plane, shapes(surface.order))
