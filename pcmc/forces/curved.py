@@ -23,7 +23,19 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
-from ..surface.geometry import Vector, accumulate, add, cross, cross_sum, dot, norm, point, scaled, sub, vector
+from ..surface.geometry import (
+    Vector,
+    accumulate,
+    add,
+    cross,
+    cross_sum,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+)
 from ..surface.lagrange import Shapes
 from .mesh import Mesh
 
@@ -80,9 +92,7 @@ def measure_elements(
             pull = scaled((alpha + w * z) / J if J > 0.0 else 0.0, g)
             turning, along = sub(pull, scaled(third_p, x)), sub(scaled(w * J, n), scaled(third_p, g))
             for i in range(len(nodes)):
-                force = add(
-                    cross(turning, _across(shapes, q, i, u, v)), scaled(shapes.value[q, i], along)
-                )
+                force = add(cross(turning, _across(shapes, q, i, u, v)), scaled(shapes.value[q, i], along))
                 accumulate(gradient, nodes[i], scaled(dA, force))
 
 
@@ -100,8 +110,8 @@ def add_element_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> No
             J = norm(g)
             if J == 0.0:
                 continue
-            nu, z, x, dA = scaled(1.0 / J, g), dot(sub(place, ground), n), sub(place, origin), shapes.weight[q]
-            dJ, T = dot(nu, dg), alpha + w * z
+            nu, x, dA = scaled(1.0 / J, g), sub(place, origin), shapes.weight[q]
+            dJ, T = dot(nu, dg), alpha + w * dot(sub(place, ground), n)
             turning = sub(scaled(T, nu), scaled(third_p, x))
             turned = add(scaled(T / J, sub(dg, scaled(dJ, nu))), scaled(w * dot(n, d), nu))
             turned = sub(turned, scaled(third_p, d))

@@ -29,9 +29,12 @@ class Mesh(NamedTuple):
         """Whether the elements are no flat triangles."""
         return self.faces.shape[1] > 3
 
-    def without(self, *weights: str) -> Mesh:
-        """With zeros for some of ``tension``, ``pressure`` and ``weight``."""
-        return self._replace(**{name: read_only(np.zeros_like(self.tension)) for name in weights})
+    def weighing(self, weight: Floats | None = None) -> Mesh:
+        """With these weights alone, no tension and no pressure; None for no weights, and both as they are."""
+        none = read_only(np.zeros_like(self.tension))
+        if weight is None:
+            return self._replace(weight=none)
+        return self._replace(tension=none, pressure=none, weight=read_only(weight.view()))
 
 
 def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
@@ -42,3 +45,19 @@ def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Float
     patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
     weights = tension, pressure, surface.weights
     return Mesh(surface.nodes, patch, surface.origin, *weights, *plane, shapes(surface.order))
+
+
+class Points(NamedTuple):
+    """All elements at the points of the quadrature: one for a flat triangle, its middle."""
+
+    place: Floats  # (e,q,3) x
+    along_u: Floats  # (e,q,3) x_ξ
+    along_v: Floats  # (e,q,3) x_η
+    area: Floats  # (e,q,3) ν dA: the weight times x_ξ × x_η, length²
+
+    @classmethod
+    def of(cls, mesh: Mesh, X: Floats) -> Points:
+        """Those of the elements with their nodes at X (n,3)."""
+        N, Nu, Nv, weight = mesh.shapes
+        x, u, v = (np.einsum("qk,ekd->eqd", shape, X[mesh.faces]) for shape in (N, Nu, Nv))
+        return cls(x, u, v, weight[:, None] * np.cross(u, v))

@@ -24,8 +24,8 @@ from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scale
 from .curved import add_element_products, fill_block
 from .elements import Elements, add_hessian_products
 from .functional import elements, energy_and_gradient
-from .motion_space import MotionSpace, VertexClasses
 from .mesh import Mesh, energy_mesh
+from .motion_space import MotionSpace, VertexClasses
 from .pattern import Pattern, hessian_pattern, pair_place, row_place
 from .triangles import Block, Tilt, triangle, triangle_block, triangle_skew, triangle_tilt
 
@@ -223,15 +223,11 @@ def _assemble_blocks(
         for i in range(vertices.shape[1]):
             for j in range(vertices.shape[1]):
                 if vertices[e, i] <= vertices[e, j]:
-                    _add_projected(
-                        blocks[e, i, j], vertices[e, i], vertices[e, j], space, pattern, data
-                    )
+                    _add_projected(blocks[e, i, j], vertices[e, i], vertices[e, j], space, pattern, data)
 
 
 @compiled
-def _add_projected(
-    block: Floats, v: int, w: int, space: MotionSpace, pattern: Pattern, data: Floats
-) -> None:
+def _add_projected(block: Floats, v: int, w: int, space: MotionSpace, pattern: Pattern, data: Floats) -> None:
     """Add Bᵀ block B of vertices v ≤ w, two of one element, to the values of the pattern."""
     dimension, start, indptr = space.dimension, space.start, pattern.indptr
     if dimension[w] == 0:

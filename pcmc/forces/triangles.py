@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
 from ..surface import Surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
@@ -89,14 +89,14 @@ def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, 
     parts = len(blocks(len(mesh.faces), workers or threads()))
     area, volume = np.zeros((2, parts, len(mesh.tension)))
     gradient = np.zeros((parts, *X.shape))
-    weightless, moment = mesh.without("weight"), np.zeros_like(area)
+    weightless, moment = mesh.weighing(), np.zeros_like(area)
 
     def work(part: int, first: int, last: int) -> None:
-        sums = area[part], volume[part]
+        sums = area[part], volume[part], moment[part]
         if mesh.curved:
-            measure_elements(weightless, X, first, last, *sums, moment[part], gradient[part])
+            measure_elements(weightless, X, first, last, *sums, gradient[part])
         else:
-            measure_block(mesh, X, first, last, *sums, gradient[part])
+            measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
 
     run_blocks(work, len(mesh.faces), workers)
     for part in range(1, parts):
@@ -136,10 +136,10 @@ def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> 
 def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | None = None) -> Floats:
     """(k,) ∫ z dA of each patch, length³; the gradient of Σ w ∫ z dA is added to ``gradient`` (n,3)."""
     moment, out = np.zeros(len(surface.patches)), NO_GRADIENT if gradient is None else gradient
-    mesh = energy_mesh(surface)._replace(weight=read_only(weights.view()))
+    mesh = energy_mesh(surface).weighing(weights)
     if mesh.curved:
-        alone, unused = mesh.without("tension", "pressure"), np.zeros((2, len(moment)))
-        measure_elements(alone, X, 0, len(mesh.faces), *unused, moment, out)
+        area, volume = np.zeros((2, len(moment)))
+        measure_elements(mesh, X, 0, len(mesh.faces), area, volume, moment, out)
     else:
         _measure_moments(mesh, X, moment, out)
     return moment

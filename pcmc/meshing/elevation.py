@@ -8,7 +8,7 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
-from ..surface.lagrange import checked_order, lattice
+from ..surface.lagrange import known_order, lattice
 from .refinement import Projection, refine
 
 
@@ -39,7 +39,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
     (2, 6, [[0, 1, 2, 3, 4, 5]])
     """
     expect_surface(surface)
-    checked_order(order, surface.faces[:0], surface.patch_of_face[:0])
+    known_order(order)
     if surface.order > 1:
         message = f"order: the surface is of order {surface.order} already; give order={surface.order}"
         raise SurfaceError(message, what="order", found=order, expected=surface.order)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
+from ..base.errors import OptionError
 from ..base.tolerances import COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
 from ..stability.modes import clear_of_zero
 from ..surface import Surface
-from ..surface.lagrange import ORDERS
+from ..surface.lagrange import known_order
 from .result import Callback, Progress, Status, until_stopped
 from .state import SolverState
 from .steps import Stepper
@@ -65,7 +66,7 @@ class NewtonOptions:
         validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
         validate.number("inflation", self.inflation, above=1.0)
         if self.order is not None:
-            validate.choice("order", self.order, ORDERS)
+            known_order(self.order, OptionError)
 
 
 @dataclass

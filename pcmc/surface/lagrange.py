@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from functools import cache
 from math import ceil
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints, read_only
-from ..base.errors import SurfaceError
+from ..base.errors import PcmcError, SurfaceError
 
 ORDERS = (1, 2, 4, 8)
 
@@ -42,17 +42,22 @@ class Shapes(NamedTuple):
     weight: Floats  # (q,)
 
 
-def checked_order(order: object, F: Ints, patch: Ints) -> int:
-    """The order, if small triangles (m,3) of the patches (m,) are parts of elements of that order.
+def known_order(order: object, error: type[PcmcError] = SurfaceError) -> int:
+    """The order, if there are such elements.
 
-    >>> checked_order(3, np.array([[0, 1, 2]]), np.array([0]))
+    >>> known_order(3)
     Traceback (most recent call last):
         ...
     pcmc.base.errors.SurfaceError: order: expected 1, 2, 4 or 8, found 3
     """
     if isinstance(order, bool) or order not in ORDERS:
-        validate.refuse("order", order, "1, 2, 4 or 8", error=SurfaceError)
-    order = int(order)  # type: ignore[call-overload]
+        validate.refuse("order", order, "1, 2, 4 or 8", error=error)
+    return int(order)  # type: ignore[call-overload,no-any-return]
+
+
+def checked_order(given: object, F: Ints, patch: Ints) -> int:
+    """The order, if small triangles (m,3) of the patches (m,) are parts of elements of that order."""
+    order = known_order(given)
     if order > 1:
         element_nodes(F, order)
         mixed = np.flatnonzero(np.ptp(patch.reshape(-1, order**2), axis=1))
@@ -62,6 +67,19 @@ def checked_order(order: object, F: Ints, patch: Ints) -> int:
             message += " is in two patches; give order=1 for flat triangles"
             raise SurfaceError(message, what="order", where=face, found=order)
     return order
+
+
+def expect_flat(surface: Any, what: str) -> None:
+    """Refuse a Surface of curved elements where ``what`` is about flat triangles.
+
+    >>> from pcmc import Patch, Surface
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=[0])
+    >>> expect_flat(flat, "the panels")
+    """
+    if surface.order > 1:
+        message = f"{what}: only for flat triangles, and the elements are of order {surface.order}; pass"
+        message += " surface.rebuilt(order=1), the triangles that join their nodes"
+        raise SurfaceError(message, what="order", found=surface.order, expected=1)
 
 
 @cache
