@@ -10,6 +10,7 @@ import typer
 from .arguments import with_groups
 from .building import draw_, panels_, report_, structure
 from .cutting import pattern
+from .finding import equilibria
 from .preparing import cache_, plan, repair_, schema
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
@@ -59,6 +60,7 @@ for name, command, summary in (
     ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
     ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("report", report_, "Write a report with pictures, plan, verdict, forces and panels."),
+    ("equilibria", equilibria, "Search for all equilibria of a roof, and the barriers between them."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),

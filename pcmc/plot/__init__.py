@@ -3,6 +3,7 @@
 With a path every function writes a picture; each returns it as an (h,w,3) array of bytes.
 """
 
+from .branches import equilibria
 from .cloth import strains
 from .curves import convergence, diagram, heatmap, histories, lines
 from .loads import under_load
@@ -12,6 +13,7 @@ __all__ = [
     "convergence",
     "diagram",
     "draw",
+    "equilibria",
     "families",
     "heatmap",
     "histories",

@@ -31,6 +31,7 @@ COMMANDS = [
     "structure",
     "panels",
     "draw",
+    "equilibria",
     "sweep",
     "explore",
     "cache",
