@@ -246,11 +246,6 @@ def in_new_unit(value: Any, factor: float) -> Any:
     return value
 
 
-def _times(value: float, factor: float, power: int) -> float:
-    """The value times factor^power, rounded once."""
-    return value * factor**power if power > 0 else value / factor**-power
-
-
 def _point(point: Vector, factor: float) -> Vector:
     x, y, z = point
     return factor * x, factor * y, factor * z
