@@ -18,8 +18,11 @@ from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
 from ..io import FORMATS, READ_ONLY
-from ..project import MOST_CHECKED, Outcome, Project
-from ..project.outcome import OnStep
+from ..project import Outcome, Output, Project
+from ..project.drawn import files_of
+from ..project.outcome import MOST_CHECKED, OnStep
+from ..project.varied import with_loads
+from ..project.writing import check_outputs
 from ..surface import Surface
 
 TOML, DXF = ".toml", ".dxf"
@@ -116,7 +119,7 @@ class Loads:
         names |= {"volume": [room.name for room in surface.rooms]}
         flags = {key: f"--{key.replace('_', '-')}" for key in names}
         given = {f"{key}s": by_name(own, getattr(self, key), flags[key]) for key, own in names.items()}
-        return projects.with_loads(surface, given)
+        return with_loads(surface, given)
 
 
 @dataclass(frozen=True)
@@ -178,6 +181,13 @@ def load(file: Path, units: str = "") -> Project:
     """The project in a file, which may be a mesh or a drawing alone."""
     check_suffix(file)
     return projects.load(file, units=units)
+
+
+def output_of(file: Path, **output: Any) -> Output:
+    """What a command writes, in the terms of a project; refused before any work if it cannot be written."""
+    wanted = Output(**output)
+    check_outputs(wanted.paths, inputs=files_of(file))
+    return wanted
 
 
 def check_suffix(file: Path) -> None:

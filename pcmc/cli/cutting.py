@@ -11,7 +11,9 @@ from .. import project as projects
 from ..base import validate
 from ..cloth import CuttingOptions
 from ..cloth.sheets import pattern_files
-from . import NOT_CERTIFIED, OK, arguments
+from ..plot import strains
+from ..project.writing import write_all
+from . import arguments, reports
 from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, count, option, real
 from .progress import working
 
@@ -94,8 +96,7 @@ def pattern(
       pcmc pattern roof.toml --width 2.4 --compensation 0.4,1.5 --allowance 0.04 -o cloth.csv
     """
     seen, files = arguments.parsed_view(view), output or []
-    outputs = projects.Output(pattern=files, picture=picture, view=seen).paths
-    projects.check_outputs(outputs, inputs=projects.files_of(file))
+    arguments.output_of(file, pattern=files, picture=picture, view=seen)
     with working() as progress:
         project = arguments.load(file, units)
         wanted, own = given.of(project.pattern), project.output
@@ -107,9 +108,7 @@ def pattern(
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)
         jobs: list[Any] = pattern_files(cloth, files, roof.units, own.sheet, roof.name)
         if picture is not None:
-            jobs.append((picture, partial(projects.paint_strain, pattern=cloth, view=seen)))
-        written = projects.write_all(jobs, progress)
+            jobs.append((picture, partial(strains, cloth, view=seen)))
+        written = write_all(jobs, progress)
     print(cloth.text(roof.units))
-    if written:
-        print(f"written: {', '.join(map(str, written))}")
-    return OK if roof.good else NOT_CERTIFIED
+    return reports.ended(roof.good, written)

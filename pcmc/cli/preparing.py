@@ -16,6 +16,10 @@ from ..base.interrupts import defer_interrupts
 from ..base.units import LENGTHS
 from ..io import metres_note, write
 from ..io.repairing import HOLES, repair
+from ..project import cache
+from ..project.planning import drawing_reference
+from ..project.settings import check_names
+from ..project.writing import check_outputs
 from . import OK
 from .arguments import OUTPUT, TOML, count, flag, option, real
 from .progress import working
@@ -49,9 +53,9 @@ def plan(
     if output.exists():
         text = f"{output}: is there already; delete it, or name another file"
         raise FileError(text, what=str(output))
-    projects.check_outputs([output])
+    check_outputs([output])
     if refer:
-        projects.drawing_reference(file, output)  # refuses a drawing elsewhere
+        drawing_reference(file, output)  # refuses a drawing elsewhere
     with working() as progress:
         progress("reading the drawing")
         text, drawing = projects.project_text(file, output.parent, units=units, gap=gap, refer=refer)
@@ -80,8 +84,8 @@ def repair_(
       pcmc repair scan.ply -o clean.ply --weld 0.01 --edge-length 0.5
       pcmc repair blender.obj -o hall.obj --units mm --up y
     """
-    projects.check_names([output])
-    projects.check_outputs([output], inputs=[file])
+    check_names([output])
+    check_outputs([output], inputs=[file])
     with working() as progress:
         progress("repairing")
         repaired = repair(file, weld=weld, holes=holes, edge_length=edge_length, units=units, up=up)
@@ -111,12 +115,12 @@ def cache_(clear: Annotated[bool, flag("--clear", "Remove all roofs that are kep
     Example:
       pcmc cache --clear
     """
-    folder = projects.cache_folder()
+    folder = cache.cache_folder()
     if folder is None:
         print("no roofs are kept (PCMC_CACHE=off)")
     elif clear:
-        print(f"{len(projects.clear_cache())} roofs removed from {folder}")
+        print(f"{len(cache.clear_cache())} roofs removed from {folder}")
     else:
-        files = projects.cached_files()
+        files = cache.cached_files()
         print(f"{len(files)} roofs in {folder}, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB")
     return OK

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from ..certificate.tables import lean_texts
-from ..project import MOST_CHECKED, Outcome
+from ..project.outcome import MOST_CHECKED, Outcome
+from . import NOT_CERTIFIED, OK
 from .progress import working
 
 FAR = 10.0  # degrees: walls that lean less are not reported
@@ -46,8 +48,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
     if outcome.advice:
         print("\n  ".join(outcome.advice))
-    if outcome.files:
-        print(f"written: {', '.join(map(str, outcome.files))}")
+    ended(outcome.good, outcome.files)
 
 
 def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False) -> None:
@@ -73,3 +74,10 @@ def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:
         with working() as progress:
             found = roof.margin(what, progress)
         print(f"margin: {found.text(roof.units)}")
+
+
+def ended(good: bool, written: Iterable[Path] = ()) -> int:
+    """Print the files written; return the exit code of a roof that is ``good`` or not."""
+    if names := ", ".join(map(str, written)):
+        print(f"written: {names}")
+    return OK if good else NOT_CERTIFIED

@@ -9,15 +9,14 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from .. import project as projects
 from ..base.errors import OptionError, unknown
 from ..io import metres_note
 from ..project import Outcome
+from ..project.writing import draw_picture, surface_files, write_all
 from ..surface import Surface
-from . import NOT_CERTIFIED, OK, arguments
+from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import Cache, FileUnits, Input, Shown, Start, ViewName, Whole, count, flag, load, option
 from .progress import working
-from .reports import report
 
 OUT = "File to write; its suffix selects the format."
 SCALAR = "Scalar of the file that colours the vertices of a .glb or .usda."
@@ -44,13 +43,13 @@ def convert(
       pcmc convert roof.toml roof.ifc
       pcmc convert roof.pcmc roof.glb --colour error
     """
-    projects.check_outputs(projects.Output(files=[output]).paths, inputs=projects.files_of(file))
+    arguments.output_of(file, files=[output])
     roof = _good(file, what, whole, units)
     if roof is None:
         return NOT_CERTIFIED
-    projects.write_all(projects.surface_files(roof, [output], colour))
-    print(*metres_note([output], roof.units.length), f"written: {output}", sep="\n")
-    return OK
+    written = write_all(surface_files(roof, [output], colour))
+    print(*(f"{note}\n" for note in metres_note([output], roof.units.length)), sep="", end="")
+    return reports.ended(True, written)
 
 
 def _good(file: Path, what: Shown, whole: bool, units: str = "") -> Outcome | None:
@@ -58,7 +57,7 @@ def _good(file: Path, what: Shown, whole: bool, units: str = "") -> Outcome | No
     with working() as progress:
         roof = what.roof(load(file, units), progress, whole)
     if roof.result is not None:
-        report(roof)
+        reports.report(roof)
     if roof.result is None or roof.good:
         return roof
     print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
@@ -83,17 +82,12 @@ def plot(
       pcmc plot half.pcmc roof.png --whole
     """
     seen = arguments.parsed_view(view)
-    wanted = projects.Output(picture=picture, view=seen, colour=colour)
-    projects.check_outputs(wanted.paths, inputs=projects.files_of(file))
+    arguments.output_of(file, picture=picture, view=seen, colour=colour)
     roof = _good(file, what, whole)
     if roof is None:
         return NOT_CERTIFIED
-    painting = partial(
-        projects.draw_picture, roof.shown.surface, views=[seen], colour=colour, units=roof.units
-    )
-    projects.write_all([(picture, painting)])
-    print(f"written: {picture}")
-    return OK
+    painting = partial(draw_picture, roof.shown.surface, views=[seen], colour=colour, units=roof.units)
+    return reports.ended(True, write_all([(picture, painting)]))
 
 
 def explore(
@@ -115,7 +109,7 @@ def explore(
       pcmc explore roof.toml --watch
       pcmc explore --example two_caps --set edge_length=1.2
     """
-    from ..explore import open_and_wait, start_roof
+    from ..explore import open_and_wait, start
     from ..explore.roof import ShownRoof, read_roof
 
     if (file is None) == (example is None):
@@ -128,12 +122,12 @@ def explore(
         if file is not None:
             arguments.check_suffix(file)
             read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
-            roof, again = read(progress=progress, report=report), read if watch else None
+            roof, again = read(progress=progress, report=reports.report), read if watch else None
         else:
             values = {name: listed[0] for name, listed in map(arguments.named_values, parameter or ())}
             roof = ShownRoof.of(_example(str(example), values), str(example))
         progress("solving")
-        explorer = start_roof(roof, host, port, again)
+        explorer = start(roof, host, port, watch=again)
     open_and_wait(explorer, browser)
     return OK
 

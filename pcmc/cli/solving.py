@@ -11,6 +11,9 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
+from ..project.file import with_rise
+from ..project.planning import proposal_text
+from ..project.writing import surface_files, write_all
 from . import NOT_CERTIFIED, OK, reports
 from .arguments import (
     MANY_FILES,
@@ -26,6 +29,7 @@ from .arguments import (
     flag,
     load,
     option,
+    output_of,
     real,
 )
 from .progress import working
@@ -85,7 +89,7 @@ def solve_(
     project = load(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
-    project = projects.with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
+    project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
@@ -101,7 +105,7 @@ def solve_(
         output=own,
     )
     if project.specified and not project.has_file:  # a drawing alone
-        print(projects.proposal_text(project))
+        print(proposal_text(project))
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, progress, changed=loads.change, **how)
@@ -172,8 +176,7 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
-    written = projects.Output(files=output)
-    projects.check_outputs(written.paths, inputs=projects.files_of(file))
+    written = output_of(file, files=output)
     with working() as progress:
         project = replace(load(file, units), output=written)
         if solve:
@@ -183,7 +186,7 @@ def remesh_(
             progress("remeshing")
             roof = projects.start_of(project)
             surface, note = stage.remeshed(roof.surface)
-            projects.write_all(projects.surface_files(roof.changed(lambda _: surface), output), progress)
+            write_all(surface_files(roof.changed(lambda _: surface), output), progress)
     if not solve:
         if note:
             print(note)

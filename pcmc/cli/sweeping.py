@@ -11,7 +11,9 @@ import typer
 from ..base.errors import MissingExtra, OptionError
 from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
-from ..project import check_names, check_outputs, files_of
+from ..project.drawn import files_of
+from ..project.settings import check_names
+from ..project.writing import check_outputs
 from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import DXF, TOML, count, flag, named_values, option, real
 from .progress import sweeping

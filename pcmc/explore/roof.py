@@ -13,6 +13,7 @@ from .. import project as projects
 from ..base.errors import MissingExtra, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
+from ..project.drawn import files_of
 from ..surface import Surface
 
 EVERY = 0.5  # seconds between two looks at the files
@@ -106,7 +107,7 @@ def read_roof(
 def signature(path: Path) -> Signature:
     """What tells that a file, or one that it refers to, was saved, replaced, or can no longer be read."""
     states: list[tuple[str, tuple[int, ...]]] = []
-    for file in projects.files_of(path):
+    for file in files_of(path):
         try:
             state, readable = file.stat(), os.access(file, os.R_OK)
             seen = (state.st_mtime_ns, state.st_size, state.st_mode, state.st_ino, readable)

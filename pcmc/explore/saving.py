@@ -12,8 +12,8 @@ from ..base.errors import FileError, MissingExtra, OptionError
 from ..base.files import atomic_write
 from ..design import Parameter, Target
 from ..design.targets import measure
-from ..project import Project, read_data, surface_of
-from ..project.file import project_of
+from ..project import Project, surface_of
+from ..project.file import project_of, read_data
 from ..project.planning import project_text
 from ..project.values import data_with_values, differences
 from ..surface import Surface

@@ -16,7 +16,8 @@ from typing import Any
 
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
-from ..project import certified_files, load
+from ..project import load
+from ..project.writing import certified_files
 from ..surface import Surface
 from . import page_data, saving
 from .following import ProjectFallback, Stop

@@ -24,7 +24,7 @@ CAP = spherical_cap(edge_length=0.25)
 
 @pytest.fixture(scope="module")
 def explorer(hall_roof):
-    running = explore.start_roof(hall_roof)
+    running = explore.start(hall_roof)
     yield running
     running.close()
 

@@ -140,7 +140,7 @@ def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
 
 
 def test_a_save_that_waits_saves_what_was_shown_when_it_was_asked_for(hall_roof, hall_folder):
-    running, taken = explore.start_roof(hall_roof), threading.Event()
+    running, taken = explore.start(hall_roof), threading.Event()
     session = running.open()[1]
     real = session.state
 
@@ -180,7 +180,7 @@ def test_surfaces_without_a_project_are_not_saved(tmp_path):
 
 
 def test_on_the_network_nothing_is_saved(hall_roof, hall_folder):
-    running = explore.start_roof(hall_roof, host="0.0.0.0")
+    running = explore.start(hall_roof, host="0.0.0.0")
     try:
         client = Client(running)
         header, _ = client.ask("/api/open")

@@ -18,7 +18,7 @@ from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import SessionState
 from pcmc.plot import colors, pictures, raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
-from pcmc.project import draw_picture
+from pcmc.project.writing import draw_picture
 from pcmc.surface.colours import WALLS, patch_colors, rgb
 
 RENDERERS = [
