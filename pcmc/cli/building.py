@@ -34,7 +34,7 @@ from .arguments import (
     parsed_number,
     real,
 )
-from .progress import working
+from .reports import working
 
 CSV = ".csv"
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."

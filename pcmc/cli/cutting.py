@@ -15,7 +15,7 @@ from ..plot import strains
 from ..project.writing import write_all
 from . import arguments, reports
 from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, count, option, real
-from .progress import working
+from .reports import working
 
 WIDTH = "Width of the cloth: no strip is wider, with its allowances."
 SEAM = "A seam from point to point along geodesics, instead of others there; may be repeated."

@@ -26,7 +26,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler
 from ..base import validate
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError, unknown
 from ..base.files import atomic_write, check_name, check_regular, system_error, writing
-from . import service
+from . import meshes as service
 from .mesh_arrays import damaged_mesh
 
 try:

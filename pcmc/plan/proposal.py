@@ -17,9 +17,9 @@ from ..surface.pieces import two_digits
 from ..surface.values import balanced_wall
 from .drawing import Drawing
 from .edges import cable_for
-from .layers import Label
 from .lines import Kind, PlanLine
 from .parts import CableLine, Divider, Hole, PatchSpec, check_count, check_keys
+from .strokes import Label
 from .walls import most_in_corners
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..advice.rises import RISES, Rise, take_rises, taken, with_rises
-from ..advice.supports import mast_note
+from ..advice.rises import RISES, Rise, mast_note, take_rises, taken, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error

@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base import validate
-from ..base.child_process import ChildError, ChildProcess
 from ..base.errors import MissingExtra, OptionError, SweepError
+from ..base.libraries import ChildError, ChildProcess
 from . import case_script
 from .case_script import version
 

@@ -19,8 +19,8 @@ from generators import spherical_cap
 from pcmc import explore
 from pcmc.base.errors import FileError, OptionError
 from pcmc.design import Parameter, Target
-from pcmc.explore import saving
-from pcmc.explore.protocol import RequestError
+from pcmc.explore import roof as saving
+from pcmc.explore.listening import RequestError
 from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.panelling.distance import difference
