@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra, OptionError
+from ..base.errors import OptionError
+from ..base.libraries import require
 from ..plan import Divider, Hole, Plan, patch_names
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
@@ -92,10 +93,9 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
 
     if not rises:
         return plan, [], []
-    try:
-        from ..plan.proposal import largest_circle, least_tension, plan_area
-    except ModuleNotFoundError:
-        raise MissingExtra("shapely", "plan") from None
+    require("shapely", extra="plan")
+    from ..plan.proposal import largest_circle, least_tension, plan_area
+
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,8 +13,9 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import MissingExtra, OptionError
+from ..base.errors import OptionError
 from ..base.files import suffix_of
+from ..base.libraries import require
 from ..io import FORMATS, READ_ONLY
 from ..project.drawn import files_of
 from ..project.file import with_rise
@@ -262,8 +262,8 @@ def sweep(
 
     inputs = files_of(what) if Path(what).exists() else ()
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
-    if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet" and not find_spec("pyarrow"):
-        raise MissingExtra("pyarrow", "files")
+    if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
+        require("pyarrow")
     check_names((), plot)
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity

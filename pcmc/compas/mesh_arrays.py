@@ -13,7 +13,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra, SurfaceError
+from ..base.errors import FileError, SurfaceError
+from ..base.libraries import require
 from ..io.mesh_data import FIXED, FREE, SLIDING, coincident, given_values
 from ..io.polygons import cut_polygons
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room
@@ -28,10 +29,9 @@ Places = Mapping[str, Mapping[int, int]]  # by mesh name and key, the index of t
 
 def mesh_class() -> Any:
     """``compas.datastructures.Mesh``, or MissingExtra."""
-    try:
-        from compas.datastructures import Mesh
-    except ImportError:
-        raise MissingExtra("compas", "compas") from None
+    require("compas", extra="compas")
+    from compas.datastructures import Mesh
+
     return Mesh
 
 

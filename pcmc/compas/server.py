@@ -26,14 +26,13 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler
 from ..base import validate
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError, unknown
 from ..base.files import atomic_write, check_name, check_regular, system_error, writing
+from ..base.libraries import require
 from . import meshes as service
 from .mesh_arrays import damaged_mesh
 
-try:
-    from compas.data import DataDecoder, DataEncoder
-    from compas.rpc import Server
-except ImportError:
-    raise MissingExtra("compas", "compas") from None
+require("compas", extra="compas")
+from compas.data import DataDecoder, DataEncoder  # noqa: E402
+from compas.rpc import Server  # noqa: E402
 
 HOST = "127.0.0.1"
 USER = "pcmc"

@@ -15,6 +15,7 @@ from typing import Any
 from .. import project as projects
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
 from ..base.files import atomic_write
+from ..base.libraries import load_library
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
 from ..design.targets import measure
@@ -244,10 +245,7 @@ def project_with(
     or, for a rise, the tension: with them, solving the project would lead away from the surface saved. With
     ``stem``, the name of the new file, the output gets other names, too.
     """
-    try:
-        import tomlkit
-    except ModuleNotFoundError:
-        raise MissingExtra("tomlkit", "cad") from None
+    tomlkit = load_library("tomlkit", "cad")
     project = roof.project
     assert project is not None
     text = project.text or project_text(project.path, refer=True)[0]

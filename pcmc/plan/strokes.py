@@ -10,16 +10,15 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.errors import FileError, MissingExtra, PlanError, unknown
+from ..base.errors import FileError, PlanError, unknown
 from ..base.files import check_regular, system_error
-from ..base.libraries import read_arrays
+from ..base.libraries import read_arrays, require
 from ..base.units import MICROMETRES, length_factor, unit_in_file
 from ..base.validate import checked_name
 from ..surface.curves import Curve
@@ -65,8 +64,7 @@ def read_strokes(path: Path, units: str = "") -> Strokes:
     if suffix not in LIBRARIES:
         text = f"{path}: {unknown('suffix of a drawing', suffix, LIBRARIES)}"
         raise FileError(text, what=str(path), found=suffix, expected=tuple(LIBRARIES))
-    if find_spec(LIBRARIES[suffix]) is None:
-        raise MissingExtra(LIBRARIES[suffix], "cad")
+    require(LIBRARIES[suffix], extra="cad")
     try:
         path.open("rb").close()
         contents = read_arrays("plan/reading_drawings.py", READERS[suffix], path)

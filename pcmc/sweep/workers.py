@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base import validate
-from ..base.errors import MissingExtra, OptionError, SweepError
-from ..base.libraries import ChildError, ChildProcess
+from ..base.errors import OptionError, SweepError
+from ..base.libraries import ChildError, ChildProcess, require
 from . import case_script
 from .case_script import version
 
@@ -194,10 +194,9 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
         text = f"scheduler: expected 'tcp://host:8786', found {address!r}"
         raise OptionError(text, what="scheduler", found=address, expected="tcp://host:8786")
-    try:
-        from distributed import Client
-    except ImportError:
-        raise MissingExtra("distributed", "distributed") from None
+    require("distributed", extra="distributed")
+    from distributed import Client
+
     try:
         client = Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:

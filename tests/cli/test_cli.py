@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import os
 import subprocess
 import sys
@@ -289,14 +288,7 @@ def test_what_a_file_says_of_its_surface_is_carried_over(solved, capsys):
 
 
 def test_without_typer_the_extra_is_named(monkeypatch, capsys):
-    real = builtins.__import__
-
-    def without(name, *rest, **more):
-        if name == "typer":
-            raise ModuleNotFoundError("No module named 'typer'", name="typer")
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "typer", None)
     assert cli.main(["--help"]) == 2
     err = capsys.readouterr().err
     assert "pcmc-surfaces[cli]" in err
