@@ -33,7 +33,7 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-def real(metavar: str, meaning: str) -> Any:
+def amount(metavar: str, meaning: str) -> Any:
     """An option with a number."""
     return option(metavar, meaning, parser=parsed_number)
 
@@ -48,7 +48,7 @@ def by_part(meaning: str) -> Any:
     return option("NAME=VALUE", meaning)
 
 
-def flag(name: str, meaning: str) -> Any:
+def switch(name: str, meaning: str) -> Any:
     """An option without a value."""
     return typer.Option(name, help=meaning)
 
@@ -84,10 +84,10 @@ UNCERTIFIED = "Accept a roof that is not certified or misses its targets; every 
 INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
 Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
 ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
-Start = Annotated[bool, flag("--start", START)]
-Cache = Annotated[bool, flag("--cache/--no-cache", CACHE)]
-Whole = Annotated[bool, flag("--whole", WHOLE)]
-MeshCheck = Annotated[bool | None, flag("--mesh-check/--no-mesh-check", MESH_CHECK)]
+Start = Annotated[bool, switch("--start", START)]
+Cache = Annotated[bool, switch("--cache/--no-cache", CACHE)]
+Whole = Annotated[bool, switch("--whole", WHOLE)]
+MeshCheck = Annotated[bool | None, switch("--mesh-check/--no-mesh-check", MESH_CHECK)]
 FileUnits = Annotated[str, option("NAME", UNITS)]
 OUTPUT = "-o", "--output"
 MANY_FILES = option("FILE", "File to write; may be repeated.", *OUTPUT)
@@ -142,7 +142,7 @@ class Build:
 
     whole: Whole = False
     cache: Cache = True
-    allow_uncertified: Annotated[bool, flag("--allow-uncertified", UNCERTIFIED)] = False
+    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""

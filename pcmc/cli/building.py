@@ -28,11 +28,11 @@ from .arguments import (
     Input,
     MeshCheck,
     ViewName,
+    amount,
     count,
-    flag,
     option,
     parsed_number,
-    real,
+    switch,
 )
 from .reports import working
 
@@ -54,19 +54,19 @@ DENSITY = "Mass per volume; above 0, self-weight is a load."
 RUN = "Run CalculiX on each case and combination; by default as the project says."
 SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
-Tolerance = Annotated[float | None, real("LENGTH", TOLERANCE)]
+Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
 
 
 def panels_(
     *,
     file: Input,
-    tolerance: Annotated[float, real("LENGTH", "Largest difference of edges within a family.")],
+    tolerance: Annotated[float, amount("LENGTH", "Largest difference of edges within a family.")],
     output: Annotated[list[Path] | None, MANY_FILES] = None,
     picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
-    change: Annotated[float | None, real("LENGTH", CHANGE)] = None,
+    change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
     mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
-    walls: Annotated[bool, flag("--walls", "Triangles of walls are panels, too.")] = False,
+    walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
     """Sort the panels of a roof into families of congruent triangles; write a schedule.
@@ -128,7 +128,7 @@ def draw_(
     height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
     line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
     tolerance: Tolerance = None,
-    panel_sheets: Annotated[bool, flag("--panel-sheets", TRUE_SIZE)] = False,
+    panel_sheets: Annotated[bool, switch("--panel-sheets", TRUE_SIZE)] = False,
     build: Build,
 ) -> int:
     """Draw a roof: plan, elevations, sections, setting-out points, panels; in .dxf, .pdf or .svg.
@@ -212,13 +212,13 @@ class Model:
     """What the command line says of a structural model, instead of the project."""
 
     thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None
-    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None
-    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None
-    density: Annotated[float | None, real("VALUE", DENSITY)] = None
-    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None
-    snow: Annotated[float | None, real("VALUE", SNOW)] = None
+    young: Annotated[float | None, amount("VALUE", "Young's modulus.")] = None
+    poisson: Annotated[float | None, amount("VALUE", "Poisson's ratio, 0.3 by default.")] = None
+    density: Annotated[float | None, amount("VALUE", DENSITY)] = None
+    gravity: Annotated[float | None, amount("VALUE", "Length/s²; by default 9.81 m/s².")] = None
+    snow: Annotated[float | None, amount("VALUE", SNOW)] = None
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
-    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None
+    cable_area: Annotated[float | None, amount("VALUE", "Section of the cables.")] = None
 
 
 def structure(
@@ -226,7 +226,7 @@ def structure(
     file: Input,
     output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
     given: Model,
-    run: Annotated[bool | None, flag("--run/--no-run", RUN)] = None,
+    run: Annotated[bool | None, switch("--run/--no-run", RUN)] = None,
     build: Build,
 ) -> int:
     """Write a structural model for CalculiX: prestressed membranes, supports, loads; and run it.

@@ -14,7 +14,7 @@ from ..cloth.sheets import pattern_files
 from ..plot import strains
 from ..project.writing import write_all
 from . import arguments, reports
-from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, count, option, real
+from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, amount, count, option
 from .reports import working
 
 WIDTH = "Width of the cloth: no strip is wider, with its allowances."
@@ -33,16 +33,16 @@ PICTURE = "Picture to draw: the strips on the roof, coloured by strain."
 class Cutting:
     """What the command line says of a cutting pattern, instead of the project."""
 
-    width: Annotated[float | None, real("LENGTH", WIDTH)] = None
+    width: Annotated[float | None, amount("LENGTH", WIDTH)] = None
     strips: Annotated[int | None, count("Number of strips of each sheet, instead of a width.")] = None
     seam: Annotated[list[str] | None, option("X,Y,X,Y", SEAM)] = None
-    direction: Annotated[float | None, real("DEGREES", DIRECTION)] = None
+    direction: Annotated[float | None, amount("DEGREES", DIRECTION)] = None
     compensation: Annotated[str | None, option("WARP,WEFT", COMPENSATION)] = None
     stiffness: Annotated[str | None, option("WARP,WEFT", STIFFNESS)] = None
-    poisson: Annotated[float | None, real("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
-    allowance: Annotated[float | None, real("LENGTH", ALLOWANCE)] = None
-    hem: Annotated[float | None, real("LENGTH", HEM)] = None
-    notches: Annotated[float | None, real("LENGTH", NOTCHES)] = None
+    poisson: Annotated[float | None, amount("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
+    allowance: Annotated[float | None, amount("LENGTH", ALLOWANCE)] = None
+    hem: Annotated[float | None, amount("LENGTH", HEM)] = None
+    notches: Annotated[float | None, amount("LENGTH", NOTCHES)] = None
 
     def of(self, own: CuttingOptions | None) -> CuttingOptions:
         """The pattern of a project with these values."""

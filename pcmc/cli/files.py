@@ -34,11 +34,11 @@ from .arguments import (
     Start,
     ViewName,
     Whole,
+    amount,
     count,
-    flag,
     load,
     option,
-    real,
+    switch,
 )
 from .reports import working
 
@@ -121,7 +121,7 @@ def explore(
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, count("Port; 0 for any free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
-    watch: Annotated[bool, flag("--watch", WATCH)] = False,
+    watch: Annotated[bool, switch("--watch", WATCH)] = False,
     start_shape: Start = False,
     cache: Cache = True,
 ) -> int:
@@ -188,8 +188,8 @@ def plan(
     file: Annotated[Path, typer.Argument(metavar="DRAWING", help=f"A .dxf or .3dm. {LAYERS}")],
     output: Annotated[Path, option("FILE", "Project to write (.toml).", *OUTPUT)],
     units: Annotated[str, option("NAME", f"Unit of the project: {', '.join(LENGTHS)}.")] = "",
-    gap: Annotated[float | None, real("LENGTH", GAP)] = None,
-    refer: Annotated[bool, flag("--refer", REFER)] = False,
+    gap: Annotated[float | None, amount("LENGTH", GAP)] = None,
+    refer: Annotated[bool, switch("--refer", REFER)] = False,
 ) -> int:
     """Write the project file for a drawing: its lines, and tensions to begin with.
 
@@ -219,9 +219,9 @@ def plan(
 def repair_(
     file: Annotated[Path, typer.Argument(metavar="FILE", help=MESH)],
     output: Annotated[Path, option("FILE", "File to write.", *OUTPUT)],
-    weld: Annotated[float | None, real("LENGTH", WELD)] = None,
+    weld: Annotated[float | None, amount("LENGTH", WELD)] = None,
     holes: Annotated[int, count(CLOSED)] = HOLES,
-    edge_length: Annotated[float | None, real("LENGTH", NEW_LENGTH)] = None,
+    edge_length: Annotated[float | None, amount("LENGTH", NEW_LENGTH)] = None,
     units: Annotated[str, option("NAME", UNITS)] = "",
     up: Annotated[str, option("AXIS", UP)] = "z",
 ) -> int:
@@ -255,7 +255,7 @@ def schema() -> int:
     return OK
 
 
-def cache_(clear: Annotated[bool, flag("--clear", "Remove all roofs that are kept.")] = False) -> int:
+def cache_(clear: Annotated[bool, switch("--clear", "Remove all roofs that are kept.")] = False) -> int:
     """Show where the roofs of projects solved before are kept, or remove them.
 
     The variable PCMC_CACHE names another folder; PCMC_CACHE=off keeps nothing.

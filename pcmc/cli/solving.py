@@ -35,13 +35,13 @@ from .arguments import (
     MeshCheck,
     Shown,
     Whole,
+    amount,
     count,
-    flag,
     load,
     named_values,
     option,
     output_of,
-    real,
+    switch,
 )
 from .reports import sweeping, working
 
@@ -62,7 +62,7 @@ SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
-Verify = Annotated[bool, flag("--verify", VERIFY)]
+Verify = Annotated[bool, switch("--verify", VERIFY)]
 
 
 def solve_(
@@ -73,11 +73,11 @@ def solve_(
     method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
     target: Annotated[str | None, option("NAME", TARGET)] = None,
     loads: Loads,
-    rise: Annotated[float | None, real("LENGTH", RISE)] = None,
-    apex: Annotated[float | None, real("LENGTH", APEX)] = None,
-    span_ratio: Annotated[float | None, real("NUMBER", SPAN_RATIO)] = None,
+    rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
+    apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
+    span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
-    allow_uncertified: Annotated[bool, flag("--allow-uncertified", UNCERTIFIED)] = False,
+    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY)] = None,
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF)] = None,
     most_triangles: Annotated[int | None, count(MOST_TRIANGLES)] = None,
@@ -139,7 +139,7 @@ def certify_(
     what: Shown,
     meshes: Annotated[int | None, count(MESHES)] = None,
     margin: Annotated[list[str] | None, option("WHAT", MARGIN)] = None,
-    whole: Annotated[bool, flag("--whole", WHOLE_INDEX)] = False,
+    whole: Annotated[bool, switch("--whole", WHOLE_INDEX)] = False,
     verify: Verify = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
@@ -176,12 +176,12 @@ def certify_(
 def remesh_(
     *,
     file: Input,
-    edge_length: Annotated[float, real("LENGTH", "Edge length of the triangles.")],
+    edge_length: Annotated[float, amount("LENGTH", "Edge length of the triangles.")],
     output: Annotated[list[Path], MANY_FILES],
-    near_curves: Annotated[float | None, real("LENGTH", "Edge length at junctions and boundaries.")] = None,
-    chord: Annotated[float | None, real("LENGTH", CHORD)] = None,
+    near_curves: Annotated[float | None, amount("LENGTH", "Edge length at junctions and boundaries.")] = None,
+    chord: Annotated[float | None, amount("LENGTH", CHORD)] = None,
     units: FileUnits = "",
-    solve: Annotated[bool, flag("--solve/--no-solve", "Solve and certify the new mesh.")] = True,
+    solve: Annotated[bool, switch("--solve/--no-solve", "Solve and certify the new mesh.")] = True,
 ) -> int:
     """Remesh a surface to an edge length, then solve and certify it. Patches and supports stay.
 
@@ -218,6 +218,7 @@ WHAT = "A project (.toml), a surface, or package.module:function that returns a 
 SEARCH = "Try further starts where the first leads to no equilibrium: slower, but tells what ends each way."
 PLOT = "Picture over one varied number or two: of the first --show, else apexes or the rise."
 SHOW = "What the table has: apex, area, volume, force, ..., or of one part: west.area. Repeat for several."
+RETRY = "Run the stored cases that failed again."
 STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
@@ -227,15 +228,15 @@ def sweep(
     method: Annotated[str | None, option("NAME", METHOD)] = None,
     store: Annotated[Path | None, option("FILE", STORE)] = None,
     csv: Annotated[Path | None, option("FILE", "Table to write (.csv or .parquet).")] = None,
-    every: Annotated[bool, flag("--all", "Write all columns, not only the first ones.")] = False,
+    every: Annotated[bool, switch("--all", "Write all columns, not only the first ones.")] = False,
     plot: Annotated[Path | None, option("FILE", PLOT)] = None,
     show: Annotated[list[str] | None, option("QUANTITY", SHOW)] = None,
     workers: Annotated[int | None, count("Local processes; default: one per processor.")] = None,
     scheduler: Annotated[str | None, option("ADDRESS", "Dask scheduler to use: tcp://HOST:8786.")] = None,
-    time_limit: Annotated[float, real("SECONDS", "Time limit per case, in seconds.")] = 600.0,
-    mesh_check: Annotated[bool, flag("--mesh-check", MESH_CHECK)] = False,
-    search: Annotated[bool, flag("--search", SEARCH)] = False,
-    retry_failed: Annotated[bool, flag("--retry-failed", "Run the stored cases that failed again.")] = False,
+    time_limit: Annotated[float, amount("SECONDS", "Time limit per case, in seconds.")] = 600.0,
+    mesh_check: Annotated[bool, switch("--mesh-check", MESH_CHECK)] = False,
+    search: Annotated[bool, switch("--search", SEARCH)] = False,
+    retry_failed: Annotated[bool, switch("--retry-failed", RETRY)] = False,
 ) -> int:
     """Solve every combination of the values; exit code 0 if all are certified.
 

@@ -245,7 +245,7 @@ def write(path: str, meshes: Any, weld: bool = False, overwrite: bool = False, *
     service.write(place, meshes, weld, **options)
 
 
-def serve(port: int | None = None) -> None:
+def serve_calls(port: int | None = None) -> None:
     """Answer calls until Ctrl-C or ``Proxy.stop_server``; on the port of the settings unless one is given."""
     port = read_settings().port if port is None else port
     try:

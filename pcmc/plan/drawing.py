@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.units import conversion_note, size_note
+from ..base.units import conversion_note, unlikely_size
 from ..surface.curves import Curve, polyline
 from ..surface.pieces import Piece, point_text, two_digits
 from ..surface.summary import listed
@@ -359,7 +359,7 @@ class _Reader:
         if hidden:
             self.notes.append(f"hidden, left out: entities of the layers {', '.join(hidden)}")
         width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
-        note = size_note(width, self.units, self.content.unit)
+        note = unlikely_size(width, self.units, self.content.unit)
         self.notes += [note] if note else []
         if note := self.content.note or conversion_note(self.content.unit, self.units):
             self.notes.insert(0, note)
