@@ -269,12 +269,12 @@ def of_type(words: str, *types: type) -> Check:
 
 
 whole, truth = of_type("a whole number", int), of_type("true or false", bool)
-real, text = of_type("a number", int, float), of_type("a name", str)
 
 
 def name(what: str, value: Any) -> str:
     """A text that is not too long."""
-    if len(text(what, value)) > LONGEST_NAME:
+    of_type("a name", str)(what, value)
+    if len(value) > LONGEST_NAME:
         raise RequestError(f"{what}: a name of {len(value)} characters: {value[:40]!r}...")
     return str(value)
 
@@ -282,7 +282,7 @@ def name(what: str, value: Any) -> str:
 def as_float(what: str, value: Any) -> float:
     """A float."""
     try:
-        return float(real(what, value))
+        return float(of_type("a number", int, float)(what, value))
     except OverflowError:
         raise RequestError(f"{what}: expected a number up to 1.8e308") from None
 
@@ -300,23 +300,6 @@ def variant_name(what: str, value: Any) -> str:
     if not 0 < len(words) <= 60:
         raise RequestError(f"{what}: expected 1 to 60 characters, found {len(words)}")
     return checked_name(what, words)
-
-
-def file_name(what: str, value: Any) -> str:
-    """The name of a file to save."""
-    if not name(what, value).strip():
-        raise RequestError(f"{what}: give the file a name, such as variant.toml")
-    return str(value.strip())
-
-
-def owner(what: str, value: Any) -> str | tuple[float, ...]:
-    """What a target is of: a name, or the point of a height."""
-    return name(what, value) if isinstance(value, str) else tuple(place(what, value, "a name or a point", 2))
-
-
-def patches(what: str, value: Any) -> str | tuple[str, ...]:
-    """A name, or those of patches that are tied: they change together."""
-    return tuple(name(what, one) for one in value) if isinstance(value, list) else name(what, value)
 
 
 def values_by_name(check: Check) -> Check:
@@ -349,8 +332,16 @@ def entries(keys: Mapping[str, Check], made: Callable[..., Any]) -> Check:
 LIMIT = or_null(as_float)
 VALUES = {f"{kind}?": values_by_name(as_float) for kind in KINDS} | {"points?": values_by_name(place)}
 LIMITS = dict.fromkeys(("value?", "at_most?", "at_least?"), LIMIT)
-TARGET = {"quantity": name, "of?": or_null(owner), **LIMITS, "name?": name}
-PARAMETER = {"patch": patches, "kind?": name, "low?": LIMIT, "high?": LIMIT}
+OWNER = or_null(  # what a target is of: a name, or the point of a height
+    lambda what, value: (
+        name(what, value) if isinstance(value, str) else tuple(place(what, value, "a name or a point", 2))
+    )
+)
+TARGET: dict[str, Check] = {"quantity": name, "of?": OWNER, **LIMITS, "name?": name}
+TIED: Check = lambda what, value: (  # noqa: E731 — a name, or those of patches that change together
+    tuple(name(what, one) for one in value) if isinstance(value, list) else name(what, value)
+)
+PARAMETER: dict[str, Check] = {"patch": TIED, "kind?": name, "low?": LIMIT, "high?": LIMIT}
 NUMBER: dict[str, Check] = {"number": whole}
 ACTS: dict[str, dict[str, Check]] = {
     "follow": VALUES,
@@ -366,7 +357,7 @@ ACTS: dict[str, dict[str, Check]] = {
 REQUESTS: dict[str, dict[str, Check]] = ACTS | {
     "open": {"session?": or_null(name)},
     "margin": {"what": name},
-    "save": {"name": file_name, "replace?": truth},
+    "save": {"name": name, "replace?": truth},
     **{act: {} for act in ("check", "verify", "families", "news")},
 }
 """All requests; those that are no acts answer with something else."""

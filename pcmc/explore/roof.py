@@ -220,7 +220,7 @@ def _place(roof: ShownRoof, name: str) -> tuple[Project, Path]:
     """The roof's project, and the path of a file beside its; FileError for one that is elsewhere."""
     if roof.project is None:
         raise FileError("only a project or a drawing can be saved as a project; use Export", what="name")
-    name = name if name.lower().endswith(".toml") else f"{name}.toml"
+    name = name.strip() if name.strip().lower().endswith(".toml") else f"{name.strip()}.toml"
     folder = roof.project.path.parent.resolve()
     problem = ""
     if not re.fullmatch(r"[^/\\:*?\"<>|.][^/\\:*?\"<>|]*", name) or not name.isprintable():

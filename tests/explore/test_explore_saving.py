@@ -51,7 +51,7 @@ def test_saving_what_the_page_met_writes_its_targets(hall_roof, hall_session):
     vary = Parameter("west", low=1.0, high=9.0), Parameter("east")
     state = hall_session.meet(targets, vary)
     assert state.message.startswith("met")
-    path, note = saving.save(hall_roof, state.surface, "met.toml", False, hall_session.aims)
+    path, note = saving.save(hall_roof, state.surface, "met.toml", False, hall_session.now.aims)
     assert note == "with its targets: apex of west, height at (9, 3)"
     again = read_roof(path, use_cache=False)
     assert again.aims[0] == targets
