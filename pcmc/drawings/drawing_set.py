@@ -23,8 +23,9 @@ from ..certificate.certificate import certified, warning_mark
 from ..panelling import Panels, panels
 from ..panelling.flat import packed, turned_to_fit
 from ..surface import Surface, expect_surface
-from . import dxf, pdf, views
+from . import dxf, views
 from .sheet import FORMATS, WIDTH, Sheet, SheetLine, Text, add_frames, corner, drawing_area, table_sheets
+from .sheet import write_pdf as write_pages
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
@@ -56,7 +57,7 @@ class DrawingSet:
             if suffix == ".dxf":
                 jobs.append((path, document.saveas))
             elif suffix == ".pdf":
-                jobs.append((path, partial(pdf.write_pdf, self.sheets)))
+                jobs.append((path, partial(write_pages, self.sheets)))
             else:
                 many = len(self.sheets) > 1
                 for k in range(len(self.sheets)):

@@ -38,7 +38,7 @@ REQUEST_SECONDS = 30.0  # to send a request, from its first byte or the last ans
 WAITING = 128  # connections that the system keeps until they are accepted
 LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 BYTES = "application/octet-stream"
 HEADERS = {
     "Cache-Control": "no-store",
@@ -203,7 +203,7 @@ class PageHandler(BaseHTTPRequestHandler):
         self._send(json.dumps({"error": " ".join(line.split())}).encode(), "application/json", status=status)
 
     def _send_file(self, name: str) -> None:
-        kind = TYPES.get(Path(name).suffix)
+        kind = MEDIA.get(Path(name).suffix)
         file = files(__package__).joinpath("page", name)
         if kind is None or not re.fullmatch(r"[\w.-]{1,80}", name) or not file.is_file():
             raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)

@@ -45,7 +45,7 @@ class MeshData:
     # whether patches share their vertices for certain, as in files that pcmc wrote. Then two vertices at one
     # place stay two: those of a wall without height below a junction on Π
     joined: bool = False
-    walls: str | None = None  # the text of ``patch_meshes.encode_walls``
+    walls: str | None = None  # the text of ``metadata.encode_walls``
     lines: tuple[tuple[Guide, Bools], ...] = ()  # ``on_line`` in Surface; the others as there
     units: Units = NO_UNITS  # of the numbers; no unit where the file has none
     planes: tuple[tuple[Plane, Bools], ...] = ()
