@@ -3,6 +3,7 @@
 With a path every function writes a picture; each returns it as an (h,w,3) array of bytes.
 """
 
+from .branches import equilibria
 from .curves import convergence, diagram, heatmap, histories, lines
 from .pictures import draw, families, panel, reactions, vectors
 from .uses import strains, under_load
@@ -11,6 +12,7 @@ __all__ = [
     "convergence",
     "diagram",
     "draw",
+    "equilibria",
     "families",
     "heatmap",
     "histories",

@@ -240,6 +240,12 @@ def diagram(
     Folds, changes of index and changes of contact are marked.
     """
     figure, axes = new_axes(width, height, title, xlabel or x, ylabel or y)
+    add_legend(axes, len(branches) + add_branches(axes, branches, x, y))
+    return finish(figure, path)
+
+
+def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
+    """Draw branches on axes as ``diagram`` does; the number of kinds of events among them."""
     marked: set[str] = set()
     for k, (label, branch) in enumerate(branches.items()):
         for column in (x, y):
@@ -257,8 +263,7 @@ def diagram(
             marked.add(str(kind))
             look = {"markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.8}
             axes.plot(rows[x], rows[y], EVENT_MARKERS[str(kind)], color=color, label=text, **look)
-    add_legend(axes, len(branches) + len(marked))
-    return finish(figure, path)
+    return len(marked)
 
 
 def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:

@@ -30,6 +30,7 @@ COMMANDS = [
     "structure",
     "panels",
     "draw",
+    "equilibria",
     "sweep",
     "explore",
     "cache",
