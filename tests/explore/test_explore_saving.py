@@ -72,7 +72,7 @@ def test_a_named_point_keeps_its_name(tmp_path):
     met = Session(solved_start(roof.surface))
     targets = Target("height", (3, 3), 1.3, name="crown"), roof.aims[0][1]
     assert met.meet(targets, roof.aims[1]).message.startswith("met")
-    text, note, _ = saving.project_with(roof, met.surface, met.aims)
+    text, note, _ = saving.project_with(roof, met.surface, met.now.aims)
     assert note == "with its targets: height at crown, apex of east"
     assert tomllib.loads(text)["targets"]["meet"][0] == {"quantity": "height", "of": "crown", "value": 1.3}
 
