@@ -73,7 +73,7 @@ def explorer():
     running.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def driver(tmp_path_factory):
     """A browser without a window, whose downloads are in ``downloads``."""
     folder = tmp_path_factory.mktemp("browser")

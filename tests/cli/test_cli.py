@@ -10,6 +10,7 @@ from importlib.metadata import version
 import numpy as np
 import pandas as pd
 import pytest
+from nightly import at_night
 from small_project import SMALL
 
 import pcmc
@@ -235,7 +236,7 @@ def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
     assert "'a'" in out.split("case 1: ")[1]
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+@pytest.mark.parametrize("encoding", ["ascii", *at_night("cp1252")])
 def test_letters_that_the_terminal_lacks_are_written_otherwise(folder, encoding):
     text = SMALL.replace("roof = ", '"größe, ō" = ')
     (folder / "roof.toml").write_text(text, encoding="utf-8")
