@@ -13,7 +13,7 @@ from small_project import SMALL
 from generators import bezier_hall, spherical_cap
 from pcmc import explore, solve
 from pcmc.explore.session import Session, solved_start
-from pcmc.plot import raster
+from pcmc.plot import scene as raster
 
 
 def pytest_addoption(parser):

@@ -10,7 +10,7 @@ import pytest
 
 import pcmc
 from generators import spherical_cap
-from pcmc.plan.layers import MEANINGS
+from pcmc.plan.strokes import MEANINGS
 from pcmc.project import reference, sections
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
