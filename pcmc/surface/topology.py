@@ -60,8 +60,8 @@ class Topology:
     @cached_array
     def one_way_edge(self) -> Bools:
         """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
-        one_way: Bools = _one_way(self.faces, self.edge_of_face, self.valence)
-        return one_way
+        total = np.bincount(self.edge_of_face.ravel(), self.sense.ravel(), len(self.edges))
+        return (self.valence == 2) & (total != 0.0)
 
     @cached_array
     def fans(self) -> Ints:
@@ -300,15 +300,6 @@ def _components(edges: Ints, n: int) -> Ints:
         else:  # the label of an earlier vertex
             parent[v] = parent[parent[v]]
     return parent
-
-
-@compiled
-def _one_way(F: Ints, edge_of_face: Ints, valence: Ints) -> Bools:
-    total = np.zeros(len(valence), dtype=np.int32)
-    for f in range(len(F)):
-        for k in range(3):
-            total[edge_of_face[f, k]] += 1 if F[f, k - 2] < F[f, k - 1] else -1
-    return (valence == 2) & (total != 0)
 
 
 @compiled
