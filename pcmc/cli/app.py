@@ -10,11 +10,9 @@ import typer
 from .arguments import with_groups
 from .building import draw_, panels_, report_, structure
 from .cutting import pattern
+from .files import cache_, convert, explore, plan, plot, repair_, schema
 from .finding import equilibria
-from .preparing import cache_, plan, repair_, schema
-from .showing import convert, explore, plot
-from .solving import certify_, remesh_, solve_
-from .sweeping import sweep
+from .solving import certify_, remesh_, solve_, sweep
 
 app = typer.Typer(
     add_completion=False,

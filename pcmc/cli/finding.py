@@ -8,9 +8,11 @@ from typing import Annotated, Any
 
 from .. import project as projects
 from ..base.errors import OptionError
+from ..project.drawn import files_of
+from ..project.writing import certified_files, check_outputs, write_all
 from . import OK, arguments
-from .arguments import MANY_FILES, FileUnits, Input, Shown, count, flag, load, option
-from .progress import working
+from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load, option, switch
+from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
 SPAN = "Least and largest factor on it; by default 0.5,1.5. Of what is 0 now, least and largest value."
@@ -29,7 +31,7 @@ def equilibria(
     starts: Annotated[int, count(STARTS)] = 6,
     seed: Annotated[int, count("Seed of these starts.")] = 0,
     axis: Annotated[str, option("NAME", VERTICAL)] = "height",
-    mesh_check: Annotated[bool, flag("--mesh-check", CHECK)] = False,
+    mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,
     what: Shown,
     units: FileUnits = "",
 ) -> int:
@@ -51,7 +53,7 @@ def equilibria(
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format
-    projects.check_outputs(files, inputs=projects.files_of(file))
+    check_outputs(files, inputs=files_of(file))
     arguments.validate.choice("--axis", axis, SHOWN)
     with working() as progress:
         roof = what.roof(load(file, units), progress, whole=False)
@@ -68,8 +70,8 @@ def equilibria(
             else:
                 for k, one in enumerate(found.found, 1):
                     place = path.with_name(f"{path.stem}-{k}{path.suffix}")
-                    jobs += projects.certified_files(one.surface, one.certificate, [place], roof.units)
-        written = projects.write_all(jobs, progress)
+                    jobs += certified_files(one.surface, one.certificate, [place], roof.units)
+        written = write_all(jobs, progress)
     print(found.text(roof.units))
     if written:
         print(f"written: {', '.join(map(str, written))}")

@@ -4,10 +4,9 @@ With a path every function writes a picture; each returns it as an (h,w,3) array
 """
 
 from .branches import equilibria
-from .cloth import strains
 from .curves import convergence, diagram, heatmap, histories, lines
-from .loads import under_load
 from .pictures import draw, families, panel, reactions, vectors
+from .uses import strains, under_load
 
 __all__ = [
     "convergence",

@@ -11,8 +11,22 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
-from .colors import color_bar, color_map
-from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, overlap_style, style
+from .figure import (
+    CURVES,
+    INK,
+    SMALL,
+    TEXT,
+    Image,
+    Path,
+    color_bar,
+    color_map,
+    finish,
+    fit_height,
+    grid,
+    new,
+    overlap_style,
+    style,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
