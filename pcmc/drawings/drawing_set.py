@@ -1,4 +1,4 @@
-"""The drawings of a roof: a model in three dimensions and sheets of paper, written together."""
+"""The drawings of a roof: a model in three dimensions and sheets of paper, panels at true size too."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from ..certificate import Certificate
 from ..certificate.certificate import certified, warning_mark
 from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
-from . import dxf, pdf, views
+from . import dxf, views
 from .panel_sheets import flat_panels, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
 from .sheet import FORMATS, Sheet, SheetLine, add_frames, table_sheets
+from .sheet import write_pdf as write_pages
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
@@ -56,7 +57,7 @@ class DrawingSet:
             if suffix == ".dxf":
                 jobs.append((path, document.saveas))
             elif suffix == ".pdf":
-                jobs.append((path, partial(pdf.write_pdf, self.sheets)))
+                jobs.append((path, partial(write_pages, self.sheets)))
             else:
                 many = len(self.sheets) > 1
                 for k in range(len(self.sheets)):

@@ -89,7 +89,7 @@ class PanelNet:
             Patch(f"panel {k}", tensions[name]) for k, name in enumerate(self.panels["patch"], start=1)
         )
         X = np.concatenate([self.points, middle])
-        return Surface(X, faces, owner, patches, fixed=range(len(X)), plane=self.surface.plane)
+        return Surface(X, faces, owner, patches, fixed=np.ones(len(X), dtype=bool), plane=self.surface.plane)
 
     def write_obj(self, path: str | PathLike[str]) -> None:
         """Write the panels as polygons of a Wavefront .obj, a group per patch."""

@@ -18,10 +18,9 @@ from ..base.files import PathLike, atomic_writes, check_name, system_error, writ
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..cloth import CuttingPattern
 from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
-from ..panelling import PanelNet, Panels
+from ..panelling import Panels
 from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
@@ -145,44 +144,14 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
     return path, partial(write_structure, model=model)
 
 
-def analysis_paths(path: Path) -> dict[str, Path]:
-    """The files of an analysis beside the structural model, by what they hold."""
-    names = {name: f"{path.stem}-{name}.csv" for name in ("cases", "patches", "supports", "cables")}
-    return {name: path.with_name(file) for name, file in names.items()} | {
-        "picture": path.with_name(f"{path.stem}-cases.png")
-    }
-
-
 def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
     """The tables and the picture of an analysis beside the structural model."""
     from ..plot import under_load  # needs the extra plot
 
-    paths = analysis_paths(path)
-    jobs: FileJobs = [
-        (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
-    ]
-    return [*jobs, (paths["picture"], partial(under_load, analysis))]
-
-
-def paint_families(path: Path, schedule: Panels, view: Any) -> None:
-    """Draw panels, coloured by family."""
-    from ..plot import families  # needs the extra plot
-
-    families(schedule, path, view=view)
-
-
-def paint_net(path: Path, net: PanelNet, view: Any) -> None:
-    """Draw quads or hexagons, coloured by planarity."""
-    from ..plot import panel_planarity  # needs the extra plot
-
-    panel_planarity(net, path, view=view)
-
-
-def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
-    """Draw the strips on the roof, coloured by the strain of the cloth."""
-    from ..plot import strains  # needs the extra plot
-
-    strains(pattern, path, view=view)
+    jobs: FileJobs = [(path.with_name(f"{path.stem}-cases.png"), partial(under_load, analysis))]
+    for name, table in analysis.tables.items():
+        jobs.insert(-1, (path.with_name(f"{path.stem}-{name}.csv"), partial(table.to_csv, index=False)))
+    return jobs
 
 
 def draw_picture(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import warnings
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -20,7 +21,7 @@ from generators import hypar_roof, spherical_cap, two_squares
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.drawings import FORMATS, drawing_set, pdf
+from pcmc.drawings import FORMATS, drawing_set
 from pcmc.drawings.panel_sheets import panel_sheets, triangles_at_true_size
 from pcmc.drawings.sheet import LAYERS, box, corner, drawing_area
 from pcmc.plan import Plan
@@ -277,7 +278,7 @@ def test_all_files_appear_together_or_none(tmp_path, monkeypatch, drawings):
         raise OSError(28, "No space left on device")
 
     (tmp_path / "roof.dxf").write_text("old")
-    monkeypatch.setattr(pdf, "write_pdf", fail)
+    monkeypatch.setattr(sys.modules["pcmc.drawings.drawing_set"], "write_pages", fail)
     with refused(FileError, what=str(tmp_path / "roof.pdf")):
         drawings.write(tmp_path / "roof.dxf", tmp_path / "roof.pdf", tmp_path / "roof.svg")
     assert [path.name for path in tmp_path.iterdir()] == ["roof.dxf"]

@@ -117,6 +117,7 @@ def test_a_parallel_net_has_parallel_edges_and_one_along_the_normals_has_not(rec
 
 
 def test_planarity_is_that_of_libigl_and_compas(rectangle):
+    import igl
     from compas.geometry import distance_line_line
 
     net = panel_net(rectangle, 1.0, "quads")
@@ -127,7 +128,6 @@ def test_planarity_is_that_of_libigl_and_compas(rectangle):
                 gap = distance_line_line((a, c), (b, d))
                 lengths = np.linalg.norm(np.subtract(a, c)) + np.linalg.norm(np.subtract(b, d))
                 assert net.panels["planarity"][k] == pytest.approx(2.0 * gap / lengths, abs=1e-12)
-            igl = pytest.importorskip("igl")
             found = igl.quad_planarity(net.points, loops.astype(np.int64))
             assert np.allclose(np.abs(np.ravel(found)), net.panels["planarity"][chosen], atol=1e-9)
 
