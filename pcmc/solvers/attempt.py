@@ -42,7 +42,7 @@ class NewtonOptions:
     levels : number of 1→4 refinements; the surface is solved before the first and after each.
     min_quality : vertices are redistributed along the shape while the worst triangle has less quality.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
-    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
+    backend : factorisation, ``"pardiso"`` or ``"superlu"``; by default the fastest here.
     """
 
     tolerance: float = 1e-12
