@@ -3,8 +3,7 @@
 Each set of parts goes into an environment of its own, from the wheel of this checkout; the least set that
 designs a roof also on the other versions of Python. A row has the size of the installed files, the number of
 packages, and the processor time until the README's roof is solved and certified: the first command, which
-compiles, and the same one again. On one thread that is about the time by the
-clock where nothing else runs.
+compiles, and the same one again. On one thread that is about the time by the clock where nothing else runs.
 """
 
 import argparse
@@ -26,7 +25,7 @@ ONE = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"
 
 def row(python: str, parts: str, wheel: Path, scratch: Path) -> dict[str, object]:
     """Install a set, measure it, and solve, certify and prove the roof with it where it has the command."""
-    place = scratch / f"{Path(python).name} {parts or 'bare'}".replace(",", "-").replace(" ", "-")
+    place = Path(tempfile.mkdtemp(dir=scratch))
     subprocess.run([python, "-m", "venv", place], check=True)
     before = size(place)
     what = f"{wheel}[{parts}]" if parts else str(wheel)
