@@ -32,7 +32,7 @@ class NesterovOptions:
     armijo : ``"printed"``, Eq. (25) as printed, E(Q) ≤ E(Y) + ξ t ‖∇E(Q)‖², which lets E rise; or
         ``"sufficient"``, the standard test of the source cited there, E(Q) ≤ E(Y) - ξ t ‖∇E(Y)‖².
         Here Y = P + γ d and Q = Y - t ∇E(Y).
-    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to run all iterations. Where all
+    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 to run all iterations. Where all
         forces are small it is taken relative to them; see ``converged_below``.
     iterations : the most iterations.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
