@@ -147,7 +147,8 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
 
 def analysis_paths(path: Path) -> dict[str, Path]:
     """The files of an analysis beside the structural model, by what they hold."""
-    names = {name: f"{path.stem}-{name}.csv" for name in ("cases", "patches", "supports", "cables")}
+    tables = ("cases", "patches", "supports", "cables", "members", "member-forces")
+    names = {name: f"{path.stem}-{name}.csv" for name in tables}
     return {name: path.with_name(file) for name, file in names.items()} | {
         "picture": path.with_name(f"{path.stem}-cases.png")
     }
