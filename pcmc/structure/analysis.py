@@ -20,7 +20,7 @@ from ..surface.geometry import face_areas
 from .calculix import CalculixError, expect_program, run_as_far
 from .gas import balanced_pressure
 from .loads import Step
-from .member_forces import MemberForces, member_tables, members_in
+from .member_forces import MemberForces, member_tables, members_in, sentences
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
@@ -245,7 +245,9 @@ class Analysis:
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
-        return "\n".join([*units, numbers, *self.answers()])
+        members = [self.members.to_string(index=False, float_format=lambda v: f"{v:.4g}")]
+        members = [*members, *sentences(self.model, self.model.units)] if len(self.members) else []
+        return "\n".join([*units, numbers, *members, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:

@@ -117,8 +117,8 @@ def _elements(model: StructuralModel) -> Iterator[str]:
 def _beams(model: StructuralModel) -> Iterator[str]:
     """Members, as rectangles with the stiffness of their profiles, and what holds their ends.
 
-    They have nodes of their own, tied to those of the sheets: where membranes and beams share nodes, CalculiX's
-    own constraints contradict each other from one increment to the next.
+    They have nodes of their own, tied to those of the sheets: where membranes and beams share nodes, the
+    constraints that CalculiX makes for them contradict each other from one increment to the next.
     """
     X, up, vertices = model.standing.vertices, np.array(model.surface.plane.normal), model.beam_vertices
     number = np.zeros(len(X), dtype=np.int64)

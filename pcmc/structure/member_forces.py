@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints, cached_array
+from ..base.units import Units
 from ..forces.cables import directions, pull_along
 from ..surface.geometry import area_vectors
 from .frames import Frame
@@ -193,3 +194,32 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
             columns |= dict(zip(COLUMNS, beam.within.T, strict=True))
             along.append(pd.DataFrame(columns | {"moved": moved}))
     return pd.DataFrame(rows), pd.concat(along, ignore_index=True) if along else pd.DataFrame()
+
+
+def sentences(model: StructuralModel, units: Units) -> list[str]:
+    """For each beam in a line: what it carries at rest, how stiff it must be, and what would not bend."""
+    lines, force, length = list[str](), units.behind("force"), units.behind("length")
+    for beam in members_at_rest(model):
+        N, share = beam.balance
+        most = beam.largest
+        far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
+        about = (
+            f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)},"
+        )
+        about += f" M/N = {beam.eccentricity:.2g}{length}; {beam.enough:.2g} times its E A and E I keep the"
+        about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
+        if beam.line.wall:
+            about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
+            cable = f"; wall = false, cable = {N:.3g} finds the shape that does not bend"
+            about += cable if N > 0.0 else "; that is a thrust, which no cable has"
+        lines.append(about)
+    return lines
+
+
+def moment_unit(units: Units) -> str:
+    """The unit of moments, with the blank before it; empty without units.
+
+    >>> moment_unit(Units("m", "kN"))
+    ' kN m'
+    """
+    return f" {units.force} {units.length}" if units else ""

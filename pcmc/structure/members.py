@@ -40,6 +40,9 @@ class Member:
     ends : of a beam, where a support holds it: "hinged", free to bend, but not to twist; or "clamped".
     propped : whether columns or a wall below hold a member on a Curve along Π's normal, all along it.
     name : of the member, for tables; by default the name that ``on`` is, or "member".
+
+    >>> Member("wall 1", Profile.tube(0.1, 0.005), Material(2.1e8)).label
+    'wall 1'
     """
 
     on: str | Curve
