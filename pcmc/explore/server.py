@@ -16,13 +16,13 @@ from typing import Any
 
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
-from ..project import certified_files, load
+from ..project import load
+from ..project.writing import certified_files
 from ..surface import Surface
-from . import page_data, saving
+from . import page_data
 from .following import ProjectFallback, Stop
-from .listening import LOOPBACK, PageHandler, listen
-from .protocol import ACTS, REQUESTS, RequestError, check_request, pack
-from .roof import ShownRoof, Watch, signature
+from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, check_request, listen, pack
+from .roof import ShownRoof, Watch, save, signature
 from .session import Session, SessionState, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -100,18 +100,15 @@ class Explorer:
             return pack(*self._opening(name, self.session(name).state()))
         session = self.session(name)
         given = check_request(REQUESTS[act], asked)
-        answer = self._act if act in ACTS else self._question
-        return pack(*(answer(session, act, given, gone) or ({"superseded": True},)))
-
-    def _act(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
-        """The state that an act leads to; None if newer values have arrived meanwhile."""
+        if act not in ACTS:
+            return pack(*(self._question(session, act, given, gone) or ({"superseded": True},)))
         values = (given,) if act in ("follow", "settle") else ()
         options = {} if values else given | ({"gone": gone} if act == "meet" else {})
         state = getattr(session, act)(*values, **options)
-        if state.superseded:
-            return None
+        if state.superseded:  # newer values have arrived meanwhile
+            return pack({"superseded": True})
         about = page_data.state_data(state, self.origin, moving=act == "follow")
-        return {"superseded": False, **about}, page_data.fields(state, self.origin)
+        return pack({"superseded": False, **about}, page_data.fields(state, self.origin))
 
     def _question(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
         """What is asked about the surface shown; None if the page shows another one before it is found."""
@@ -168,7 +165,7 @@ class Explorer:
         with self._saving:
             if self.start is not start:
                 raise RequestError("the file was changed while this save waited; save again")
-            path, note = saving.save(self.roof, state.surface, name, replace, state.aims)
+            path, note = save(self.roof, state.surface, name, replace, state.aims)
             if path == self.roof.path:
                 outcome = dataclasses.replace(self.roof.outcome, project=load(path))
                 self.roof = dataclasses.replace(self.roof, outcome=outcome)

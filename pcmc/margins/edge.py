@@ -34,6 +34,7 @@ from ..solvers import solve
 from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
+from ..surface.lagrange import expect_flat
 from .varied import Varied
 
 FIRST, LARGEST = 0.05, 0.15  # the first and the longest step along the branch, as of ``follow``
@@ -111,7 +112,8 @@ def find_end(
         down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
-            detail += f" near {_worst_place(there)}"
+            worst = there.faces[worst_face(there, ~there.roof)[0]]  # of walls, triangles may vanish
+            detail += f" near ({', '.join(f'{x:.3g}' for x in there.vertices[worst].mean(axis=0))})"
     last = branch.last.vertices
     before = branch.surfaces.get(len(branch.points) - 2, branch.last).vertices
     motion = last - before if before.shape == last.shape else np.zeros_like(last)
@@ -138,12 +140,6 @@ def _follow(
     if branch.ending is Ending.STOPPED and not over[0]:
         raise KeyboardInterrupt
     return branch
-
-
-def _worst_place(surface: Surface) -> str:
-    """Where the worst triangle of the roof is, walls left out as their triangles may vanish."""
-    worst = surface.faces[worst_face(surface, ~surface.roof)[0]]
-    return f"({', '.join(f'{x:.3g}' for x in surface.vertices[worst].mean(axis=0))})"
 
 
 def _compression(branch: Branch) -> float | None:
@@ -276,6 +272,7 @@ def margin(
         certificate, surface = surface.certificate, surface.surface
     if not isinstance(surface, Surface):
         validate.refuse("surface", type(surface).__name__, "a Surface or a Result", error=SurfaceError)
+    expect_flat(surface, "margin")
     validate.number("most", most, above=1.0)
     validate.integer("meshes", meshes, least=1)
     varied = Varied.of(surface, what, towards)

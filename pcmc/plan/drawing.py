@@ -15,15 +15,25 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.units import conversion_note, size_note
+from ..base.units import conversion_note, unlikely_size
 from ..surface.curves import Curve, polyline
 from ..surface.pieces import Piece, point_text, two_digits
 from ..surface.summary import listed
-from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out
 from .lines import EXACT, Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
-from .strokes import Stroke, Strokes, read_strokes
+from .strokes import (
+    UNDERSTOOD,
+    Label,
+    Layer,
+    Stroke,
+    Strokes,
+    heights_of,
+    labels_of,
+    layer_of,
+    left_out,
+    read_strokes,
+)
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
 LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
@@ -116,7 +126,14 @@ class _Reader:
 
     def drawing(self, path: Path) -> Drawing:
         """All parts, each checked."""
-        outline = self._outline()
+        loops = self._loops(self.edge)
+        if len(loops) > 1:
+            ends = ", ".join(f"{listed(loop.labels)} at {point_text(loop.ends[0])}" for loop in loops[:3])
+            where = f"layer {loops[0].layer!r}"
+            text = f"{where} has {len(loops)} closed curves ({ends}); a roof has one outline"
+            text += ": put the edges of openings on a layer 'hole NAME'"
+            raise PlanError(text, what=where, found=len(loops), expected=1)
+        outline, self.layers["the outline"] = loops[0].curve, loops[0].source
         holes: dict[str, Curve] = {}
         self._add("hole", hole_label, "hole", holes, self._loops)
         check_count("holes", len(holes))
@@ -210,17 +227,6 @@ class _Reader:
             text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
             raise PlanError(text, what=where, where=(_plain(one[1]), _plain(two[1])), found=gap)
         return paths
-
-    def _outline(self) -> Curve:
-        paths = self._loops(self.edge)
-        if len(paths) > 1:
-            ends = ", ".join(f"{listed(path.labels)} at {point_text(path.ends[0])}" for path in paths[:3])
-            where = f"layer {paths[0].layer!r}"
-            text = f"{where} has {len(paths)} closed curves ({ends}); a roof has one outline"
-            text += ": put the edges of openings on a layer 'hole NAME'"
-            raise PlanError(text, what=where, found=len(paths), expected=1)
-        self.layers["the outline"] = paths[0].source
-        return paths[0].curve
 
     def _add(
         self,
@@ -349,7 +355,7 @@ class _Reader:
         if hidden:
             self.notes.append(f"hidden, left out: entities of the layers {', '.join(hidden)}")
         width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
-        note = size_note(width, self.units, self.content.unit)
+        note = unlikely_size(width, self.units, self.content.unit)
         self.notes += [note] if note else []
         if note := self.content.note or conversion_note(self.content.unit, self.units):
             self.notes.insert(0, note)

@@ -18,7 +18,6 @@ from ..base.files import PathLike, atomic_writes, check_name, system_error, writ
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..cloth import CuttingPattern
 from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
@@ -145,38 +144,14 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
     return path, partial(write_structure, model=model)
 
 
-def analysis_paths(path: Path) -> dict[str, Path]:
-    """The files of an analysis beside the structural model, by what they hold."""
-    tables = ("cases", "patches", "supports", "cables", "members", "member-forces")
-    names = {name: f"{path.stem}-{name}.csv" for name in tables}
-    return {name: path.with_name(file) for name, file in names.items()} | {
-        "picture": path.with_name(f"{path.stem}-cases.png")
-    }
-
-
 def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
     """The tables and the picture of an analysis beside the structural model."""
     from ..plot import under_load  # needs the extra plot
 
-    paths = analysis_paths(path)
-    jobs: FileJobs = [
-        (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
-    ]
-    return [*jobs, (paths["picture"], partial(under_load, analysis))]
-
-
-def paint_families(path: Path, schedule: Panels, view: Any) -> None:
-    """Draw panels, coloured by family."""
-    from ..plot import families  # needs the extra plot
-
-    families(schedule, path, view=view)
-
-
-def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
-    """Draw the strips on the roof, coloured by the strain of the cloth."""
-    from ..plot import strains  # needs the extra plot
-
-    strains(pattern, path, view=view)
+    jobs: FileJobs = [(path.with_name(f"{path.stem}-cases.png"), partial(under_load, analysis))]
+    for name, table in analysis.tables.items():
+        jobs.insert(-1, (path.with_name(f"{path.stem}-{name}.csv"), partial(table.to_csv, index=False)))
+    return jobs
 
 
 def draw_picture(

@@ -167,16 +167,12 @@ class Analysis:
     @property
     def members(self) -> pd.DataFrame:
         """A row per case and beam; see ``member_tables``."""
-        return self._members[0]
+        return member_tables((case.name, case.members) for case in self.cases)[0]
 
     @property
     def member_forces(self) -> pd.DataFrame:
         """A row per case and point of a beam; see ``member_tables``."""
-        return self._members[1]
-
-    @cached_property
-    def _members(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        return member_tables((case.name, case.members) for case in self.cases)
+        return member_tables((case.name, case.members) for case in self.cases)[1]
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -245,7 +241,7 @@ class Analysis:
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
-        members = [self.members.to_string(index=False, float_format=lambda v: f"{v:.4g}")]
+        members = [self.members.to_string(index=False, float_format="{:.4g}".format)]
         members = [*members, *sentences(self.model, self.model.units)] if len(self.members) else []
         return "\n".join([*units, numbers, *members, *self.answers()])
 

@@ -19,6 +19,7 @@ from ..forces.pinching import standing_part
 from ..forces.triangles import effective_tensions
 from ..surface import Surface, expect_surface
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.lagrange import expect_flat
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports
 from .gas import Gas
@@ -99,6 +100,7 @@ class StructuralModel:
         solved: Any = self.surface  # or a surface, which has neither of these
         surface = getattr(solved, "surface", solved)
         expect_surface(surface)
+        expect_flat(surface, "the structural model")
         hint = "give Material(young=..., poisson=...)"
         for name, material in _each(self.material, surface.patches, "patch"):
             if not isinstance(material, Material):

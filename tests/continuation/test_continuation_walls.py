@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from branches import tension_of_height
+from nightly import at_night
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
@@ -26,6 +27,7 @@ def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
         assert certify(solve(near, target="stationary", min_quality=0.0).surface).index == index
 
 
+@pytest.mark.nightly
 def test_fold_of_two_caps_on_a_coarse_mesh():
     start = solve(two_caps(1.2), target="stationary").surface
     branch = follow(start, Direction({"large": -1.0, "small": -1.0}, relative=True), folds=1)
@@ -47,7 +49,7 @@ def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
     assert after.residual <= 1e-9
 
 
-@pytest.mark.parametrize("largest", [0.15, 0.04])
+@pytest.mark.parametrize("largest", [0.15, *at_night(0.04)])
 def test_wall_comes_down_at_the_same_tensions_whatever_the_steps(largest):
     start = solve(two_squares(4, alpha_aux=1.0)).surface
     branch = follow(start, "wall", 3.0, largest=largest)
