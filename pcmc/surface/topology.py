@@ -18,7 +18,6 @@ from ..base.compiled import compiled
 
 SHEET, CURVE, POINT = 0, 1, 2
 SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle's sides, in the order of the corners opposite
-GAPS = (16001, 3301, 701, 301, 132, 57, 23, 10, 4, 1)  # of Shell's sort
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,13 +341,17 @@ def _number_edges(F: Ints, n: int) -> tuple[Ints, Ints, Ints]:
     count = 0
     for v in range(n):
         start, end = first[v], first[v + 1]
-        for gap in GAPS:
+        gap = 1  # Shell's sort: by insertion, of buckets with many sides at large distances first
+        while 9 * gap < end - start:
+            gap = 3 * gap + 1
+        while gap > 0:
             for i in range(start + gap, end):
                 high, where, j = higher[i], place[i], i
                 while j >= start + gap and higher[j - gap] > high:
                     higher[j], place[j] = higher[j - gap], place[j - gap]
                     j -= gap
                 higher[j], place[j] = high, where
+            gap //= 3
         for i in range(start, end):
             if i == start or higher[i] != higher[i - 1]:
                 edges[count, 0], edges[count, 1] = v, higher[i]
