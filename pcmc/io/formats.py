@@ -95,9 +95,7 @@ FORMATS = {
     ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "unit")),
     ".obj": Format("obj", loses=("order",)),
     ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices"), loses=("order",)),
-    ".stl": Format(
-        "stl", separate=True, bare=True, loses=tuple(name for name, part in PARTS.items() if part.words)
-    ),
+    ".stl": Format("stl", separate=True, bare=True, loses=TOLD),
     ".vtp": Format("vtk", scalars="both", reserved=OURS),
     ".vtu": Format("vtk", scalars="both", reserved=OURS),
     ".glb": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),

@@ -112,7 +112,8 @@ def find_end(
         down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
-            detail += f" near {_worst_place(there)}"
+            worst = there.faces[worst_face(there, ~there.roof)[0]]  # of walls, triangles may vanish
+            detail += f" near ({', '.join(f'{x:.3g}' for x in there.vertices[worst].mean(axis=0))})"
     last = branch.last.vertices
     before = branch.surfaces.get(len(branch.points) - 2, branch.last).vertices
     motion = last - before if before.shape == last.shape else np.zeros_like(last)
@@ -139,12 +140,6 @@ def _follow(
     if branch.ending is Ending.STOPPED and not over[0]:
         raise KeyboardInterrupt
     return branch
-
-
-def _worst_place(surface: Surface) -> str:
-    """Where the worst triangle of the roof is, walls left out as their triangles may vanish."""
-    worst = surface.faces[worst_face(surface, ~surface.roof)[0]]
-    return f"({', '.join(f'{x:.3g}' for x in surface.vertices[worst].mean(axis=0))})"
 
 
 def _compression(branch: Branch) -> float | None:
@@ -212,7 +207,12 @@ class Margin:
         holds = f"stays a saddle of index {self.index}" if self.index else "holds"
         none_now = math.isnan(self.factor)
         number = self.value if none_now else self.factor
-        of = {"tension": "tensions", "cable": "tensions of the cables"}.get(self.what, self.what)
+        many = {
+            "tension": "tensions",
+            "cable": "tensions of the cables",
+            "cable_weight": "weights of cables",
+        }
+        of = many.get(self.what, self.what)
         at_least, mesh = self.ends_by in OPEN, " on this mesh" * (self.ends_by is MarginEnd.MESH)
         shown = f"{number:.4g}" if at_least else with_bar(number, self.bar)
         shown += f"{units.behind(self.dimension)} of {self.what}" if none_now else f" times the {of}"
@@ -242,9 +242,10 @@ def margin(
     Parameters
     ----------
     surface : at rest.
-    what : ``"pressure"``, ``"snow"``, ``"weight"``, ``"tension"`` (with cables), ``"cable"`` or ``"volume"``:
-        all of a kind in proportion; or one of them, such as ``"pressure of hall"``; the name of a patch or
-        cable alone means its tension. What is 0 now is added, alike on all patches.
+    what : ``"pressure"``, ``"snow"``, ``"weight"`` and ``"tension"`` (both with cables), ``"cable"``,
+        ``"cable_weight"`` or ``"volume"``: all of a kind in proportion; or one of them, such as
+        ``"pressure of hall"``; the name of a patch or cable alone means its tension. What is 0 now is added,
+        alike on all patches or cables.
     towards : ``"more"`` or ``"less"``; by default loads and walls pull more, sheets and cables less.
     most : followed up to this factor, or down to 1 over it; of what is 0 now, up to so many times the
         largest pressure, or tension over size.
