@@ -269,7 +269,8 @@ class Outcome:
 
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
-        return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
+        plan = None if self.project is None else self.project.plan
+        return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
 
     def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
         """The cutting pattern of what is shown."""
