@@ -101,7 +101,7 @@ def pattern(
         wanted, own = given.of(project.pattern), project.output
         own = replace(own, pattern=files, sheet=sheet or own.sheet)
         own.check(project.units, project.structure, wanted)
-        wanted.check(projects.surface_of(project))
+        projects.of_material(wanted, project.structure, projects.surface_of(project))
         roof = build.roof(project, progress)
         progress("cutting strips")
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)

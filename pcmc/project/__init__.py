@@ -32,6 +32,7 @@ from .settings import (
     Remeshing,
     Structure,
     check_names,
+    of_material,
     schedule_paths,
 )
 from .solving import solve_project
@@ -57,6 +58,7 @@ __all__ += ["draw_picture", "drawing_reference", "files_of", "is_drawing", "is_p
 __all__ += [
     "load",
     "model_job",
+    "of_material",
     "opened",
     "paint_families",
     "paint_strain",

@@ -22,7 +22,7 @@ from ..surface import Surface
 from .checking import in_file
 from .file import Project
 from .outcome import EXTENSIVE, OnStep, Outcome, ignore
-from .settings import AccuracyWanted
+from .settings import AccuracyWanted, of_material
 from .start import start_of
 
 if TYPE_CHECKING:
@@ -71,8 +71,8 @@ def _check_wishes(project: Project, surface: Surface) -> None:
             structure.check(surface)
         if structure is not None and structure.run and (output.structure or output.report):
             expect_program()
-        if project.pattern is not None and output.pattern:
-            project.pattern.check(surface)
+        if project.pattern is not None and (output.pattern or output.report):
+            of_material(project.pattern, structure, surface)
         if project.margin:
             from ..margins.varied import Varied  # takes long to import
 
