@@ -12,7 +12,7 @@ stability certificate      lowest modes, Morse index; the verdict on a finished 
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
-margins                    how far a roof is from the edge of its stability
+margins equilibria         how far a roof is from the edge; its other equilibria, and the barriers to them
 design                     tensions that meet targets
 compas                     meshes of COMPAS, and a server for them
 panelling structure        families of panels; structural models
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .cloth import CuttingPattern, cutting_pattern
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
+    from .equilibria import Equilibria, find_equilibria
     from .existence import solve
     from .forces.curvature import curvature_error, mean_curvature, target_curvature
     from .forces.functional import energy, gradient
@@ -68,6 +69,7 @@ __all__ = [
     "CuttingPattern",
     "Design",
     "Direction",
+    "Equilibria",
     "FewerFamilies",
     "Gas",
     "Line",
@@ -99,6 +101,7 @@ __all__ = [
     "errors",
     "explore",
     "fewer_families",
+    "find_equilibria",
     "follow",
     "gradient",
     "hessian",
@@ -133,6 +136,7 @@ _NAMES = {
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
     "forces.rooms": ("room_volume_gradients", "room_volumes"),
+    "equilibria": ("Equilibria", "find_equilibria"),
     "existence": ("solve",),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),

@@ -89,7 +89,7 @@ def files_of(study: str) -> dict[str, str]:
             names.add(name)
             waiting += _needs(module, name)
     found = {
-        _name(_path(module)): _hash(_reached(_tree(_path(module)), frozenset(names)))
+        _name(_path(module)): _hash(_path(module), frozenset(names))
         for module, names in wanted.items()
         if names
     }
@@ -284,17 +284,19 @@ def _name(path: Path) -> str:
 
 @cache
 def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def _hash(tree: ast.Module) -> str:
-    """Of the code as it would be written without comments and docstrings, and with all names public."""
-    bare = ast.parse(ast.unparse(tree))
-    for node in ast.walk(bare):
+    """The code of a file without docstrings."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             first, *rest = node.body or [ast.Pass()]
             node.body = (rest or [ast.Pass()]) if _is_words(first) else node.body
-    return _short(PRIVATE.sub("", ast.unparse(bare)))
+    return tree
+
+
+@cache
+def _hash(path: Path, names: frozenset[str]) -> str:
+    """Of what these names reach of a file, without comments and docstrings, and with all names public."""
+    return _short(PRIVATE.sub("", ast.unparse(_reached(_tree(path), names))))
 
 
 def _is_words(node: ast.stmt) -> bool:

@@ -13,7 +13,7 @@ from small_project import SMALL
 from generators import bezier_hall, spherical_cap
 from pcmc import explore, solve
 from pcmc.explore.session import Session, solved_start
-from pcmc.plot import raster
+from pcmc.plot import scene as raster
 
 
 def pytest_addoption(parser):
@@ -73,7 +73,7 @@ def explorer():
     running.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def driver(tmp_path_factory):
     """A browser without a window, whose downloads are in ``downloads``."""
     folder = tmp_path_factory.mktemp("browser")

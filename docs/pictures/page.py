@@ -25,7 +25,7 @@ options = webdriver.ChromeOptions()
 options.binary_location = str(shutil.which("chromium"))
 for flag in ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"):
     options.add_argument(flag)
-running = explore.start_roof(read_roof("explored.toml"))
+running = explore.start(read_roof("explored.toml"))
 driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(str(shutil.which("chromedriver"))))
 try:
     driver.set_window_size(1200, 860)

@@ -34,6 +34,7 @@ from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
+from ..surface.lagrange import expect_flat
 from .estimator import GROWTH, Goal, error_shares, evenness, size_field
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, row_name, vertex_numbers, with_bar
 
@@ -173,6 +174,7 @@ def solve_to_accuracy(
     validate.choice("accuracy_of", accuracy_of, ACCURACY_OF)
     validate.integer("most_triangles", most_triangles, least=1)
     expect_surface(surface)
+    expect_flat(surface, "solve_to_accuracy")
     check_places(wanted, surface)
     if importlib.util.find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")

@@ -22,6 +22,7 @@ from ..meshing.refinement import Projection, refine
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
+from ..surface.lagrange import expect_flat
 from .extrapolation import extrapolate
 from .persistence import MeshVerdict, compared, lost, shape_order
 from .quantities import Key, Reading, readings
@@ -162,6 +163,7 @@ def check_mesh(
     first = surface.surface if isinstance(surface, Result) else surface
     if not isinstance(first, Surface):
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
+    expect_flat(first, "check_mesh")
     validate.integer("most_triangles", most_triangles)
     sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
     finest = first.m * 4 ** (meshes - 1)

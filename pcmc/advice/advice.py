@@ -23,8 +23,7 @@ from ..plan.parts import BALANCED
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.pieces import two_digits
-from .rises import Rise, net_pressures
-from .supports import SHARES, as_sail, point_masts, ring_lines, with_rings
+from .rises import SHARES, Rise, as_sail, net_pressures, point_masts, ring_lines, with_rings
 
 if TYPE_CHECKING:
     from ..design import Design, Parameter, Target

@@ -53,7 +53,7 @@ def outlive(parent: int) -> None:
     os.killpg(0, signal.SIGKILL)
 
 
-def main() -> None:
+def answer_calls() -> None:
     """Answer until the other side closes: (True, value, ""), or (False, message, traceback)."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -86,4 +86,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    answer_calls()

@@ -200,12 +200,12 @@ def unit_in_file(system: int | str) -> tuple[str, str]:
     return next(((name, "") for name, unit in TABLE.items() if system in (unit.dxf, unit.rhino)), ("", note))
 
 
-def size_note(size: float, unit: str, drawn: str = "") -> str:
+def unlikely_size(size: float, unit: str, drawn: str = "") -> str:
     """A sentence on a plan whose size is unlikely in its unit, with the line to type; else empty.
 
     ``size`` is the larger side of the plan in ``unit``, ``drawn`` the unit that its drawing itself has.
 
-    >>> size_note(12000.0, "m"), size_note(12.0, "m")
+    >>> unlikely_size(12000.0, "m"), unlikely_size(12.0, "m")
     ('the plan is 12 km long; are its numbers in mm? Then type units = "mm"', '')
     """
     metres = size * length_factor(unit, "m")

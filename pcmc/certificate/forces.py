@@ -17,16 +17,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, read_only
 from ..base.tolerances import EXCESS
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import add_values
+from ..forces.mesh import Points, energy_mesh
 from ..forces.pinching import standing_part
-from ..forces.triangles import add_weights, energy_mesh, measure
+from ..forces.triangles import add_weights, measure
 from ..surface import Surface
 from ..surface.checks import lying
-from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
+from ..surface.geometry import segment_lengths
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
@@ -36,8 +37,10 @@ CableEnd = tuple[Cable, int, Floats]
 
 def loads(surface: Surface) -> Floats:
     """(m + c,3) the force on each triangle, (p - s) A ν of pressure and snow, -w A n of weight; and -g ℓ n on
-    each edge of cables."""
-    patch, vector = surface.patch_of_face, area_vectors(surface.vertices[surface.faces])
+    each edge of cables. On curved elements it is given at each point of the quadrature."""
+    mesh = energy_mesh(surface)
+    vector = Points.of(mesh, surface.vertices).area.reshape(-1, 3)
+    patch = np.repeat(mesh.patch, len(vector) // len(mesh.patch))
     found = surface.net_pressures[patch, None] * vector
     ends, _, weight = surface.cable_edges
     heavy = np.append(
@@ -51,7 +54,8 @@ def loads(surface: Surface) -> Floats:
 def load_places(surface: Surface) -> Floats:
     """(m + c,3) where the forces of ``loads`` act: the middles of the triangles and of the cables' edges."""
     X = surface.vertices
-    return np.concatenate([X[surface.faces].mean(axis=1), X[surface.cable_edges.ends].mean(axis=1)])
+    places = Points.of(energy_mesh(surface), X).place.reshape(-1, 3)
+    return np.concatenate([places, X[surface.cable_edges.ends].mean(axis=1)])
 
 
 def load(surface: Surface) -> float:
@@ -67,17 +71,17 @@ def along_normal(surface: Surface, forces: Floats) -> float:
 def by_cause(surface: Surface) -> dict[str, Floats]:
     """(n,3) the forces on the vertices: of tension, cables, weight, and of pressure less snow.
 
-    Of tension -Σ α ∂A, of pressure ⅓ Σ p A_T ν_T, a third of each triangle's. At a boundary these are not
+    Of tension -Σ α ∂A, of pressure Σ p ∫ N_i ν dA: of a flat triangle a third. At a boundary these are not
     -∇E: there the volume is that of a cone to the point of Π, whose side is under no pressure.
     """
-    X = surface.vertices
-    tension = measure(energy_mesh(surface, pressure=np.zeros(len(surface.patches))), X)[2]
-    cable, weight = np.zeros((2, *X.shape))
+    X, mesh = surface.vertices, energy_mesh(surface)
+    tension = measure(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
+    cable, weight, pressure = np.zeros((3, *X.shape))
     add_values(cables.elements(surface, X), cable)
     add_values(cable_weights.elements(surface, X), weight)
     add_weights(surface, X, weight)
-    third = area_vectors(X[surface.faces]) / 3.0 * surface.net_pressures[surface.patch_of_face, None]
-    pressure = vertex_sums(third, surface.faces, surface.n)
+    pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
+    np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))
     return {"tension": -tension, "cable": -cable, "weight": -weight, "pressure": pressure}
 
 

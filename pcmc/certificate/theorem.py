@@ -36,6 +36,7 @@ from ..stability.backward_error import backward_error
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
 from ..surface import Surface, expect_surface
+from ..surface.lagrange import expect_flat
 from .balls import SAFE, U
 from .lipschitz import lipschitz
 from .system import System, system
@@ -131,6 +132,7 @@ def verify(surface: Surface) -> Theorem:
     False
     """
     expect_surface(surface)
+    expect_flat(surface, "verify")
     try:
         return _proved(surface)
     except (_Unproved, SingularMatrix) as why:

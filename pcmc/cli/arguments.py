@@ -18,8 +18,11 @@ from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import LENGTHS
 from ..io import FORMATS, READ_ONLY
-from ..project import MOST_CHECKED, Outcome, Project
-from ..project.outcome import OnStep
+from ..project import Outcome, Output, Project
+from ..project.drawn import files_of
+from ..project.outcome import MOST_CHECKED, OnStep
+from ..project.varied import with_loads
+from ..project.writing import check_outputs
 from ..surface import Surface
 
 TOML, DXF = ".toml", ".dxf"
@@ -30,7 +33,7 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-def real(metavar: str, meaning: str) -> Any:
+def amount(metavar: str, meaning: str) -> Any:
     """An option with a number."""
     return option(metavar, meaning, parser=parsed_number)
 
@@ -45,7 +48,7 @@ def by_part(meaning: str) -> Any:
     return option("NAME=VALUE", meaning)
 
 
-def flag(name: str, meaning: str) -> Any:
+def switch(name: str, meaning: str) -> Any:
     """An option without a value."""
     return typer.Option(name, help=meaning)
 
@@ -81,10 +84,10 @@ UNCERTIFIED = "Accept a roof that is not certified or misses its targets; every 
 INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
 Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
 ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
-Start = Annotated[bool, flag("--start", START)]
-Cache = Annotated[bool, flag("--cache/--no-cache", CACHE)]
-Whole = Annotated[bool, flag("--whole", WHOLE)]
-MeshCheck = Annotated[bool | None, flag("--mesh-check/--no-mesh-check", MESH_CHECK)]
+Start = Annotated[bool, switch("--start", START)]
+Cache = Annotated[bool, switch("--cache/--no-cache", CACHE)]
+Whole = Annotated[bool, switch("--whole", WHOLE)]
+MeshCheck = Annotated[bool | None, switch("--mesh-check/--no-mesh-check", MESH_CHECK)]
 FileUnits = Annotated[str, option("NAME", UNITS)]
 OUTPUT = "-o", "--output"
 MANY_FILES = option("FILE", "File to write; may be repeated.", *OUTPUT)
@@ -116,7 +119,7 @@ class Loads:
         names |= {"volume": [room.name for room in surface.rooms]}
         flags = {key: f"--{key.replace('_', '-')}" for key in names}
         given = {f"{key}s": by_name(own, getattr(self, key), flags[key]) for key, own in names.items()}
-        return projects.with_loads(surface, given)
+        return with_loads(surface, given)
 
 
 @dataclass(frozen=True)
@@ -139,7 +142,7 @@ class Build:
 
     whole: Whole = False
     cache: Cache = True
-    allow_uncertified: Annotated[bool, flag("--allow-uncertified", UNCERTIFIED)] = False
+    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
@@ -178,6 +181,13 @@ def load(file: Path, units: str = "") -> Project:
     """The project in a file, which may be a mesh or a drawing alone."""
     check_suffix(file)
     return projects.load(file, units=units)
+
+
+def output_of(file: Path, **output: Any) -> Output:
+    """What a command writes, in the terms of a project; refused before any work if it cannot be written."""
+    wanted = Output(**output)
+    check_outputs(wanted.paths, inputs=files_of(file))
+    return wanted
 
 
 def check_suffix(file: Path) -> None:

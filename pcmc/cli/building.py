@@ -13,9 +13,13 @@ from ..base.errors import FileError, OptionError
 from ..base.units import Units
 from ..certificate.certificate import require_certified
 from ..io import FORMATS, write
+from ..plot import families
+from ..project.drawn import files_of
+from ..project.settings import Output, Structure, schedule_paths
+from ..project.writing import analysis_jobs, check_outputs, model_job, schedule_jobs, write_all
 from ..structure import analyse
 from ..structure.calculix import expect_program
-from . import NOT_CERTIFIED, OK, arguments, reports
+from . import arguments, reports
 from .arguments import (
     MANY_FILES,
     OUTPUT,
@@ -24,13 +28,13 @@ from .arguments import (
     Input,
     MeshCheck,
     ViewName,
+    amount,
     count,
-    flag,
     option,
     parsed_number,
-    real,
+    switch,
 )
-from .progress import working
+from .reports import working
 
 CSV = ".csv"
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
@@ -50,19 +54,19 @@ DENSITY = "Mass per volume; above 0, self-weight is a load."
 RUN = "Run CalculiX on each case and combination; by default as the project says."
 SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
-Tolerance = Annotated[float | None, real("LENGTH", TOLERANCE)]
+Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
 
 
 def panels_(
     *,
     file: Input,
-    tolerance: Annotated[float, real("LENGTH", "Largest difference of edges within a family.")],
+    tolerance: Annotated[float, amount("LENGTH", "Largest difference of edges within a family.")],
     output: Annotated[list[Path] | None, MANY_FILES] = None,
     picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
-    change: Annotated[float | None, real("LENGTH", CHANGE)] = None,
+    change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
     mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
-    walls: Annotated[bool, flag("--walls", "Triangles of walls are panels, too.")] = False,
+    walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
     """Sort the panels of a roof into families of congruent triangles; write a schedule.
@@ -79,13 +83,13 @@ def panels_(
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    outputs = projects.Output(picture=picture, view=seen).paths
+    outputs = Output(picture=picture, view=seen).paths
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
-        outputs += projects.schedule_paths(path) if suffix == CSV else [path]
-    projects.check_outputs(outputs, inputs=projects.files_of(file))
+        outputs += schedule_paths(path) if suffix == CSV else [path]
+    check_outputs(outputs, inputs=files_of(file))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
     with working() as progress:
@@ -104,16 +108,14 @@ def panels_(
         writing = partial(write, surface=schedule.surface, units=roof.units)
         for path in files:
             is_table = path.suffix.lower() == CSV
-            works += projects.schedule_jobs(path, schedule) if is_table else [(path, writing)]
+            works += schedule_jobs(path, schedule) if is_table else [(path, writing)]
         if picture is not None:
-            works.append((picture, partial(projects.paint_families, schedule=schedule, view=seen)))
-        written = projects.write_all(works, progress)
+            works.append((picture, partial(families, schedule, view=seen)))
+        written = write_all(works, progress)
     print(schedule.text(roof.units))
     if change is not None:
         print(f"\n{fewer}")
-    if written:
-        print(f"written: {', '.join(map(str, written))}")
-    return OK if schedule.certificate.certified and roof.good else NOT_CERTIFIED
+    return reports.ended(schedule.certificate.certified and roof.good, written)
 
 
 def draw_(
@@ -126,7 +128,7 @@ def draw_(
     height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
     line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
     tolerance: Tolerance = None,
-    panel_sheets: Annotated[bool, flag("--panel-sheets", TRUE_SIZE)] = False,
+    panel_sheets: Annotated[bool, switch("--panel-sheets", TRUE_SIZE)] = False,
     build: Build,
 ) -> int:
     """Draw a roof: plan, elevations, sections, setting-out points, panels; in .dxf, .pdf or .svg.
@@ -136,7 +138,7 @@ def draw_(
       pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
-    projects.check_outputs(projects.Output(drawings=output).paths, inputs=projects.files_of(file))
+    arguments.output_of(file, drawings=output)
     heights = None if height is None else [parsed_number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as progress:
@@ -145,10 +147,9 @@ def draw_(
         documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets)
         options = {"scale": scale, "heights": heights, "lines": lines}
         drawings = roof.drawing_set(documents, anyway=build.allow_uncertified, **options)
-        written = projects.write_all(drawings.files(*output), progress)
-    sheets = f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}"
-    print(f"{sheets}; written: {', '.join(map(str, written))}")
-    return OK if roof.good else NOT_CERTIFIED
+        written = write_all(drawings.files(*output), progress)
+    print(f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}", end="; ")
+    return reports.ended(roof.good, written)
 
 
 def report_(
@@ -169,7 +170,7 @@ def report_(
       pcmc report roof.toml -o roof.pdf
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
-    projects.check_outputs(projects.Output(report=output).paths, inputs=projects.files_of(file))
+    arguments.output_of(file, report=output)
     anyway = build.allow_uncertified
     with working() as progress:
         project = arguments.load(file, units)
@@ -188,12 +189,11 @@ def report_(
         documents = _documents(roof, tolerance=tolerance, date=date)
         listed = {file.name: "project" if roof.result is not None else "surface"}
         report = roof.report(documents, files=listed, anyway=anyway)
-        projects.write_all([(output, report.write)], progress)
-    print(f"written: {output}")
-    return OK if roof.good else NOT_CERTIFIED
+        written = write_all([(output, report.write)], progress)
+    return reports.ended(roof.good, written)
 
 
-def _documents(roof: projects.Outcome, **given: Any) -> projects.Output:
+def _documents(roof: projects.Outcome, **given: Any) -> Output:
     """What a project says about its documents, with what the command line says instead."""
     return replace(roof.output, **{name: value for name, value in given.items() if value is not None})
 
@@ -212,13 +212,13 @@ class Model:
     """What the command line says of a structural model, instead of the project."""
 
     thickness: Annotated[list[str] | None, option("NAME=VALUE", THICKNESS)] = None
-    young: Annotated[float | None, real("VALUE", "Young's modulus.")] = None
-    poisson: Annotated[float | None, real("VALUE", "Poisson's ratio, 0.3 by default.")] = None
-    density: Annotated[float | None, real("VALUE", DENSITY)] = None
-    gravity: Annotated[float | None, real("VALUE", "Length/s²; by default 9.81 m/s².")] = None
-    snow: Annotated[float | None, real("VALUE", SNOW)] = None
+    young: Annotated[float | None, amount("VALUE", "Young's modulus.")] = None
+    poisson: Annotated[float | None, amount("VALUE", "Poisson's ratio, 0.3 by default.")] = None
+    density: Annotated[float | None, amount("VALUE", DENSITY)] = None
+    gravity: Annotated[float | None, amount("VALUE", "Length/s²; by default 9.81 m/s².")] = None
+    snow: Annotated[float | None, amount("VALUE", SNOW)] = None
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
-    cable_area: Annotated[float | None, real("VALUE", "Section of the cables.")] = None
+    cable_area: Annotated[float | None, amount("VALUE", "Section of the cables.")] = None
 
 
 def structure(
@@ -226,7 +226,7 @@ def structure(
     file: Input,
     output: Annotated[Path, option("INP", "File to write, .inp.", *OUTPUT)],
     given: Model,
-    run: Annotated[bool | None, flag("--run/--no-run", RUN)] = None,
+    run: Annotated[bool | None, switch("--run/--no-run", RUN)] = None,
     build: Build,
 ) -> int:
     """Write a structural model for CalculiX: prestressed membranes, supports, loads; and run it.
@@ -240,7 +240,7 @@ def structure(
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
       pcmc structure roof.toml -o roof.inp --run
     """
-    projects.check_outputs(projects.Output(structure=output).paths, inputs=projects.files_of(file))
+    arguments.output_of(file, structure=output)
     with working() as progress:
         project = arguments.load(file)
         start = projects.surface_of(project)
@@ -251,24 +251,23 @@ def structure(
         values |= {name: value for name, value in vars(given).items() if value not in (None, [])}
         values |= {"thickness": thick[patches[0]] if even else thick} if thick else {}
         values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
-        wanted = projects.Structure(**values)
+        wanted = Structure(**values)
         wanted.check(start)
         if run := wanted.run if run is None else run:
             expect_program()
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        jobs = [projects.model_job(output, model)]
+        jobs = [model_job(output, model)]
         analysis = analyse(model, progress=progress) if run else None
-        jobs += projects.analysis_jobs(output, analysis) if analysis is not None else []
-        written = projects.write_all(jobs, progress)
+        jobs += analysis_jobs(output, analysis) if analysis is not None else []
+        written = write_all(jobs, progress)
     if model.note:
         print(model.note)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-        return OK if roof.good else NOT_CERTIFIED
+        return reports.ended(roof.good)
     print(analysis)
-    print(f"written: {', '.join(map(str, written))}")
-    return OK if roof.good and analysis.carried else NOT_CERTIFIED
+    return reports.ended(roof.good and analysis.carried, written)

@@ -11,9 +11,12 @@ from .. import project as projects
 from ..base import validate
 from ..cloth import CuttingOptions
 from ..cloth.sheets import pattern_files
-from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, count, option, real
-from .progress import working
+from ..plot import strains
+from ..project.settings import of_material
+from ..project.writing import write_all
+from . import arguments, reports
+from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, amount, count, option
+from .reports import working
 
 WIDTH = "Width of the cloth: no strip is wider, with its allowances."
 SEAM = "A seam from point to point along geodesics, instead of others there; may be repeated."
@@ -31,16 +34,16 @@ PICTURE = "Picture to draw: the strips on the roof, coloured by strain."
 class Cutting:
     """What the command line says of a cutting pattern, instead of the project."""
 
-    width: Annotated[float | None, real("LENGTH", WIDTH)] = None
+    width: Annotated[float | None, amount("LENGTH", WIDTH)] = None
     strips: Annotated[int | None, count("Number of strips of each sheet, instead of a width.")] = None
     seam: Annotated[list[str] | None, option("X,Y,X,Y", SEAM)] = None
-    direction: Annotated[float | None, real("DEGREES", DIRECTION)] = None
+    direction: Annotated[float | None, amount("DEGREES", DIRECTION)] = None
     compensation: Annotated[str | None, option("WARP,WEFT", COMPENSATION)] = None
     stiffness: Annotated[str | None, option("WARP,WEFT", STIFFNESS)] = None
-    poisson: Annotated[float | None, real("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
-    allowance: Annotated[float | None, real("LENGTH", ALLOWANCE)] = None
-    hem: Annotated[float | None, real("LENGTH", HEM)] = None
-    notches: Annotated[float | None, real("LENGTH", NOTCHES)] = None
+    poisson: Annotated[float | None, amount("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
+    allowance: Annotated[float | None, amount("LENGTH", ALLOWANCE)] = None
+    hem: Annotated[float | None, amount("LENGTH", HEM)] = None
+    notches: Annotated[float | None, amount("LENGTH", NOTCHES)] = None
 
     def of(self, own: CuttingOptions | None) -> CuttingOptions:
         """The pattern of a project with these values."""
@@ -94,22 +97,19 @@ def pattern(
       pcmc pattern roof.toml --width 2.4 --compensation 0.4,1.5 --allowance 0.04 -o cloth.csv
     """
     seen, files = arguments.parsed_view(view), output or []
-    outputs = projects.Output(pattern=files, picture=picture, view=seen).paths
-    projects.check_outputs(outputs, inputs=projects.files_of(file))
+    arguments.output_of(file, pattern=files, picture=picture, view=seen)
     with working() as progress:
         project = arguments.load(file, units)
         wanted, own = given.of(project.pattern), project.output
         own = replace(own, pattern=files, sheet=sheet or own.sheet)
         own.check(project.units, project.structure, wanted)
-        projects.of_material(wanted, project.structure, projects.surface_of(project))
+        of_material(wanted, project.structure, projects.surface_of(project))
         roof = build.roof(project, progress)
         progress("cutting strips")
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)
         jobs: list[Any] = pattern_files(cloth, files, roof.units, own.sheet, roof.name)
         if picture is not None:
-            jobs.append((picture, partial(projects.paint_strain, pattern=cloth, view=seen)))
-        written = projects.write_all(jobs, progress)
+            jobs.append((picture, partial(strains, cloth, view=seen)))
+        written = write_all(jobs, progress)
     print(cloth.text(roof.units))
-    if written:
-        print(f"written: {', '.join(map(str, written))}")
-    return OK if roof.good else NOT_CERTIFIED
+    return reports.ended(roof.good, written)

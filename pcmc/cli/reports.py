@@ -1,13 +1,21 @@
-"""What the commands print about a designed roof: how it ended, its mesh check and its margins."""
+"""What the commands print about a designed roof, and their progress on a terminal that can redraw a line."""
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..certificate.tables import lean_texts
-from ..project import MOST_CHECKED, Outcome
-from .progress import working
+from ..project.outcome import MOST_CHECKED, Outcome
+from . import NOT_CERTIFIED, OK
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 FAR = 10.0  # degrees: walls that lean less are not reported
 UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
@@ -48,8 +56,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(outcome.under_load)
     if outcome.advice:
         print("\n  ".join(outcome.advice))
-    if outcome.files:
-        print(f"written: {', '.join(map(str, outcome.files))}")
+    ended(outcome.good, outcome.files)
 
 
 def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False) -> None:
@@ -75,3 +82,62 @@ def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:
         with working() as progress:
             found = roof.margin(what, progress)
         print(f"margin: {found.text(roof.units)}")
+
+
+def ended(good: bool, written: Iterable[Path] = ()) -> int:
+    """Print the files written; return the exit code of a roof that is ``good`` or not."""
+    if names := ", ".join(map(str, written)):
+        print(f"written: {names}")
+    return OK if good else NOT_CERTIFIED
+
+
+@contextmanager
+def working() -> Iterator[Callable[[str], None]]:
+    """A function that shows the name of the current step."""
+    if not _live():
+        yield lambda step: None
+        return
+    from rich import progress
+    from rich.console import Console
+
+    columns = (
+        progress.BarColumn(20),
+        progress.TimeElapsedColumn(),
+        progress.TextColumn("{task.description}", markup=False),
+    )
+    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda step: bar.update(task, description=step)
+
+
+@contextmanager
+def sweeping(console: Console | None = None) -> Iterator[Callable[[Any], None] | None]:
+    """A function of a sweep's Progress that draws cases, time left and verdicts; None without a terminal."""
+    if console is None and not _live():
+        yield None
+        return
+    from rich import progress
+    from rich.console import Console
+    from rich.table import Column
+
+    rest = Column(ratio=1, no_wrap=True, overflow="ellipsis")
+    columns = (
+        progress.BarColumn(20),
+        progress.MofNCompleteColumn(table_column=Column(no_wrap=True, min_width=9)),
+        progress.TextColumn("{task.fields[left]} left", table_column=Column(min_width=12)),
+        progress.TextColumn("{task.description}", markup=False, table_column=rest),
+    )
+    with progress.Progress(*columns, console=console or Console(stderr=True), expand=True) as bar:
+        task = bar.add_task("", total=None, left="?")
+
+        def draw(state: Any) -> None:
+            counts = sorted(state.counts.items(), key=lambda item: (-item[1], item[0]))
+            text = " · ".join(f"{verdict} {count}" for verdict, count in counts)
+            left = timedelta(seconds=round(state.seconds_left))
+            bar.update(task, total=state.total, completed=state.done, left=str(left), description=text)
+
+        yield draw
+
+
+def _live() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"

@@ -13,6 +13,7 @@ from typing import Any
 from ..base import errors
 from ..base.errors import MissingExtra, PcmcError
 from ..base.interrupts import termination_as_interrupt
+from ..base.libraries import require
 from . import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.PlanWarning)
@@ -77,10 +78,7 @@ def _run(arguments: list[str]) -> int:
 def _command() -> Callable[..., Any]:
     """The command line."""
     for library in ("typer", "rich"):
-        try:
-            __import__(library)
-        except ModuleNotFoundError as error:
-            raise MissingExtra(error.name or library, "cli") from None
+        require(library, extra="cli")
     import typer
 
     from .app import app

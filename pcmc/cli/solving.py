@@ -1,19 +1,32 @@
-"""The commands solve, certify and remesh. Each returns the exit code."""
+"""The commands that solve: solve, certify, remesh, and sweep, over combinations. Each returns the code."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from . import NOT_CERTIFIED, OK, reports
+from ..base.errors import OptionError
+from ..base.files import suffix_of
+from ..base.libraries import require
+from ..io import FORMATS, READ_ONLY
+from ..project.drawn import files_of
+from ..project.file import with_rise
+from ..project.planning import proposal_text
+from ..project.settings import check_names
+from ..project.writing import check_outputs, surface_files, write_all
+from . import INTERRUPTED, NOT_CERTIFIED, OK, reports
 from .arguments import (
+    DXF,
     MANY_FILES,
+    TOML,
     UNCERTIFIED,
     Cache,
     FileUnits,
@@ -22,13 +35,18 @@ from .arguments import (
     MeshCheck,
     Shown,
     Whole,
+    amount,
     count,
-    flag,
     load,
+    named_values,
     option,
-    real,
+    output_of,
+    switch,
 )
-from .progress import working
+from .reports import sweeping, working
+
+if TYPE_CHECKING:
+    from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
@@ -44,7 +62,7 @@ SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
-Verify = Annotated[bool, flag("--verify", VERIFY)]
+Verify = Annotated[bool, switch("--verify", VERIFY)]
 
 
 def solve_(
@@ -55,11 +73,11 @@ def solve_(
     method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
     target: Annotated[str | None, option("NAME", TARGET)] = None,
     loads: Loads,
-    rise: Annotated[float | None, real("LENGTH", RISE)] = None,
-    apex: Annotated[float | None, real("LENGTH", APEX)] = None,
-    span_ratio: Annotated[float | None, real("NUMBER", SPAN_RATIO)] = None,
+    rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
+    apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
+    span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
-    allow_uncertified: Annotated[bool, flag("--allow-uncertified", UNCERTIFIED)] = False,
+    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY)] = None,
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF)] = None,
     most_triangles: Annotated[int | None, count(MOST_TRIANGLES)] = None,
@@ -85,7 +103,7 @@ def solve_(
     project = load(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
-    project = projects.with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
+    project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
@@ -101,7 +119,7 @@ def solve_(
         output=own,
     )
     if project.specified and not project.has_file:  # a drawing alone
-        print(projects.proposal_text(project))
+        print(proposal_text(project))
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, progress, changed=loads.change, **how)
@@ -121,7 +139,7 @@ def certify_(
     what: Shown,
     meshes: Annotated[int | None, count(MESHES)] = None,
     margin: Annotated[list[str] | None, option("WHAT", MARGIN)] = None,
-    whole: Annotated[bool, flag("--whole", WHOLE_INDEX)] = False,
+    whole: Annotated[bool, switch("--whole", WHOLE_INDEX)] = False,
     verify: Verify = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
@@ -158,12 +176,12 @@ def certify_(
 def remesh_(
     *,
     file: Input,
-    edge_length: Annotated[float, real("LENGTH", "Edge length of the triangles.")],
+    edge_length: Annotated[float, amount("LENGTH", "Edge length of the triangles.")],
     output: Annotated[list[Path], MANY_FILES],
-    near_curves: Annotated[float | None, real("LENGTH", "Edge length at junctions and boundaries.")] = None,
-    chord: Annotated[float | None, real("LENGTH", CHORD)] = None,
+    near_curves: Annotated[float | None, amount("LENGTH", "Edge length at junctions and boundaries.")] = None,
+    chord: Annotated[float | None, amount("LENGTH", CHORD)] = None,
     units: FileUnits = "",
-    solve: Annotated[bool, flag("--solve/--no-solve", "Solve and certify the new mesh.")] = True,
+    solve: Annotated[bool, switch("--solve/--no-solve", "Solve and certify the new mesh.")] = True,
 ) -> int:
     """Remesh a surface to an edge length, then solve and certify it. Patches and supports stay.
 
@@ -172,8 +190,7 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
-    written = projects.Output(files=output)
-    projects.check_outputs(written.paths, inputs=projects.files_of(file))
+    written = output_of(file, files=output)
     with working() as progress:
         project = replace(load(file, units), output=written)
         if solve:
@@ -183,7 +200,7 @@ def remesh_(
             progress("remeshing")
             roof = projects.start_of(project)
             surface, note = stage.remeshed(roof.surface)
-            projects.write_all(projects.surface_files(roof.changed(lambda _: surface), output), progress)
+            write_all(surface_files(roof.changed(lambda _: surface), output), progress)
     if not solve:
         if note:
             print(note)
@@ -193,3 +210,121 @@ def remesh_(
     if not outcome.files:
         print("nothing written (use --no-solve to write the new mesh)")
     return OK if outcome.files else NOT_CERTIFIED
+
+
+METHOD = "newton, nesterov or lbfgs; default: the project's."
+MESH_CHECK = "Solve each case on two finer meshes, too, for error bars."
+WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
+SEARCH = "Try further starts where the first leads to no equilibrium: slower, but tells what ends each way."
+PLOT = "Picture over one varied number or two: of the first --show, else apexes or the rise."
+SHOW = "What the table has: apex, area, volume, force, ..., or of one part: west.area. Repeat for several."
+RETRY = "Run the stored cases that failed again."
+STORE = "File for finished cases. The same command again runs only the missing ones."
+
+
+def sweep(
+    what: Annotated[str, typer.Argument(metavar="WHAT", help=WHAT)],
+    values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
+    method: Annotated[str | None, option("NAME", METHOD)] = None,
+    store: Annotated[Path | None, option("FILE", STORE)] = None,
+    csv: Annotated[Path | None, option("FILE", "Table to write (.csv or .parquet).")] = None,
+    every: Annotated[bool, switch("--all", "Write all columns, not only the first ones.")] = False,
+    plot: Annotated[Path | None, option("FILE", PLOT)] = None,
+    show: Annotated[list[str] | None, option("QUANTITY", SHOW)] = None,
+    workers: Annotated[int | None, count("Local processes; default: one per processor.")] = None,
+    scheduler: Annotated[str | None, option("ADDRESS", "Dask scheduler to use: tcp://HOST:8786.")] = None,
+    time_limit: Annotated[float, amount("SECONDS", "Time limit per case, in seconds.")] = 600.0,
+    mesh_check: Annotated[bool, switch("--mesh-check", MESH_CHECK)] = False,
+    search: Annotated[bool, switch("--search", SEARCH)] = False,
+    retry_failed: Annotated[bool, switch("--retry-failed", RETRY)] = False,
+) -> int:
+    """Solve every combination of the values; exit code 0 if all are certified.
+
+    For a project or a surface, NAME is PATCH.tension, PATCH.pressure, PATCH.weight or PATCH.snow of a patch
+    or wall, CABLE.tension or CABLE.weight of a cable, or ROOM.volume of a room that has one. For a project it
+    may also be the keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of
+    the third corner); or the shift of a whole divider, hole, support or named point along x, y or z: "wall
+    1.x". For a generator it is one of its parameters, or an option of the method. With a store, values may be
+    added later: only new cases are run. If the project file has changed, name a new store.
+    The table has the parameters, the verdict, the apex of each patch, the rise, the area, and the largest
+    reaction per length, or what --show names; with --all it has every number of the certificate, too. Cells
+    are empty where nothing is at rest.
+
+    \b
+    Examples:
+      pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
+      pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
+    """
+    from ..certificate.quantities import dimension_of
+    from ..sweep import draw_sweep, run, short_table, write_table
+    from ..sweep.projects import column_labels
+    from ..sweep.store import FAILED
+    from ..sweep.tables import TABLES, columns_of
+
+    inputs = files_of(what) if Path(what).exists() else ()
+    check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
+    if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
+        require("pyarrow")
+    check_names((), plot)
+    for name in show or ():
+        dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
+    options = {"mesh_check": mesh_check, "search": search}
+
+    def resume(kept: int, missing: int) -> None:
+        if kept:
+            print(f"{store}: {kept} cases are finished, {missing} to run")
+
+    with sweeping() as draw:
+        cases = _cases(what, values, method, options)
+        table = run(
+            cases,
+            store,
+            scheduler=scheduler,
+            workers=workers,
+            time_limit=time_limit,
+            retry_failed=retry_failed,
+            on_record=draw,
+            on_resume=resume,
+        )
+    if table.empty:
+        return INTERRUPTED
+    first = short_table(table, list(cases.grid), show or ())
+    if csv is not None:
+        write_table(csv, table if every else first)
+    labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, table))
+    if plot is not None:
+        draw_sweep(table, list(cases.grid), plot, labels, *(show or ())[:1])
+    print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}", na_rep=""))
+    for name in show or ():
+        if not columns_of(table, name, list(cases.grid)):
+            print(f"no case has {name}")
+    failed = table[table["status"].isin(FAILED)]
+    for message, alike in failed.groupby("message", sort=False):  # each reason once
+        others = f" and {len(alike) - 1} more" if len(alike) > 1 else ""
+        print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
+    if len(table) < len(cases):
+        return INTERRUPTED
+    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    return OK if good.all() else NOT_CERTIFIED
+
+
+def _cases(what: str, values: list[str], method: str | None, options: dict[str, bool]) -> Sweep:
+    """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
+    from ..sweep import Sweep, solve_case
+    from ..sweep.projects import project_sweep
+
+    given: dict[str, list[Any]] = {}
+    for name, listed in map(named_values, values):
+        if name in given:
+            raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
+        given[name] = listed
+    grid = {name: listed for name, listed in given.items() if len(listed) > 1}
+    grid = grid or given  # one case, whose names are checked as those of any other
+    fixed = {name: listed[0] for name, listed in given.items() if name not in grid}
+    if Path(what).suffix.lower() in (TOML, DXF, *FORMATS, *READ_ONLY):
+        return project_sweep(what, grid, fixed, method=method, **options)
+    if ":" not in what:
+        kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
+        raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
+    about: dict[str, Any] = {name: True for name, wanted in options.items() if wanted}
+    return Sweep(solve_case, grid, about | {"generator": what, "method": method or "newton"} | fixed)

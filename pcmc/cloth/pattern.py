@@ -15,6 +15,7 @@ from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
+from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .cut_mesh import CutMesh, cut_mesh
 from .flattening import FOLDED, Flat
@@ -78,6 +79,7 @@ def cutting_pattern_of(
 ) -> CuttingPattern:
     """The cutting pattern that ``options`` ask for; the rest as of ``cutting_pattern``."""
     expect_surface(surface)
+    expect_flat(surface, "the cutting pattern")
     options.check(surface)
     certificate = certified(surface, anyway, certificate)
     base = with_lines(cut_mesh(surface, _narrowest(surface, options) / ACROSS), options.lines, surface.plane)

@@ -4,7 +4,6 @@ Gives ``to_meshes``, ``from_meshes``, functions of meshes and plain data, and th
 ``compas.rpc.Proxy`` (``python -m pcmc.compas``). May import ``certificate``, ``io`` and those below them.
 """
 
-from .meshes import from_meshes, to_meshes
-from .service import certify, read, solve, write
+from .meshes import certify, from_meshes, read, solve, to_meshes, write
 
 __all__ = ["certify", "from_meshes", "read", "solve", "to_meshes", "write"]

@@ -9,7 +9,7 @@ from contextlib import suppress
 from ..base.errors import MissingExtra, PcmcError
 
 
-def main() -> int:
+def command() -> int:
     """Serve, or set up; 2 if that cannot be."""
     parser = argparse.ArgumentParser(prog="python -m pcmc.compas", description=__doc__, allow_abbrev=False)
     parser.add_argument("--folder", help="let pcmc read and write in this folder, make a new secret, and end")
@@ -18,11 +18,11 @@ def main() -> int:
         parser.add_argument(name, action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     try:
-        from .server import serve, set_up
+        from .server import serve_calls, set_up
 
         if given.folder is None:
             with suppress(KeyboardInterrupt):
-                serve(given.port)
+                serve_calls(given.port)
         else:
             print(f"settings for Proxy, with its secret: {set_up(given.folder)}")
     except (PcmcError, MissingExtra) as error:
@@ -32,4 +32,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command())

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, MissingExtra, SurfaceError
+from ..base.errors import FileError, SurfaceError
+from ..base.libraries import require
 from ..io.mesh_data import FIXED, FREE, SLIDING, coincident, given_values
 from ..io.polygons import cut_polygons
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room
@@ -28,10 +29,9 @@ Places = Mapping[str, Mapping[int, int]]  # by mesh name and key, the index of t
 
 def mesh_class() -> Any:
     """``compas.datastructures.Mesh``, or MissingExtra."""
-    try:
-        from compas.datastructures import Mesh
-    except ImportError:
-        raise MissingExtra("compas", "compas") from None
+    require("compas", extra="compas")
+    from compas.datastructures import Mesh
+
     return Mesh
 
 
@@ -59,7 +59,7 @@ def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> lis
     for name, mesh in named.items():
         values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given[name]
         for key in [key for key, default in known.items() if default is MISSING and key not in values]:
-            refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
+            _refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
         patches.append(Patch(name, **values))
     return patches
 
@@ -84,7 +84,7 @@ def read_whole(named: Mapping[str, Any]) -> WholeMesh:
     for other in owners[1:]:
         if named[other].attributes[KEY] != values:
             text = f"attributes[{KEY!r}] differs from that of mesh {owners[0]!r}; keep one of the two"
-            refuse(KEY, other, text)
+            _refuse(KEY, other, text)
 
     def made(kind: Any, row: Mapping[str, Any]) -> Any:
         """A part of a surface, with tuples for lists."""
@@ -101,7 +101,7 @@ def read_whole(named: Mapping[str, Any]) -> WholeMesh:
             tuple(map(HeldCurve.from_plain, values.get("curves", ()))),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({_reason(error)}); without it Π is z = 0")
+        _refuse(KEY, owners[0], f"attributes[{KEY!r}] is damaged ({_reason(error)}); without it Π is z = 0")
 
 
 class Vertex(NamedTuple):
@@ -123,7 +123,7 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
     for name, mesh in named.items():
         used = set(chain.from_iterable(mesh.face.values()))
         if lost := used - set(mesh.vertex):
-            refuse("faces", name, f"a face names vertex {min(lost)}, which the mesh does not have")
+            _refuse("faces", name, f"a face names vertex {min(lost)}, which the mesh does not have")
         unused += len(mesh.vertex) - len(used)
         for key in filter(used.__contains__, mesh.vertex):
             row = mesh.default_vertex_attributes | mesh.vertex[key]
@@ -132,12 +132,12 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
             marked |= any(mark in row for mark in (SLIDES, *HELD))
             guide, planes = row.get(GUIDE), row.get(PLANES) or ()
             if not (guide is None or _is_index(guide)):
-                refuse(GUIDE, name, f"vertex {key}: {GUIDE!r} must be the number of a line or circle")
+                _refuse(GUIDE, name, f"vertex {key}: {GUIDE!r} must be the number of a line or circle")
             if not (isinstance(planes, Sequence) and all(map(_is_index, planes))):
-                refuse(PLANES, name, f"vertex {key}: {PLANES!r} must be a list of numbers of planes")
+                _refuse(PLANES, name, f"vertex {key}: {PLANES!r} must be a list of numbers of planes")
             point = [row.get(axis) for axis in "xyz"]
             if not all(isinstance(x, int | float | np.number) and math.isfinite(x) for x in point):
-                refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
+                _refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
             place = [float(x) for x in point if x is not None]
             vertices.append(Vertex(name, key, place, support, -1 if guide is None else guide, planes))
     if not vertices:
@@ -166,7 +166,7 @@ def shared_vertices(vertices: Sequence[Vertex], weld: bool) -> tuple[Ints, Ints]
     if len(apart):
         one, two = vertices[keep[place[apart[0]]]], vertices[apart[0]]
         text = f"vertex {two.key} is at {two.point}, and in mesh {one.mesh!r} at {one.point};"
-        refuse("vertices", two.mesh, f"{text} give a key to a common vertex only, or pass weld=True")
+        _refuse("vertices", two.mesh, f"{text} give a key to a common vertex only, or pass weld=True")
     return keep, place
 
 
@@ -189,7 +189,7 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
     except FileError as error:
         at = int(str(error.where))
         text = str(error).replace(f"face {at}", f"face {faces[at][0]}", 1)
-        refuse("faces", list(named)[mesh_of_face[at]], text)
+        _refuse("faces", list(named)[mesh_of_face[at]], text)
     return F, mesh_of_face[source], notes
 
 
@@ -205,18 +205,18 @@ def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) 
             if cable is None:
                 continue
             if not isinstance(cable, str):
-                refuse(CABLE, name, f"edge {ends}: {CABLE!r} must be a name, found {validate.shown(cable)}")
+                _refuse(CABLE, name, f"edge {ends}: {CABLE!r} must be a name, found {validate.shown(cable)}")
             one, two = sorted(places[name].get(int(key), -1) for key in re.findall(r"\d+", ends))
             if one < 0:
-                refuse(CABLE, name, f"the cable {cable!r} has the edge {ends}, which the mesh does not have")
+                _refuse(CABLE, name, f"the cable {cable!r} has the edge {ends}, which the mesh does not have")
             if tension is None or tensions.setdefault(cable, tension) != tension:
                 text = f"the edges of the cable {cable!r} need one and the same edge attribute {TENSION!r}"
-                refuse(CABLE, name, f"{text}; that of edge {ends} is {tension}")
+                _refuse(CABLE, name, f"{text}; that of edge {ends} is {tension}")
             edges.setdefault(cable, set()).add((one, two))
     return tuple(Cable(name, tensions[name], np.array(sorted(ends))) for name, ends in edges.items() if ends)
 
 
-def refuse(what: str, name: str, problem: str) -> NoReturn:
+def _refuse(what: str, name: str, problem: str) -> NoReturn:
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
 
 

@@ -26,14 +26,13 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler
 from ..base import validate
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError, unknown
 from ..base.files import atomic_write, check_name, check_regular, system_error, writing
-from . import service
+from ..base.libraries import require
+from . import meshes as service
 from .mesh_arrays import damaged_mesh
 
-try:
-    from compas.data import DataDecoder, DataEncoder
-    from compas.rpc import Server
-except ImportError:
-    raise MissingExtra("compas", "compas") from None
+require("compas", extra="compas")
+from compas.data import DataDecoder, DataEncoder  # noqa: E402
+from compas.rpc import Server  # noqa: E402
 
 HOST = "127.0.0.1"
 USER = "pcmc"
@@ -246,7 +245,7 @@ def write(path: str, meshes: Any, weld: bool = False, overwrite: bool = False, *
     service.write(place, meshes, weld, **options)
 
 
-def serve(port: int | None = None) -> None:
+def serve_calls(port: int | None = None) -> None:
     """Answer calls until Ctrl-C or ``Proxy.stop_server``; on the port of the settings unless one is given."""
     port = read_settings().port if port is None else port
     try:

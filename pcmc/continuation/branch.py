@@ -14,6 +14,7 @@ from ..base import validate
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..solvers.result import Callback
 from ..surface import Surface
+from ..surface.lagrange import expect_flat
 from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
 from .direction import Direction, Named, ParameterLine
@@ -238,6 +239,7 @@ def follow(
     """
     if not isinstance(surface, Surface):
         validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_flat(surface, "follow")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")
     chosen = validate.build(FollowOptions, "follow", options)

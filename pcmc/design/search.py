@@ -26,6 +26,7 @@ from ..certificate.measures import vertices_up
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, expect_surface
+from ..surface.lagrange import expect_flat
 from .outcome import Design, DesignStatus, NoStart
 from .sensitivity import slopes
 from .steps import StepPlan, Trial
@@ -92,6 +93,7 @@ def meet(
     (True, 0.555556)
     """
     expect_surface(surface)
+    expect_flat(surface, "meet")
     aims, parameters = as_targets(targets), as_parameters(vary)
     for target in aims:
         if not target.limits:

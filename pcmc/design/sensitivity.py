@@ -27,6 +27,7 @@ from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..surface import Surface, expect_surface
+from ..surface.lagrange import expect_flat
 from ..surface.values import rates_of
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
@@ -77,6 +78,7 @@ def sensitivities(
     curvature of roof        -0.500000
     """
     expect_surface(surface)
+    expect_flat(surface, "sensitivities")
     targets, parameters = as_targets(of), as_parameters(to)
     for parameter in parameters:
         parameter.check(surface)

@@ -5,6 +5,7 @@ Gives ``solve``, the package's own, and the parts of its search. May import ``co
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .. import solvers
@@ -71,8 +72,13 @@ def solve(
     the pressure is 2.50 times what the boundary's tension could carry on any smooth surface
     """
     first = solvers.solve(surface, method, callback, **options)
-    if method != "newton" or first.converged:
+    if method != "newton" or first.converged or first.surface.order > 1:
         return first
     from .search import search
 
-    return search(surface, first, callback, options)
+    flat = {name: value for name, value in options.items() if name != "order"}
+    found = search(surface, first, callback, flat)
+    if not found.converged or flat == options:
+        return found
+    curved = solvers.solve(found.surface, method, callback, **options | {"levels": 0})
+    return replace(curved, note="; ".join(filter(None, (found.note, curved.note))))

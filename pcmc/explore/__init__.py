@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .roof import ShownRoof
     from .server import Explorer, View
 
-__all__ = ["open_and_wait", "serve", "show", "start", "start_roof"]
+__all__ = ["open_and_wait", "serve", "show", "start"]
 
 
 def serve(
@@ -63,28 +63,28 @@ def open_and_wait(explorer: Explorer, open_browser: bool = True) -> None:
 
 
 def start(
-    surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "", units: Units | str = NO_UNITS
+    roof: Surface | ShownRoof,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    title: str = "",
+    units: Units | str = NO_UNITS,
+    watch: Callable[[], ShownRoof] | None = None,
 ) -> Explorer:
-    """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
-    from .roof import ShownRoof
+    """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``.
 
-    return start_roof(ShownRoof.of(surface, title, as_units(units)), host, port)
-
-
-def start_roof(
-    roof: ShownRoof, host: str = "127.0.0.1", port: int = 0, watch: Callable[[], ShownRoof] | None = None
-) -> Explorer:
-    """As ``start``, for the roof in a file; with ``watch``, which reads it again, the page follows the file.
+    With ``watch``, which reads the roof of a file again, the page follows that file.
 
     >>> from pcmc.explore.roof import read_roof
-    >>> explorer = start_roof(read_roof("notebooks/roof.toml"))
+    >>> explorer = start(read_roof("notebooks/roof.toml"))
     >>> explorer.start.certificate.verdict.name
     'STABLE'
     >>> explorer.close()
     """
+    from .roof import ShownRoof
     from .server import Explorer
 
-    return Explorer(roof, host, port, watch)
+    shown = roof if isinstance(roof, ShownRoof) else ShownRoof.of(roof, title, as_units(units))
+    return Explorer(shown, host, port, watch)
 
 
 def show(surface: Surface, height: int = 680, title: str = "", units: Units | str = NO_UNITS) -> View:

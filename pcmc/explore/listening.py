@@ -1,6 +1,10 @@
-"""HTTP: connections, who may ask, and what goes back. What is asked is the explorer's; see server.py.
+"""HTTP: connections, who may ask, requests checked by one table, and answers in one run of bytes.
 
-It is the standard library's, so that exploring needs the core install alone.
+The server is the standard library's, so that exploring needs the core install alone. An answer is a JSON
+header and the arrays that it names:
+4 bytes     length of the header, little-endian
+header      JSON, padded with spaces to a multiple of 4 bytes; "arrays" lists [name, type, count]
+arrays      one after another, little-endian, 4 bytes a number: "f" float32, "u" uint32
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ import secrets
 import select
 import socket
 import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -20,14 +25,20 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
-from ..base.errors import MissingExtra, OptionError, PcmcError
-from .protocol import REQUESTS, RequestError
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import plain
+from ..base.errors import MissingExtra, OptionError, PcmcError, unknown
+from ..base.validate import checked_name
+from ..design import Parameter, Target
+from ..surface.values import KINDS
 
 REQUEST_SECONDS = 30.0  # to send a request, from its first byte or the last answer; and to take an answer
 WAITING = 128  # connections that the system keeps until they are accepted
 LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 BYTES = "application/octet-stream"
 HEADERS = {
     "Cache-Control": "no-store",
@@ -192,7 +203,7 @@ class PageHandler(BaseHTTPRequestHandler):
         self._send(json.dumps({"error": " ".join(line.split())}).encode(), "application/json", status=status)
 
     def _send_file(self, name: str) -> None:
-        kind = TYPES.get(Path(name).suffix)
+        kind = MEDIA.get(Path(name).suffix)
         file = files(__package__).joinpath("page", name)
         if kind is None or not re.fullmatch(r"[\w.-]{1,80}", name) or not file.is_file():
             raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
@@ -212,3 +223,169 @@ class PageHandler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
+
+
+TYPES = {"f": "<f4", "u": "<u4"}
+LONGEST_NAME = 1000  # characters
+MOST_AIMS = 100  # targets, and parameters, of one request
+Check = Callable[[str, Any], Any]  # the value of a key, given its place in the request; else RequestError
+
+
+class RequestError(Exception):
+    """A request that the server answers with one line of error."""
+
+    def __init__(self, line: str, status: HTTPStatus = HTTPStatus.BAD_REQUEST) -> None:
+        super().__init__(line)
+        self.status = status
+
+
+def check_request(keys: Mapping[str, Check], asked: Mapping[str, Any], where: str = "") -> dict[str, Any]:
+    """The values in a request; a key that is not in the table is refused, one ending in ? may be missing.
+
+    >>> check_request({"number": whole, "name?": name}, {"number": 3})
+    {'number': 3}
+    """
+    known = {key.removesuffix("?"): check for key, check in keys.items()}
+    if odd := [key for key in asked if key not in known]:
+        raise RequestError(where + unknown("key", odd[0][:60], known))
+    given = (key for key in known if key in asked or key in keys)
+    return {key: known[key](where + key, asked.get(key)) for key in given}
+
+
+def or_null(check: Check) -> Check:
+    """The check of a value that may be null."""
+    return lambda what, value: None if value is None else check(what, value)
+
+
+def of_type(words: str, *types: type) -> Check:
+    """The check of a value of one of these types; true and false are no numbers."""
+
+    def check(what: str, value: Any) -> Any:
+        if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+            raise RequestError(f"{what}: expected {words}, found {value!r:.60}")
+        return value
+
+    return check
+
+
+whole, truth = of_type("a whole number", int), of_type("true or false", bool)
+
+
+def name(what: str, value: Any) -> str:
+    """A text that is not too long."""
+    of_type("a name", str)(what, value)
+    if len(value) > LONGEST_NAME:
+        raise RequestError(f"{what}: a name of {len(value)} characters: {value[:40]!r}...")
+    return str(value)
+
+
+def as_float(what: str, value: Any) -> float:
+    """A float."""
+    try:
+        return float(of_type("a number", int, float)(what, value))
+    except OverflowError:
+        raise RequestError(f"{what}: expected a number up to 1.8e308") from None
+
+
+def place(what: str, value: Any, words: str = "a point [x, y, z]", size: int = 3) -> list[float]:
+    """A point."""
+    if not isinstance(value, list) or len(value) != size:
+        raise RequestError(f"{what}: expected {words}, found {value!r:.60}")
+    return [as_float(what, x) for x in value]
+
+
+def variant_name(what: str, value: Any) -> str:
+    """The name of a new variant."""
+    words = " ".join(name(what, value).split())
+    if not 0 < len(words) <= 60:
+        raise RequestError(f"{what}: expected 1 to 60 characters, found {len(words)}")
+    return checked_name(what, words)
+
+
+def values_by_name(check: Check) -> Check:
+    """Values by name."""
+
+    def values(kind: str, listed: Any) -> dict[str, Any]:
+        if not isinstance(listed, dict):
+            raise RequestError(f"{kind}: expected numbers by name")
+        return {name(kind, one): check(f"{kind}: {one!r}", value) for one, value in listed.items()}
+
+    return values
+
+
+def entries(keys: Mapping[str, Check], made: Callable[..., Any]) -> Check:
+    """Objects, at least one, each with the first of the keys."""
+    first = next(iter(keys))  # without it there is no object
+
+    def objects(what: str, listed: Any) -> tuple[Any, ...]:
+        if not isinstance(listed, list) or not listed or not all(isinstance(entry, dict) for entry in listed):
+            raise RequestError(f"{what}: expected a list of objects, at least one")
+        if len(listed) > MOST_AIMS:
+            raise RequestError(f"{what}: {len(listed)} are too many; at most {MOST_AIMS}")
+        if not all(first in entry for entry in listed):
+            raise RequestError(f"{what}: each needs a {first}")
+        return tuple(made(**check_request(keys, entry, f"{what}: ")) for entry in listed)
+
+    return objects
+
+
+LIMIT = or_null(as_float)
+VALUES = {f"{kind}?": values_by_name(as_float) for kind in KINDS} | {"points?": values_by_name(place)}
+LIMITS = dict.fromkeys(("value?", "at_most?", "at_least?"), LIMIT)
+OWNER = or_null(  # what a target is of: a name, or the point of a height
+    lambda what, value: (
+        name(what, value) if isinstance(value, str) else tuple(place(what, value, "a name or a point", 2))
+    )
+)
+TARGET: dict[str, Check] = {"quantity": name, "of?": OWNER, **LIMITS, "name?": name}
+TIED: Check = lambda what, value: (  # noqa: E731 — a name, or those of patches that change together
+    tuple(name(what, one) for one in value) if isinstance(value, list) else name(what, value)
+)
+PARAMETER: dict[str, Check] = {"patch": TIED, "kind?": name, "low?": LIMIT, "high?": LIMIT}
+NUMBER: dict[str, Check] = {"number": whole}
+ACTS: dict[str, dict[str, Check]] = {
+    "follow": VALUES,
+    "settle": VALUES,
+    "meet": {"targets": entries(TARGET, Target), "vary": entries(PARAMETER, Parameter)},
+    "keep": {"name": variant_name},
+    "forget": NUMBER,
+    "recall": NUMBER,
+    "compare": {"number?": or_null(whole)},
+    **{act: {} for act in ("stabilise", "remesh", "undo", "redo", "reset", "stop", "state")},
+}
+"""The acts of a session, with the arguments that each takes; they answer with its state."""
+REQUESTS: dict[str, dict[str, Check]] = ACTS | {
+    "open": {"session?": or_null(name)},
+    "margin": {"what": name},
+    "save": {"name": name, "replace?": truth},
+    **{act: {} for act in ("check", "verify", "families", "news")},
+}
+"""All requests; those that are no acts answer with something else."""
+
+
+def pack(header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]] | None = None) -> bytes:
+    """One answer; float arrays become float32, integers uint32.
+
+    >>> packed = pack({"a": float("nan")}, {"x": np.array([1.5])})
+    >>> unpack(packed)
+    ({'a': None}, {'x': array([1.5], dtype=float32)})
+    """
+    listed, blocks = [], []
+    for name, array in (arrays or {}).items():
+        kind = "f" if array.dtype.kind == "f" else "u"
+        listed.append([name, kind, int(array.size)])
+        blocks.append(np.ascontiguousarray(array, dtype=TYPES[kind]).tobytes())
+    packed = json.dumps(plain({**header, "arrays": listed}), allow_nan=False).encode()
+    packed += b" " * (-len(packed) % 4)
+    return b"".join([len(packed).to_bytes(4, "little"), packed, *blocks])
+
+
+def unpack(message: bytes) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Header and flat arrays of an answer: the inverse of ``pack``."""
+    start = 4 + int.from_bytes(message[:4], "little")
+    header = json.loads(message[4:start])
+    arrays = {}
+    for name, kind, count in header.pop("arrays"):
+        arrays[name] = np.frombuffer(message, TYPES[kind], count, start)
+        start += 4 * count
+    return header, arrays

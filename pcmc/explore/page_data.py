@@ -55,9 +55,8 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
     }
     corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
     corners, faces = np.unique(corner, return_inverse=True)
-    topo, index = surface.topology, np.array([surface.n, 1])  # an edge is known by its vertices
-    cables = np.sort(surface.cable_edges[0], axis=1) @ index
-    curves = topo.curve_edge | np.isin(np.sort(topo.edges, axis=1) @ index, cables)
+    topo, curves = surface.topology, surface.topology.curve_edge.copy()
+    curves[topo.edge_numbers(surface.cable_edges[0])] = True
     of_wall = np.ones(len(topo.edges), dtype=bool)  # edges all of whose triangles belong to walls
     of_wall[topo.edge_of_face[surface.roof[surface.patch_of_face]]] = False
     return header, {

@@ -1,18 +1,29 @@
-"""The roof that a page opens: an outcome, how its file was when it was read, and the watch of that file."""
+"""The roof behind a page: how its file was read, the watch of that file, and saving it as a project."""
 
 from __future__ import annotations
 
 import os
+import re
 import threading
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from .. import project as projects
-from ..base.errors import MissingExtra, PcmcError
+from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
+from ..base.files import atomic_write
+from ..base.libraries import load_library
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
+from ..design.targets import measure
+from ..project import Project, surface_of
+from ..project.drawn import files_of
+from ..project.file import project_of, read_data
+from ..project.planning import project_text
+from ..project.values import data_with_values, differences
 from ..surface import Surface
 
 EVERY = 0.5  # seconds between two looks at the files
@@ -106,7 +117,7 @@ def read_roof(
 def signature(path: Path) -> Signature:
     """What tells that a file, or one that it refers to, was saved, replaced, or can no longer be read."""
     states: list[tuple[str, tuple[int, ...]]] = []
-    for file in projects.files_of(path):
+    for file in files_of(path):
         try:
             state, readable = file.stat(), os.access(file, os.R_OK)
             seen = (state.st_mtime_ns, state.st_size, state.st_mode, state.st_ino, readable)
@@ -155,3 +166,193 @@ class Watch:
             self.problem = " ".join(f"{type(error).__name__}: {error}".split())
         finally:
             self.working = False
+
+
+HELD = 1e-6  # relative misfit up to which a surface still meets a target
+FIELDS = ("quantity", "of", "value", "at_most", "at_least")
+OUTPUTS = {"files", "picture", "drawings", "panels", "structure", "report"}  # keys of [output] with names
+Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
+
+
+def save(
+    roof: ShownRoof, surface: Surface, name: str, replace: bool, aims: Aims | None = None
+) -> tuple[Path, str]:
+    """Write a project with the values of a surface into the folder of its file.
+
+    ``name`` is that of the file, without folder; with ``replace`` it may be that of a project that is there.
+    ``aims`` are targets met by the page, with what they vary. Returns the file, and what happened to its
+    targets. FileError for a name that leads elsewhere, or a file that may not be replaced; OptionError for
+    values that the project cannot hold; MissingExtra without tomlkit.
+    """
+    project, path = _place(roof, name)
+    text, note, left = project_with(roof, surface, aims, path.stem)
+    problem = ""
+    if not path.exists():
+        pass
+    elif not replace:
+        problem = "is there already; check that it may be replaced, or give another name"
+    elif path.resolve() == project.path.resolve():
+        if path.read_text(encoding="utf-8-sig") != project.text:
+            problem = "was changed since the page read it; save under another name"
+    else:
+        try:
+            read_data(path)
+        except FileError:
+            problem = "is no project of pcmc, so it is not replaced; give another name"
+    if problem:
+        raise FileError(f"{path.name} {problem}", what="name", found=path.name)
+    with atomic_write(path) as temporary:
+        ends = "\r\n" if project.path.exists() and b"\r\n" in project.path.read_bytes() else "\n"
+        temporary.write_text(text, encoding="utf-8", newline=ends)
+        try:  # read back: the file, not what it was made from, is what counts
+            saved = surface_of(project_of(temporary, read_data(temporary)[1]))
+        except FileError as error:
+            message = str(error).replace(str(temporary), path.name)
+            raise FileError(f"{message}; nothing is saved", what="name") from None
+        wrong = [f"{kind.removesuffix('s')} of {name}" for kind, name in differences(saved, surface, left)]
+        if wrong:
+            message = f"{path.name} would have another {', '.join(wrong[:5])}; nothing is saved"
+            raise OptionError(message, what="values", found=wrong)
+    return path, note
+
+
+def _place(roof: ShownRoof, name: str) -> tuple[Project, Path]:
+    """The roof's project, and the path of a file beside its; FileError for one that is elsewhere."""
+    if roof.project is None:
+        raise FileError("only a project or a drawing can be saved as a project; use Export", what="name")
+    name = name.strip() if name.strip().lower().endswith(".toml") else f"{name.strip()}.toml"
+    folder = roof.project.path.parent.resolve()
+    problem = ""
+    if not re.fullmatch(r"[^/\\:*?\"<>|.][^/\\:*?\"<>|]*", name) or not name.isprintable():
+        problem = "a name without folder is needed, such as variant.toml"
+    elif len(name) > 100 or len(name.encode()) > 240:  # file systems have 255 bytes
+        problem = "a shorter name is needed: at most 100 letters and 240 bytes, with .toml"
+    elif (folder / name).resolve().parent != folder:
+        problem = "this is a link to another folder; give another name"
+    elif (folder / name).exists() and not (folder / name).is_file():
+        problem = "this is no file; give another name"
+    if problem:
+        raise FileError(f"{name!r:.60}: {problem}", what="name", found=name[:60])
+    return roof.project, roof.project.path.parent / name
+
+
+def project_with(
+    roof: ShownRoof, surface: Surface, aims: Aims | None = None, stem: str = ""
+) -> tuple[str, str, set[tuple[str, str]]]:
+    """The text of a roof's project with the values of a surface, a note on its targets, and what these find.
+
+    Targets that the surface meets are kept: those of the page, else those of the file. Others become comments
+    or, for a rise, the tension: with them, solving the project would lead away from the surface saved. With
+    ``stem``, the name of the new file, the output gets other names, too.
+    """
+    tomlkit = load_library("tomlkit", "cad")
+    project = roof.project
+    assert project is not None
+    text = project.text or project_text(project.path, refer=True)[0]
+    document, data = tomlkit.parse(text), tomllib.loads(text)
+    given, note, dropped, found = data.get("targets"), "", "", {}
+    kept: Aims = roof.aims
+    if aims is not None and aims != kept and _meets(surface, aims[0]):
+        kept, points = aims, data["plan"].get("points", {})
+        entries = [_target(target, points) for target in aims[0]]
+        found = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        data.pop("targets", None)  # until a rise that these replace is a tension
+        note = f"with its targets: {', '.join(t.label for t in aims[0])}"
+    elif not _meets(surface, roof.aims[0]):
+        kept = (), ()
+        labels = ", ".join(t.label for t in roof.aims[0] if not _meets(surface, (t,)))
+        if given is not None:
+            del data["targets"]
+            dropped = tomlkit.dumps({"targets": document["targets"]}).strip()
+            note = f"its [targets] as comments, as the surface saved does not meet them ({labels})"
+        elif project.drawing is not None and len(project.drawing.heights):
+            problem = f"the drawing asks for {labels}, and the surface shown does not meet it"
+            raise OptionError(f"{problem}; change the drawing", what="targets")
+        else:
+            note = f"with tensions instead of heights that the surface saved does not have ({labels})"
+    sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
+    left = sought - differences(roof.surface, surface).keys() if kept == roof.aims else set()
+    data = data_with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
+    old = project.path.stem
+    if stem and stem != old:
+        output = data.get("output", {})
+        for key in OUTPUTS & output.keys():
+            names = output[key]
+            one = isinstance(names, str)
+            output[key] = _renamed(names, old, stem) if one else [_renamed(n, old, stem) for n in names]
+    if found and given is None:
+        document["targets"] = tomlkit.table()
+        for key, entries in found.items():
+            document["targets"][key] = tomlkit.array()
+            for entry in entries:
+                document["targets"][key].append(_item(tomlkit, entry))
+    _change(tomlkit, document, data)
+    if dropped:
+        document.add(tomlkit.nl())
+        for line in ("not met by the values saved here:", *dropped.splitlines()):
+            document.add(tomlkit.comment(line))
+    return tomlkit.dumps(document), note, left
+
+
+def _renamed(name: str, old: str, new: str) -> str:
+    """The name of an output of the project ``new``, from that of ``old``.
+
+    >>> _renamed("out/roof-plan.dxf", "roof", "higher"), _renamed("all.glb", "roof", "higher")
+    ('out/higher-plan.dxf', 'higher-all.glb')
+    """
+    path = Path(name)
+    rest = path.name.removeprefix(old) if path.name.startswith(old) else f"-{path.name}"
+    return path.with_name(new + rest).as_posix()
+
+
+def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
+    values = [(target, measure(surface, target).value) for target in targets]
+    return all(abs(value - t.nearest(value)) <= HELD * t.scale(surface) for t, value in values)
+
+
+def _target(target: Target, points: Mapping[str, Any]) -> dict[str, Any]:
+    """A target as in a project: a point that the plan names by its name."""
+    entry = {key: getattr(target, key) for key in FIELDS}
+    entry |= {"of": target.name} if target.name in points else {}
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in entry.items() if v is not None}
+
+
+def _parameter(parameter: Parameter) -> Any:
+    """A parameter as in a project: its name, a list of names, or a table."""
+    names = list(parameter.names) if len(parameter.names) > 1 else parameter.names[0]
+    entry = {k: v for k, v in vars(parameter).items() if v is not None} | {"patch": names}
+    return names if entry == {"patch": names, "kind": "tension"} else entry
+
+
+def _change(tomlkit: Any, table: Any, data: Mapping[str, Any]) -> None:
+    """Give a table of a document the values of ``data``; where nothing differs, the text stays."""
+    for key in [key for key in table if key not in data]:
+        del table[key]
+    for key, value in data.items():
+        if key in table:
+            _change_item(tomlkit, table, key, value)
+        else:
+            table[key] = _item(tomlkit, value)
+
+
+def _change_item(tomlkit: Any, table: Any, key: Any, value: Any) -> None:
+    """Give an entry of a table or a list another value."""
+    old = table[key]
+    if isinstance(value, Mapping) and isinstance(old, Mapping):
+        _change(tomlkit, old, value)
+    elif isinstance(value, list) and isinstance(old, list) and len(value) >= len(old) > 0:
+        for place in range(len(old)):
+            _change_item(tomlkit, old, place, value[place])
+        for more in value[len(old) :]:
+            old.append(more if isinstance(old, tomlkit.items.AoT) else _item(tomlkit, more))
+    elif old != value:
+        table[key] = _item(tomlkit, value)
+
+
+def _item(tomlkit: Any, value: Any) -> Any:
+    """Plain data for a document: a table of plain values in one line."""
+    if isinstance(value, Mapping) and not any(isinstance(v, Mapping) for v in value.values()):
+        item = tomlkit.inline_table()
+        item.update(value)
+        return item
+    return value

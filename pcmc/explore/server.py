@@ -16,13 +16,13 @@ from typing import Any
 
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
-from ..project import certified_files, load
+from ..project import load
+from ..project.writing import certified_files
 from ..surface import Surface
-from . import page_data, saving
+from . import page_data
 from .following import ProjectFallback, Stop
-from .listening import LOOPBACK, PageHandler, listen
-from .protocol import ACTS, REQUESTS, RequestError, check_request, pack
-from .roof import ShownRoof, Watch, signature
+from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, check_request, listen, pack
+from .roof import ShownRoof, Watch, save, signature
 from .session import Session, SessionState, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -168,7 +168,7 @@ class Explorer:
         with self._saving:
             if self.start is not start:
                 raise RequestError("the file was changed while this save waited; save again")
-            path, note = saving.save(self.roof, state.surface, name, replace, state.aims)
+            path, note = save(self.roof, state.surface, name, replace, state.aims)
             if path == self.roof.path:
                 outcome = dataclasses.replace(self.roof.outcome, project=load(path))
                 self.roof = dataclasses.replace(self.roof, outcome=outcome)

@@ -83,15 +83,11 @@ class SessionState:
     superseded: bool = False  # newer values have arrived meanwhile, so that the page ignores this state
 
     @property
-    def unsaved(self) -> bool:
-        """Whether values or surface differ from the newest step."""
-        step = self.steps[self.place]
-        return self.surface is not step or changeable_values(self.wanted) != changeable_values(step)
-
-    @property
     def undo(self) -> int:
-        """The number of steps back."""
-        return self.place + self.unsaved
+        """The number of steps back; one more if values or surface differ from the newest step."""
+        step = self.steps[self.place]
+        same = self.surface is step and changeable_values(self.wanted) == changeable_values(step)
+        return self.place + (not same)
 
     @property
     def redo(self) -> int:
@@ -212,11 +208,6 @@ class Session:
     def surface(self) -> Surface:
         """The surface shown."""
         return self.now.surface
-
-    @property
-    def aims(self) -> Aims | None:
-        """The targets met last, with what they vary."""
-        return self.now.aims
 
     @act()
     def state(self, state: SessionState, stop: Stop) -> SessionState:

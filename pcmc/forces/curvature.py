@@ -16,8 +16,10 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.supports import symmetric_part
 from .functional import weighted
+from .motion_space import normal_vectors, vertex_classes
 
 Method = Literal["cotangent", "variational"]
+NO_SHARE = 1e-2  # of the area around a node: its shape function integrates to next to nothing
 METHODS: tuple[Method, ...] = ("cotangent", "variational")
 
 
@@ -32,6 +34,9 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
       it is H̄ |Σ A_T ν_T| / Σ A_T ≤ H̄: it sees that the star is not flat.
     - ``"variational"``: ⟨∇A, ∇V⟩ / (2 ⟨∇V, ∇V⟩), exactly H̄ at a stationary vertex.
 
+    At the nodes of curved elements ∇V = ∫ N_i ν dA, of which the part along the node's normal counts, stands
+    for both A_b and ∇V; NaN where it is next to nothing, as at the corners of elements of order 2.
+
     >>> from pcmc import Patch, Surface
     >>> pyramid = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]],
     ...     [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4, [Patch("roof", 1.0)], fixed=range(4))
@@ -44,6 +49,13 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     validate.choice("method", method, METHODS)
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
+    if surface.order > 1:
+        normal = normal_vectors(vertex_classes(surface), surface.vertices)
+        symmetric_part(surface.on_planes, normal)
+        normal /= np.where(normal.any(axis=1), np.linalg.norm(normal, axis=1), 1.0)[:, None]
+        share = 3.0 * np.einsum("ij,ij->i", weighted(surface, 0.0, -1.0)[2], normal)
+        share[np.abs(share) < NO_SHARE * star_area] = np.nan
+        area_vector, star_area = share[:, None] * normal, np.abs(share)
     symmetric_part(surface.on_planes, area_gradient)
     area_vector = symmetric_part(surface.on_planes, area_vector)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)

@@ -25,6 +25,7 @@ from ..base.arrays import Bools, Floats, Ints, kept_with_owner
 from ..base.tolerances import PARALLEL, SAME_PLACE
 from ..surface import Plane, Surface
 from ..surface.checks import lying
+from ..surface.lagrange import expect_flat
 from ..surface.supports import common_point
 from .elements import Elements
 
@@ -119,6 +120,7 @@ def flat_pieces(surface: Surface) -> FlatPieces:
         columns.append((*side, *_ends(surface, side, (plane, mask), others)))
     if not sum(len(column[0]) for column in columns):
         return NONE
+    expect_flat(surface, "boundaries that slide on planes through no common point")
     return FlatPieces(*(np.concatenate(column) for column in zip(*columns, strict=True)))
 
 

@@ -30,7 +30,8 @@ from ..surface.supports import apply_supports
 from . import cable_weights, cables, flat_pieces
 from .elements import Elements, add_values
 from .flat_pieces import add_plane_volumes
-from .triangles import add_weights, areas_and_volumes, energy_mesh, measure
+from .mesh import energy_mesh
+from .triangles import add_weights, areas_and_volumes, measure
 
 LINE_FORCES = (cables.elements, cable_weights.elements)
 FORCES = (*LINE_FORCES, flat_pieces.elements)

@@ -16,12 +16,12 @@ A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import isqrt, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, Vector
+from ..base.arrays import Bools, Floats, Ints, Vector, read_only
 from ..base.compiled import compiled, inlined
 from ..base.tolerances import NO_DIRECTION, ON
 from ..surface import Surface
@@ -38,6 +38,7 @@ from ..surface.geometry import (
     vector,
     vertex_area_vectors,
 )
+from ..surface.lagrange import lattice
 from ..surface.supports import mirror_edges
 from ..surface.topology import (
     CURVE,
@@ -50,7 +51,8 @@ from ..surface.topology import (
     vertex_kind,
 )
 from .cables import laws_on, squared_cable_forces
-from .triangles import Mesh, effective_tensions, energy_mesh
+from .mesh import Mesh, energy_mesh
+from .triangles import effective_tensions
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +68,12 @@ class VertexClasses:
     beside: Ints  # (c,2) their neighbours along it
     idle: Bools  # (n,) vertices of no active face
     level: Bools  # (n,) curve vertices beside one that rests on Π: their tangent is taken along Π
+    nodes: Ints  # (e,k) of the active elements; of flat ones ``faces``
 
     def mesh(self, surface: Surface) -> Mesh:
-        """The active faces, with the tensions and pressures of a surface of these classes."""
-        return energy_mesh(surface)._replace(faces=self.faces, patch=self.patch_of_face)
+        """The active elements, with the tensions and pressures of a surface of these classes."""
+        patch = self.patch_of_face[:: surface.order**2]
+        return energy_mesh(surface)._replace(faces=self.nodes, patch=np.ascontiguousarray(patch))
 
 
 class MotionSpace(NamedTuple):
@@ -168,7 +172,8 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     curve, beside = curve[~shared[curve]], beside[~shared[curve]]
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     level = np.zeros(surface.n, dtype=bool) if level is None else level
-    return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level)
+    nodes = faces if surface.order == 1 else read_only(surface.nodes[active[:: surface.order**2]])
+    return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level, nodes)
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
@@ -185,7 +190,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     chord = np.zeros_like(X)
     chord[classes.curve] = curve_chords(surface, classes, X)
     basis, dimension = np.zeros((surface.n, 3, 3)), np.zeros(surface.n, dtype=np.int64)
-    area_vector = vertex_area_vectors(X, classes.faces)[0]
+    area_vector = normal_vectors(classes, X)
     _fill(classes.kind, area_vector, chord, freedom, axis, basis, dimension)
     return MotionSpace.of(basis, dimension)
 
@@ -233,6 +238,30 @@ def _fill(
             if size > 0:
                 basis[v, 0, d] = first[d]
             basis[v, 1, d], basis[v, 2, d] = second[d], third[d]
+
+
+def normal_vectors(classes: VertexClasses, X: Floats, there: Floats | None = None) -> Floats:
+    """(n,3) along the sheets' normals: the area vectors of flat triangles around each vertex.
+
+    At the nodes of curved elements the unit normals of the corners are interpolated, each of the triangles
+    around it in the same sheet: where the normals of nodes are uneven, so are their distances after a step,
+    and elements of order 4 and more lose their order. Quadratic in ``there``, if those of these positions
+    are asked for, with the lengths that make them unit normals at X.
+    """
+    if classes.nodes.shape[1] == 3:
+        return vertex_area_vectors(X, classes.faces)[0]
+    law, n, nodes = classes.topology.patch_of_face, len(X), classes.nodes
+    sheets, faces = int(law.max(initial=0)) + 1, classes.faces + n * law[:, None]
+    around = vertex_area_vectors(np.tile(X, (sheets, 1)), faces)[0]
+    length = np.linalg.norm(around, axis=1)[:, None]
+    if there is not None:
+        around = vertex_area_vectors(np.tile(there, (sheets, 1)), faces)[0]
+    around /= np.where(length > 0.0, length, 1.0)
+    per_element = len(law) // len(nodes)
+    corners = nodes[:, :3] + n * law[::per_element, None]
+    place, out = lattice(isqrt(per_element)).nodes, np.zeros_like(X)
+    out[nodes] = np.einsum("kc,ecd->ekd", place / isqrt(per_element), around[corners])
+    return out
 
 
 def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:

@@ -38,7 +38,9 @@ class Pattern(NamedTuple):
 
 
 def hessian_pattern(of: VertexClasses | Surface, space: MotionSpace) -> Pattern:
-    """Sparsity of Bᵀ (∂²E) B: it depends on the faces and on the dimensions of the motion space."""
+    """Sparsity of Bᵀ (∂²E) B: it depends on the elements and on the dimensions of the motion space."""
+    if of.nodes.shape[1] > 3:
+        return pattern_of(of.nodes, space)
     pattern, offset = _pattern(of.topology.edges, space)
     # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
     return pattern._replace(offset=np.ascontiguousarray(offset[of.topology.edge_of_face[:, [2, 0, 1]]]))
@@ -47,8 +49,9 @@ def hessian_pattern(of: VertexClasses | Surface, space: MotionSpace) -> Pattern:
 def pattern_of(elements: Ints, space: MotionSpace) -> Pattern:
     """Sparsity for elements of k vertices each (e,k)."""
     first, second = np.triu_indices(elements.shape[1], 1)
-    pairs = np.stack([elements[:, first].ravel(), elements[:, second].ravel()], axis=1)
-    return _pattern(np.unique(np.sort(pairs, axis=1), axis=0), space)[0]
+    one, other, n = elements[:, first].ravel(), elements[:, second].ravel(), len(space.dimension)
+    pairs = np.unique(np.minimum(one, other).astype(np.int64) * n + np.maximum(one, other))
+    return _pattern(np.stack([pairs // n, pairs % n], axis=1), space)[0]
 
 
 def _pattern(pairs: Ints, space: MotionSpace) -> tuple[Pattern, Ints]:

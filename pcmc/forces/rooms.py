@@ -21,6 +21,7 @@ from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
+from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
 from ..surface.supports import apply_supports
 from ..surface.topology import components
@@ -197,6 +198,7 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     off = np.flatnonzero((left != 0.0) & ~lying)
     if not len(off):
         return
+    expect_flat(surface, f"the volume of room {room.name!r}, whose boundary is off Π")
     X, count, ends = surface.vertices - surface.origin, left[off], edges[off]
     piece = components(ends, surface.n)[ends[:, 0]]
     for k in np.unique(piece):

@@ -21,20 +21,13 @@ from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..surface import Surface, expect_surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scaled, vector
+from .curved import add_element_products, fill_block
 from .elements import Elements, add_hessian_products
 from .functional import elements, energy_and_gradient
+from .mesh import Mesh, energy_mesh
 from .motion_space import MotionSpace, VertexClasses
 from .pattern import Pattern, hessian_pattern, pair_place, row_place
-from .triangles import (
-    Block,
-    Mesh,
-    Tilt,
-    energy_mesh,
-    triangle,
-    triangle_block,
-    triangle_skew,
-    triangle_tilt,
-)
+from .triangles import Block, Tilt, triangle, triangle_block, triangle_skew, triangle_tilt
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -91,8 +84,8 @@ def circle_curvatures(surface: Surface, space: MotionSpace, X: Floats) -> tuple[
 
 
 def add_products(surface: Surface, mesh: Mesh, X: Floats, d: Floats, change: Floats) -> Floats:
-    """(∂²E) d added to ``change`` (n,3), in place, for a motion d (n,3); ``mesh`` has the triangles."""
-    _add_triangle_products(mesh, X, d, change)
+    """(∂²E) d added to ``change`` (n,3), in place, for a motion d (n,3); ``mesh`` has the elements."""
+    (add_element_products if mesh.curved else _add_triangle_products)(mesh, X, d, change)
     add_hessian_products(elements(surface, X), d, change)
     return change
 
@@ -107,7 +100,8 @@ def _assembled(
     stiffness: float = 0.0,
 ) -> Floats:
     data = np.zeros(len(pattern.indices))
-    _assemble_triangles(mesh, X, space, pattern, hessian, stiffness, data)
+    fill = _assemble_curved if mesh.curved else _assemble_triangles
+    fill(mesh, X, space, pattern, hessian, stiffness, data)
     add_blocks(elements(surface, X), space, pattern, hessian, stiffness, data)
     return data
 
@@ -180,6 +174,29 @@ def _assemble_triangles(
                 _add_pair(space, pattern, v, w, offset, pair, q, triangle_tilt(t, n, i, j), data)
 
 
+@compiled
+def _assemble_curved(
+    mesh: Mesh,
+    X: Floats,
+    space: MotionSpace,
+    pattern: Pattern,
+    hessian: float,
+    stiffness: float,
+    data: Floats,
+) -> None:
+    size = mesh.faces.shape[1]
+    block = np.empty((size, size, 3, 3))
+    for e in range(len(mesh.faces)):
+        fill_block(mesh, X, e, hessian, stiffness, block)
+        for i in range(size):
+            for j in range(i, size):
+                v, w = mesh.faces[e, i], mesh.faces[e, j]
+                if v <= w:
+                    _add_projected(block[i, j], v, w, space, pattern, data)
+                else:
+                    _add_projected(block[i, j].T, w, v, space, pattern, data)
+
+
 def add_blocks(
     forces: Iterable[Elements],
     space: MotionSpace,
@@ -202,27 +219,29 @@ def add_blocks(
 def _assemble_blocks(
     vertices: Ints, blocks: Floats, space: MotionSpace, pattern: Pattern, data: Floats
 ) -> None:
-    dimension, start, indptr = space.dimension, space.start, pattern.indptr
     for e in range(len(vertices)):
         for i in range(vertices.shape[1]):
             for j in range(vertices.shape[1]):
-                v, w, block = vertices[e, i], vertices[e, j], blocks[e, i, j]
-                if v > w or dimension[w] == 0:
-                    continue
-                for r in range(dimension[v]):
-                    at, b = row_place(space, pattern, v, r), vector(space.basis[v, r])
-                    row = (
-                        dot(b, vector(block[:, 0])),
-                        dot(b, vector(block[:, 1])),
-                        dot(b, vector(block[:, 2])),
-                    )
-                    if v != w:
-                        first, last = indptr[start[v] + r], indptr[start[v] + r + 1]
-                        at = first + np.searchsorted(pattern.indices[first:last], start[w])
-                        if at == last or pattern.indices[at] != start[w]:
-                            raise LookupError("two vertices of an element are no pair of the pattern")
-                    for s in range(r if v == w else 0, dimension[w]):
-                        data[at + s] += dot(row, vector(space.basis[w, s]))
+                if vertices[e, i] <= vertices[e, j]:
+                    _add_projected(blocks[e, i, j], vertices[e, i], vertices[e, j], space, pattern, data)
+
+
+@compiled
+def _add_projected(block: Floats, v: int, w: int, space: MotionSpace, pattern: Pattern, data: Floats) -> None:
+    """Add Bᵀ block B of vertices v ≤ w, two of one element, to the values of the pattern."""
+    dimension, start, indptr = space.dimension, space.start, pattern.indptr
+    if dimension[w] == 0:
+        return
+    for r in range(dimension[v]):
+        at, b = row_place(space, pattern, v, r), vector(space.basis[v, r])
+        row = dot(b, vector(block[:, 0])), dot(b, vector(block[:, 1])), dot(b, vector(block[:, 2]))
+        if v != w:
+            first, last = indptr[start[v] + r], indptr[start[v] + r + 1]
+            at = first + np.searchsorted(pattern.indices[first:last], start[w])
+            if at == last or pattern.indices[at] != start[w]:
+                raise LookupError("two vertices of an element are no pair of the pattern")
+        for s in range(r if v == w else 0, dimension[w]):
+            data[at + s] += dot(row, vector(space.basis[w, s]))
 
 
 @compiled

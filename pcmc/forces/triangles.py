@@ -26,33 +26,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
 from ..surface import Surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
+from .curved import measure_elements
+from .mesh import Mesh, energy_mesh
 
-
-class Mesh(NamedTuple):
-    """Faces with the weights of their energy, as one argument of compiled loops; positions are another."""
-
-    faces: Ints  # (m,3) corners
-    patch: Ints  # (m,) of each triangle
-    origin: Floats  # (3,) the reference point of volumes
-    tension: Floats  # (k,) α of each patch; p and w below
-    pressure: Floats
-    weight: Floats
-    ground: Floats  # (3,) a point of Π, and its normal: weights act along it
-    normal: Floats
-
-
-def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
-    """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
-    tension = surface.tensions if tension is None else read_only(tension)
-    pressure = surface.net_pressures if pressure is None else read_only(pressure)
-    plane = np.array(surface.plane.point), np.array(surface.plane.normal)
-    return Mesh(
-        surface.faces, surface.patch_of_face, surface.origin, tension, pressure, surface.weights, *plane
-    )
+NO_GRADIENT = np.empty((0, 3))
 
 
 @compiled
@@ -108,9 +89,14 @@ def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, 
     parts = len(blocks(len(mesh.faces), workers or threads()))
     area, volume = np.zeros((2, parts, len(mesh.tension)))
     gradient = np.zeros((parts, *X.shape))
+    weightless, moment = mesh.weighing(), np.zeros_like(area)
 
     def work(part: int, first: int, last: int) -> None:
-        measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
+        sums = area[part], volume[part], moment[part]
+        if mesh.curved:
+            measure_elements(weightless, X, first, last, *sums, gradient[part])
+        else:
+            measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
 
     run_blocks(work, len(mesh.faces), workers)
     for part in range(1, parts):
@@ -121,10 +107,13 @@ def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, 
 def areas_and_volumes(mesh: Mesh, X: Floats) -> tuple[Floats, Floats]:
     """Areas (k,) and signed volumes (k,), seen from the mesh's origin, of the k patches."""
     parts = len(blocks(len(mesh.faces), threads()))
-    area, volume = np.zeros((2, parts, len(mesh.tension)))
+    area, volume, moment = np.zeros((3, parts, len(mesh.tension)))
 
     def work(part: int, first: int, last: int) -> None:
-        _measure_areas(mesh, X, first, last, area[part], volume[part])
+        if mesh.curved:
+            measure_elements(mesh, X, first, last, area[part], volume[part], moment[part], NO_GRADIENT)
+        else:
+            _measure_areas(mesh, X, first, last, area[part], volume[part])
 
     run_blocks(work, len(mesh.faces), None)
     return area.sum(axis=0), volume.sum(axis=0)
@@ -146,9 +135,13 @@ def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> 
 
 def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | None = None) -> Floats:
     """(k,) ∫ z dA of each patch, length³; the gradient of Σ w ∫ z dA is added to ``gradient`` (n,3)."""
-    moment = np.zeros(len(surface.patches))
-    mesh = energy_mesh(surface)._replace(weight=read_only(weights.view()))
-    _measure_moments(mesh, X, moment, np.empty((0, 3)) if gradient is None else gradient)
+    moment, out = np.zeros(len(surface.patches)), NO_GRADIENT if gradient is None else gradient
+    mesh = energy_mesh(surface).weighing(weights)
+    if mesh.curved:
+        area, volume = np.zeros((2, len(moment)))
+        measure_elements(mesh, X, 0, len(mesh.faces), area, volume, moment, out)
+    else:
+        _measure_moments(mesh, X, moment, out)
     return moment
 
 

@@ -1,9 +1,11 @@
 """The volume between a patch and Π, and its gradient.
 
-With z the height over Π, n its normal, and ν the normal of a triangle T = (a, b, c), on which z is linear,
+With z the height over Π, n its normal, ν that of the patch, and g = x_ξ × x_η and m_i as in ``curved``,
 
-    V_i = ∫ z ⟨ν, n⟩ dA = Σ_T z̄_T A_T ⟨ν_T, n⟩,   z̄_T = ⅓ (z_a + z_b + z_c)
-    ∂V_T/∂a = ⅓ A_T ⟨ν_T, n⟩ n + ½ z̄_T n × (c - b)
+    V_i = ∫ z ⟨ν, n⟩ dA = Σ_T ∫ z ⟨g, n⟩ dξ dη,    ∂V_T/∂x_i = ∫ N_i ⟨g, n⟩ n + z n × m_i dξ dη
+
+over the elements T. Of a flat triangle (a, b, c) these are z̄ A ⟨ν, n⟩, with the mean height z̄ of its corners,
+and ⅓ A ⟨ν, n⟩ n + ½ z̄ n × (c - b).
 
 It counts the prisms between the triangles and Π: positive where the patch looks away from Π, negative where
 it overhangs. The sum over all patches under pressure is the volume enclosed where the boundary lies on Π or
@@ -18,7 +20,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from .mesh import Points, energy_mesh
 
 
 def volumes_below(surface: Surface) -> Floats:
@@ -30,10 +32,10 @@ def volumes_below(surface: Surface) -> Floats:
     >>> volumes_below(lid).tolist()  # the mean height 6 over a triangle of area ½
     [3.0]
     """
-    corners = surface.vertices[surface.faces]
-    height = surface.plane.height(corners).mean(axis=1)
-    each = height * (area_vectors(corners) @ np.array(surface.plane.normal))
-    return np.asarray(np.bincount(surface.patch_of_face, each, len(surface.patches)), dtype=float)
+    mesh = energy_mesh(surface)
+    at = Points.of(mesh, surface.vertices)
+    each = (surface.plane.height(at.place) * (at.area @ mesh.normal)).sum(axis=1)
+    return np.asarray(np.bincount(mesh.patch, each, len(surface.patches)), dtype=float)
 
 
 def volume_below(surface: Surface) -> float:
@@ -51,13 +53,11 @@ def volume_below_gradient(surface: Surface, factors: Floats) -> Floats:
     >>> gradient[:, 2].sum().round(12).tolist()  # the area below the lid, for a motion along n
     0.5
     """
-    F, normal = surface.faces, np.array(surface.plane.normal)
-    corners = surface.vertices[F]
-    factor = factors[surface.patch_of_face]
-    height = factor * surface.plane.height(corners).mean(axis=1)
-    raised = (factor * (area_vectors(corners) @ normal) / 3.0)[:, None] * normal
-    gradient = np.zeros_like(surface.vertices)
-    for a in range(3):
-        opposite = corners[:, a - 1] - corners[:, a - 2]
-        np.add.at(gradient, F[:, a], raised + 0.5 * height[:, None] * np.cross(normal, opposite))
+    mesh, gradient = energy_mesh(surface), np.zeros_like(surface.vertices)
+    at, (N, Nu, Nv, weight) = Points.of(mesh, surface.vertices), mesh.shapes
+    factor, normal = factors[mesh.patch][:, None], mesh.normal
+    raised = (factor * (at.area @ normal)) @ N
+    high = (factor * weight * surface.plane.height(at.place))[..., None]
+    across = np.einsum("qk,eqd->ekd", Nv, high * at.along_u) - np.einsum("qk,eqd->ekd", Nu, high * at.along_v)
+    np.add.at(gradient, mesh.faces, raised[..., None] * normal + np.cross(normal, across))
     return gradient

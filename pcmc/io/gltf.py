@@ -23,8 +23,7 @@ from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
 from .formats import Content
 from .mesh_data import MeshData, support_kinds, support_of
-from .metadata import parse_metadata
-from .patch_meshes import WALLS, from_scene, patch_meshes
+from .metadata import WALLS, from_scene, parse_metadata, patch_meshes
 
 SUPPORT = "_SUPPORT"
 NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does not allow

@@ -26,8 +26,7 @@ from ..surface import Cable, Surface
 from ..surface.geometry import file_origin
 from .formats import Content
 from .mesh_data import MeshData, support_of
-from .metadata import parse_metadata
-from .patch_meshes import patch_meshes
+from .metadata import parse_metadata, patch_meshes
 
 SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
 TIME = "2000-01-01T00:00:00"

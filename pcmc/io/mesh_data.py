@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints, Vector
@@ -22,7 +20,7 @@ from ..base.units import NO_UNITS, Units, conversion_note, length_factor
 from ..base.validate import choice
 from ..surface import Cable, Circle, Guide, HeldCurve, Line, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
-from ..surface.topology import topology
+from ..surface.topology import components, topology
 from ..surface.values import KINDS, POWERS
 
 FREE, SLIDING, FIXED = 0, 1, 2
@@ -47,7 +45,7 @@ class MeshData:
     # whether patches share their vertices for certain, as in files that pcmc wrote. Then two vertices at one
     # place stay two: those of a wall without height below a junction on Π
     joined: bool = False
-    walls: str | None = None  # the text of ``patch_meshes.encode_walls``
+    walls: str | None = None  # the text of ``metadata.encode_walls``
     lines: tuple[tuple[Guide, Bools], ...] = ()  # ``on_line`` in Surface; the others as there
     units: Units = NO_UNITS  # of the numbers; no unit where the file has none
     planes: tuple[tuple[Plane, Bools], ...] = ()
@@ -150,9 +148,8 @@ def coincident(X: Floats) -> tuple[Ints, Ints]:
     >>> keep.tolist(), place.tolist()
     ([0, 1, 3], [0, 1, 0, 2])
     """
-    one, two = cKDTree(X).query_pairs(TOLERANCE * bounding_size(X), output_type="ndarray").T
-    graph = coo_array((np.ones(len(one), dtype=bool), (one, two)), shape=(len(X), len(X)))
-    group = connected_components(graph, directed=False)[1]  # groups are numbered by their first vertex
+    near = cKDTree(X).query_pairs(TOLERANCE * bounding_size(X), output_type="ndarray")
+    group = components(near, len(X))  # groups are numbered by their first vertex
     return np.unique(group, return_index=True)[1], group
 
 
@@ -244,11 +241,6 @@ def in_new_unit(value: Any, factor: float) -> Any:
         case HeldCurve():
             return value.mapped(factor * np.eye(3), np.zeros(3))
     return value
-
-
-def _times(value: float, factor: float, power: int) -> float:
-    """The value times factor^power, rounded once."""
-    return value * factor**power if power > 0 else value / factor**-power
 
 
 def _point(point: Vector, factor: float) -> Vector:

@@ -27,6 +27,8 @@ from .metadata import DAMAGED, parse_metadata
 
 VERSION = max(part.since for part in PARTS.values())
 FORMAT = "pcmc surface"
+HELD = {"format", "version", "description", "curves", "certificate", "scalar"}  # of meta and arrays
+HELD |= {"vertices", "faces", "patch_of_face", "support"}
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
 
@@ -75,10 +77,12 @@ def read(path: Path) -> MeshData:
         if version > VERSION:
             text = f"written by a newer pcmc (format {version}, this one reads up to {VERSION}); update pcmc"
             raise FileError(text, where="version", found=version, expected=VERSION)
+        if odd := [name for name in (*meta, *arrays) if name.partition(" ")[0] not in HELD]:
+            text = f"written by a pcmc before 0.1.0, with {odd[0]!r}; write the surface again from its source"
+            raise FileError(text, where=odd[0])
         metadata = parse_metadata(meta["description"])
         X, F, patch, support = (arrays[key] for key in ("vertices", "faces", "patch_of_face", "support"))
         about: dict[str, Any] = {
-            "parts": {**_older_parts(meta, arrays), **metadata.parts},
             "curves": _curves(meta.get("curves", ()), len(X)),
             "scalars": _under("scalar ", arrays),
             "certificate": {**meta["certificate"], **_under("certificate ", arrays)},
@@ -96,27 +100,6 @@ def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:
         text = f"curve {len(curves)} is damaged: {error}"
         raise FileError(text, what="curves", where=len(curves)) from None
     return tuple(curves)
-
-
-def _older_parts(meta: Mapping[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
-    """Cables, rooms, lines, circles and planes as versions up to 5 had them, in the form of ``metadata``."""
-
-    def held(name: str, along: str) -> list[tuple[Any, list[int]]]:
-        if name not in arrays:
-            return []
-        rows = arrays.pop(name).tolist()
-        masks = numeric(arrays.pop(along), along, "b", (len(rows), len(arrays["vertices"])))
-        return [(row, np.flatnonzero(mask).tolist()) for row, mask in zip(rows, masks, strict=True)]
-
-    circles = [[(row[:3], row[3:6], row[6]), own] for row, own in held("circles", "on_circle")]
-    planes = zip(held("planes", "on_planes"), meta.get("planes", ()), strict=True)
-    parts = {
-        "cables": [[*row, arrays.pop(f"cable {k}").tolist()] for k, row in enumerate(meta.get("cables", ()))],
-        "rooms": meta.get("rooms", ()),
-        "lines": [*held("lines", "on_line"), *circles],
-        "planes": [[(*row, about["name"], about["mirror"]), own] for (row, own), about in planes],
-    }
-    return {key: part for key, part in parts.items() if part}
 
 
 def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,8 +27,7 @@ from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import topology
 from .formats import FORMATS, READ_ONLY, Format, format_of
 from .mesh_data import MeshData, checked_data, converted, merged, to_surface, without_unused
-from .metadata import with_parts
-from .patch_meshes import restore_walls
+from .metadata import restore_walls, with_parts
 
 GAP = 0.05  # of the boundary edges next to it: closer vertices are one, drawn twice
 FACES_ONE_WAY = 0.5  # part of the area: then it is a roof, and not a column or a ball

@@ -25,8 +25,7 @@ from ..surface.geometry import bounding_size
 from ..surface.sections import curves_by_kind
 from .formats import Content
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
-from .metadata import Metadata, parse_metadata
-from .patch_meshes import WALLS, patch_meshes
+from .metadata import WALLS, Metadata, parse_metadata, patch_meshes
 from .polygons import cut_polygons
 
 KEY, CABLE, NAME = "pcmc", "pcmc cable", "pcmc name"

@@ -18,8 +18,7 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors, file_origin
 from .formats import Content
 from .mesh_data import MeshData
-from .metadata import Metadata
-from .patch_meshes import from_scene
+from .metadata import Metadata, from_scene
 
 SPECIAL = re.compile("solid|vertex", re.I)  # readers look for these words, in names too
 FACET = (

@@ -20,7 +20,7 @@ from ..surface.colours import linear, scalar_colors
 from ..surface.geometry import file_origin
 from .formats import Content
 from .mesh_data import support_of
-from .patch_meshes import patch_meshes
+from .metadata import patch_meshes
 
 ROOF = "/Roof"
 SUPPORT = "support"

@@ -20,8 +20,7 @@ from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .formats import FORMATS, Content, format_of
 from .mesh_data import scaled_surface
-from .metadata import metadata_text
-from .patch_meshes import encode_walls
+from .metadata import encode_walls, metadata_text
 
 
 def write(

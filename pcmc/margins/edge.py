@@ -34,6 +34,7 @@ from ..solvers import solve
 from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
+from ..surface.lagrange import expect_flat
 from .varied import Varied
 
 FIRST, LARGEST = 0.05, 0.15  # the first and the longest step along the branch, as of ``follow``
@@ -276,6 +277,7 @@ def margin(
         certificate, surface = surface.certificate, surface.surface
     if not isinstance(surface, Surface):
         validate.refuse("surface", type(surface).__name__, "a Surface or a Result", error=SurfaceError)
+    expect_flat(surface, "margin")
     validate.number("most", most, above=1.0)
     validate.integer("meshes", meshes, least=1)
     varied = Varied.of(surface, what, towards)

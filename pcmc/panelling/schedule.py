@@ -15,6 +15,7 @@ from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
+from ..surface.lagrange import expect_flat
 from .families import families
 from .flat import joints, laid_flat
 
@@ -159,6 +160,7 @@ def panels(
     [[4.0, 1.457737974, 1.457737974, 2.0]]
     """
     expect_surface(surface)
+    expect_flat(surface, "panels")
     tolerance = validate.positive("tolerance", tolerance)
     validate.choice("mirror_images", mirror_images, MIRROR_IMAGES)
     validate.flag("walls", walls)

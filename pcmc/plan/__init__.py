@@ -1,8 +1,8 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
 ``plan`` holds Plan, ``parts`` dividers, holes, patches and cables; ``build`` makes the Surface from the
-``draft`` (``lines``, their ``arrangement``, ``edges``) and its ``walls``, by ``surface`` and ``meshing``.
-``drawing`` reads CAD files (``strokes`` on ``layers``, joined to ``paths``), ``proposal`` chooses what they
+``draft`` (``lines``, their ``arrangement``, ``edges``, walls), by ``surface`` and ``meshing``.
+``drawing`` reads CAD files (``strokes`` on layers, joined to ``paths``), ``proposal`` chooses what they
 do not say. May import ``io`` and the rooms below it.
 """
 

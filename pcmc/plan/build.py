@@ -22,11 +22,10 @@ from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
 from ..surface.pieces import Piece, to_space
-from .draft import Draft, drafted
+from .draft import Draft, Roof, drafted, rooms_of, upright_planes, walls_of
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
 from .lines import EXACT, SNAP, Kind, PlanLine
 from .parts import PatchSpec
-from .walls import Roof, rooms_of, upright_planes, walls_of
 
 if TYPE_CHECKING:
     from .plan import Plan

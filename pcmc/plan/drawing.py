@@ -15,15 +15,25 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.units import conversion_note, size_note
+from ..base.units import conversion_note, unlikely_size
 from ..surface.curves import Curve, polyline
 from ..surface.pieces import Piece, point_text, two_digits
 from ..surface.summary import listed
-from .layers import UNDERSTOOD, Label, Layer, heights_of, labels_of, layer_of, left_out
 from .lines import EXACT, Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
-from .strokes import Stroke, Strokes, read_strokes
+from .strokes import (
+    UNDERSTOOD,
+    Label,
+    Layer,
+    Stroke,
+    Strokes,
+    heights_of,
+    labels_of,
+    layer_of,
+    left_out,
+    read_strokes,
+)
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
 LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
@@ -349,7 +359,7 @@ class _Reader:
         if hidden:
             self.notes.append(f"hidden, left out: entities of the layers {', '.join(hidden)}")
         width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
-        note = size_note(width, self.units, self.content.unit)
+        note = unlikely_size(width, self.units, self.content.unit)
         self.notes += [note] if note else []
         if note := self.content.note or conversion_note(self.content.unit, self.units):
             self.notes.insert(0, note)

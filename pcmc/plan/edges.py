@@ -17,6 +17,7 @@ from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
 from ..surface.geometry import bounding_size
 from ..surface.pieces import point_text, to_local, to_space, two_digits
+from ..surface.topology import SIDES, edge_places
 from .arrangement import Arrangement
 from .lines import EXACT, SNAP, Kind, LineTree, PlanLine
 from .parts import cable_label
@@ -204,10 +205,7 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
 
 def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequence[Patch]) -> None:
     """Refuse pressure or snow on a patch with a cable along a free edge: it acts on the cone below, too."""
-    free = np.sort(edges.ends[edges.cable != NONE], axis=1)
-    n = np.array([int(triangles.max()) + 1, 1])
-    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-    beside = np.isin(sides @ n, free @ n).any(axis=1)
+    beside = (edge_places(triangles[:, SIDES], edges.ends[edges.cable != NONE]) >= 0).any(axis=1)
     for k in np.unique(patch[beside]):
         for key, instead in (("pressure", "pressure = 0 (and a weight)"), ("snow", "a weight in its place")):
             name, value = patches[k].name, getattr(patches[k], key)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +11,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra, OptionError
+from ..base.errors import OptionError
+from ..base.libraries import require
 from ..base.validate import checked_name
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
@@ -193,8 +193,9 @@ class Plan:
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""
-        with _needs_shapely():
-            from .build import build_surface  # a plan without its mesh does not need it
+        require("shapely", extra="plan")
+        from .build import build_surface  # a plan without its mesh does not need it
+
         return build_surface(self)
 
 
@@ -209,19 +210,10 @@ def patch_names(plan: Plan) -> tuple[str, ...]:
     """
     if plan.patches:
         return tuple(patch.name for patch in plan.patches)
-    with _needs_shapely():
-        from .draft import part_count
+    require("shapely", extra="plan")
+    from .draft import part_count
+
     return tuple(f"patch {k + 1}" for k in range(part_count(plan)))
-
-
-@contextmanager
-def _needs_shapely() -> Iterator[None]:
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name != "shapely":
-            raise
-        raise MissingExtra("shapely", "plan") from None
 
 
 def plan_from(data: Mapping[str, Any]) -> Plan:

@@ -15,12 +15,12 @@ from ..base.errors import OptionError, PlanError, unknown
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
 from ..surface.values import balanced_wall
+from .draft import most_in_corners
 from .drawing import Drawing
 from .edges import cable_for
-from .layers import Label
 from .lines import Kind, PlanLine
 from .parts import CableLine, Divider, Hole, PatchSpec, check_count, check_keys
-from .walls import most_in_corners
+from .strokes import Label
 
 if TYPE_CHECKING:
     from .plan import Plan

@@ -3,15 +3,16 @@
 With a path every function writes a picture; each returns it as an (h,w,3) array of bytes.
 """
 
-from .cloth import strains
+from .branches import equilibria
 from .curves import convergence, diagram, heatmap, histories, lines
-from .loads import under_load
 from .pictures import draw, families, panel, reactions, vectors
+from .uses import strains, under_load
 
 __all__ = [
     "convergence",
     "diagram",
     "draw",
+    "equilibria",
     "families",
     "heatmap",
     "histories",

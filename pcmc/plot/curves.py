@@ -11,8 +11,22 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
-from .colors import color_bar, color_map
-from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, overlap_style, style
+from .figure import (
+    CURVES,
+    INK,
+    SMALL,
+    TEXT,
+    Image,
+    Path,
+    color_bar,
+    color_map,
+    finish,
+    fit_height,
+    grid,
+    new,
+    overlap_style,
+    style,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,6 +240,12 @@ def diagram(
     Folds, changes of index and changes of contact are marked.
     """
     figure, axes = new_axes(width, height, title, xlabel or x, ylabel or y)
+    add_legend(axes, len(branches) + add_branches(axes, branches, x, y))
+    return finish(figure, path)
+
+
+def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
+    """Draw branches on axes as ``diagram`` does; the number of kinds of events among them."""
     marked: set[str] = set()
     for k, (label, branch) in enumerate(branches.items()):
         for column in (x, y):
@@ -243,8 +263,7 @@ def diagram(
             marked.add(str(kind))
             look = {"markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.8}
             axes.plot(rows[x], rows[y], EVENT_MARKERS[str(kind)], color=color, label=text, **look)
-    add_legend(axes, len(branches) + len(marked))
-    return finish(figure, path)
+    return len(marked)
 
 
 def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:

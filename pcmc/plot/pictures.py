@@ -19,10 +19,22 @@ from ..base.units import NO_UNITS, Units
 from ..certificate.forces import Forces
 from ..surface import Surface
 from ..surface.geometry import area_vectors
-from .colors import add_picture_legend, color_scale
-from .figure import DPI, INK, SMALL, TEXT, Image, Path, finish, fit_height, grid, new, png
-from .raster import paint
-from .scene import Camera, Rendering, mean_edge, scene, view_of
+from .figure import (
+    DPI,
+    INK,
+    SMALL,
+    TEXT,
+    Image,
+    Path,
+    add_picture_legend,
+    color_scale,
+    finish,
+    fit_height,
+    grid,
+    new,
+    png,
+)
+from .scene import Camera, Rendering, mean_edge, paint, scene, view_of
 
 if TYPE_CHECKING:
     from .. import Panels

@@ -27,8 +27,7 @@ def is_drawing(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix != RHINO:
         return suffix == DXF
-    from ..plan.layers import layer_of
-    from ..plan.strokes import read_strokes
+    from ..plan.strokes import layer_of, read_strokes
 
     with suppress(PcmcError, MissingExtra, OSError):  # the reader of surfaces has the better error
         for stroke in read_strokes(path).strokes:

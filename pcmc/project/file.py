@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..advice.rises import RISES, Rise, take_rises, taken, with_rises
-from ..advice.supports import mast_note
+from ..advice.rises import RISES, Rise, mast_note, take_rises, taken, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
-from ..base.units import NO_UNITS, Units, size_note
+from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
@@ -135,7 +134,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
     elif project.drawing is None and project.plan is not None:
         corners = project.plan.outline.at(project.plan.outline.dense)
         width = float(np.ptp(corners, axis=0).max())
-        for note in filter(None, (mast_note(project.plan), size_note(width, project.units.length))):
+        for note in filter(None, (mast_note(project.plan), unlikely_size(width, project.units.length))):
             warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 

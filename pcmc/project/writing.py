@@ -18,7 +18,6 @@ from ..base.files import PathLike, atomic_writes, check_name, system_error, writ
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..cloth import CuttingPattern
 from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
@@ -162,20 +161,6 @@ def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
         (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
     ]
     return [*jobs, (paths["picture"], partial(under_load, analysis))]
-
-
-def paint_families(path: Path, schedule: Panels, view: Any) -> None:
-    """Draw panels, coloured by family."""
-    from ..plot import families  # needs the extra plot
-
-    families(schedule, path, view=view)
-
-
-def paint_strain(path: Path, pattern: CuttingPattern, view: Any) -> None:
-    """Draw the strips on the roof, coloured by the strain of the cloth."""
-    from ..plot import strains  # needs the extra plot
-
-    strains(pattern, path, view=view)
 
 
 def draw_picture(

@@ -16,7 +16,7 @@ from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate, quantities
 from ..certificate.certificate import certified, warning_mark
 from ..certificate.quantities import Figure
-from ..drawings.pdf import register_fonts
+from ..drawings.sheet import register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png

@@ -18,7 +18,7 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import Flowable, Image, KeepTogether, PageBreak, Paragraph, SimpleDocTemplate
 from reportlab.platypus import Table as Grid
 
-from ..drawings.pdf import BOLD, FONT, paint_sheet
+from ..drawings.sheet import BOLD, FONT, paint_sheet
 from .plan import PaperPlan
 from .tables import Block, Heading, Table
 

@@ -59,6 +59,7 @@ def solve(
     solver = find_method(method)
     cannot = "slide vertices along lines" if surface.on_line else ""
     cannot = cannot or next((f"keep the volume of room {room.name!r}" for room in surface.rooms), "")
+    cannot = cannot or ("move curved elements" if surface.order > 1 else "")
     if cannot and method != "newton":
         message = f"method {method!r} cannot {cannot}; use method='newton'"
         raise OptionError(message, what="method", found=method, expected="newton")

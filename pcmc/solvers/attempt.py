@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
+from ..base.errors import OptionError
 from ..base.tolerances import COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
 from ..stability.modes import clear_of_zero
 from ..surface import Surface
+from ..surface.lagrange import known_order
 from .result import Callback, Progress, Status, until_stopped
 from .state import SolverState
 from .steps import Stepper
@@ -43,6 +45,8 @@ class NewtonOptions:
     min_quality : vertices are redistributed along the shape while the worst triangle has less quality.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
+    order : of the elements of the result: flat triangles are solved first, on all levels, and then, as
+        elements of order 2, 4 or 8, once more; None for the order of the surface.
     """
 
     tolerance: float = 1e-12
@@ -52,6 +56,7 @@ class NewtonOptions:
     min_quality: float = 0.45
     inflation: float = 10.0
     backend: str | None = None
+    order: int | None = None
 
     def __post_init__(self) -> None:
         validate.number("tolerance", self.tolerance, above=0.0)
@@ -60,6 +65,8 @@ class NewtonOptions:
         validate.integer("levels", self.levels)
         validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
         validate.number("inflation", self.inflation, above=1.0)
+        if self.order is not None:
+            known_order(self.order, OptionError)
 
 
 @dataclass

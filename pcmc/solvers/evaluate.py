@@ -72,7 +72,7 @@ class Evaluator:
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
         self._more = surface.heavy or any(True for _ in elements(surface, surface.vertices))
-        self._single = len(blocks(surface.m, threads())) == 1
+        self._single = len(blocks(surface.m, threads())) == 1 and not self._mesh.curved
 
     def ending(self, point: Point) -> Status | None:
         """Why to stop at a point, or None."""

@@ -22,6 +22,7 @@ from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_en
 from ..forces.functional import energy
 from ..forces.pinching import find_walls
 from ..forces.rooms import check_rooms, room_pressures
+from ..meshing.elevation import elevate
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import descent_mode
@@ -43,11 +44,14 @@ def newton(
     check_rooms(surface)
     refinable("levels", options.levels, surface.m)
     log, first, rows = Log(callback), surface, list[dict[str, Any]]()
-    for level in range(options.levels + 1):
+    order = options.order or surface.order
+    last = options.levels + (order > surface.order)
+    for level in range(last + 1):
         end = _solve_level(surface, options, log, level, rows)
-        if end.status is not Status.CONVERGED or level == options.levels:
+        if end.status is not Status.CONVERGED or level == last:
             break
-        surface, rows, end.clear = refine(end.state.result_surface()), end.rows, None
+        reached, rows, end.clear = end.state.result_surface(), end.rows, None
+        surface = refine(reached) if level < options.levels else elevate(reached, order)
     reached = end.state.result_surface()
     return Result(
         surface=reached,

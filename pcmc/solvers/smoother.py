@@ -39,7 +39,7 @@ class Smoother:
         tensions = {p.name: max(p.tension, least) for p, least in zip(surface.patches, floor, strict=True)}
         self._moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
-        self._classes = replace(classes, active=np.ones(surface.m, dtype=bool), **faces)
+        self._classes = replace(classes, active=np.ones(surface.m, dtype=bool), nodes=surface.nodes, **faces)
         used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
         self._surface, self._axes = surface, _axes(surface)
         self._free, self._number = _free_coordinates(surface, used, self._axes)

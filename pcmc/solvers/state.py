@@ -48,7 +48,8 @@ class SolverState:
     def __init__(
         self, surface: Surface, min_quality: float, held: bool = False, backend: str | None = None
     ) -> None:
-        self.min_quality, self.size, self.backend = min_quality, surface.size, backend
+        self.min_quality = min_quality if surface.order == 1 else 0.0  # nodes stay where they are in elements
+        self.size, self.backend = surface.size, backend
         self.pressures = np.zeros(len(surface.rooms))  # (r,) δ, their changes since the start
         part = standing_part(surface)
         if held:

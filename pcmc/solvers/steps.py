@@ -46,19 +46,20 @@ class Stepper:
         self._smoother_age = REFRESH
         self.state.at.release()
 
-    def _drop_outdated(self) -> None:
+    def drop_outdated(self) -> None:
+        """Drop the factors where they belong to other faces or unknowns."""
         if self._version != self.state.version:
             self.free()
 
     def newton(self) -> bool:
         """A Newton step, shortened if necessary; False, with nothing moved, if none helps."""
-        self._drop_outdated()
+        self.drop_outdated()
         state, at = self.state, self.state.at
         fresh = self.second is None
-        second = self.second or self._factorise_definite()
+        second = self.second or self.factorise()
         if second is None:
             return False
-        d, pressures, gmres_steps = self._direction(second)
+        d, pressures, gmres_steps = self.direction(second)
         energy, slope = state.energy, float((at.gradient * d).sum())
         for t in LENGTHS if fresh else LENGTHS[:1]:
             X, down = state.displaced(t * d)
@@ -87,7 +88,7 @@ class Stepper:
 
     def descend(self) -> bool:
         """One smooth descent step with backtracking; False if E does not fall."""
-        self._drop_outdated()
+        self.drop_outdated()
         state, at = self.state, self.state.at
         if self._smoother is None:
             self._smoother = Smoother(at.surface, at.classes, state.backend)
@@ -153,7 +154,7 @@ class Stepper:
 
         ``at`` is the present equilibrium, whose factors may be used up; by default a copy.
         """
-        self._drop_outdated()
+        self.drop_outdated()
         state, at = self.state, at or replace(self.state.at)
         try:
             second = at.factorised()
@@ -190,7 +191,7 @@ class Stepper:
             t *= 2.0
         return best
 
-    def _factorise_definite(self) -> SecondVariation | None:
+    def factorise(self) -> SecondVariation | None:
         """Factorise; where a minimum is sought, with shifts until no eigenvalue is negative."""
         for shift in SHIFTS if self.minimum else SHIFTS[:1]:
             try:
@@ -211,7 +212,7 @@ class Stepper:
         out = action(np.append(then.from_other(now, z[: now.size]), z[now.size :]))
         return np.append(now.from_other(then, out[: now.size]), out[now.size :])
 
-    def _direction(self, second: SecondVariation) -> tuple[Floats, Floats, int]:
+    def direction(self, second: SecondVariation) -> tuple[Floats, Floats, int]:
         """-B J⁻¹ r (n,3), the changes (r,) of the rooms' pressures, and the steps that GMRES took.
 
         The factor preconditions J, ``Equilibrium.times``; shifted, it is the inverse. Stiffness added to the

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, read_only
 from ..forces.functional import energy_and_gradient
 from ..forces.jacobian import Linearisation, linearise
 from ..forces.loose_parts import relative_forces
@@ -44,6 +44,9 @@ class Equilibrium:
     X: Floats  # (n,3)
     backend: str | None = None  # of the factorisation; None for the fastest here
     least_volume: float = 0.0  # smaller prescribed volumes count as this large in ``volume_units``, length³
+
+    def __post_init__(self) -> None:
+        read_only(self.X)  # like those of a surface: compiled loops are compiled for one kind of array
 
     @classmethod
     def of(cls, surface: Surface, backend: str | None = None) -> Equilibrium:

@@ -20,6 +20,7 @@ from ..forces.triangles import effective_tensions
 from ..surface import Surface, expect_surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.lagrange import expect_flat
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports
 from .gas import Gas
@@ -140,6 +141,7 @@ class StructuralModel:
         solved: Any = self.surface  # or a surface, which has neither of these
         surface = getattr(solved, "surface", solved)
         expect_surface(surface)
+        expect_flat(surface, "the structural model")
         hint = "give Material(young=..., poisson=...)"
         for name, material in _each(self.material, surface.patches, "patch"):
             if not isinstance(material, Material):

@@ -20,6 +20,7 @@ from .checked import checked_parts
 from .geometry import bounding_size
 from .guides import Guide, Plane
 from .held_curve import EdgesOnCurves, HeldCurve, followed
+from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
 from .summary import summary
 from .topology import Topology, topology
@@ -28,7 +29,7 @@ from .walls import wall_patches
 
 PARTS = (
     *("vertices", "faces", "patch_of_face", "patches"),
-    *("fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "curves"),
+    *("fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "curves", "order"),
 )
 FIELDS = (*PARTS, "given_supports")
 GROUND = Plane()
@@ -79,6 +80,8 @@ class Surface(supports.Supported):
     curves : sequence of HeldCurve: the curves that fixed vertices were drawn on. The new vertices of finer
         meshes are fixed on them; of other edges between fixed vertices it is guessed whether they are held.
         Where fixed vertices are moved, see ``held_curves``.
+    order : 1 for flat triangles; 2, 4 or 8 for curved elements of this order (``pcmc.surface.lagrange``),
+        each of order² triangles in a row, as ``pcmc.meshing.elevation.elevate`` makes them.
 
     Attributes
     ----------
@@ -109,6 +112,7 @@ class Surface(supports.Supported):
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
     curves: tuple[HeldCurve, ...] = ()
+    order: int = 1
     given_supports: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -140,6 +144,11 @@ class Surface(supports.Supported):
     def topology(self) -> Topology:
         """Edges, curves and points, from the faces alone; shared by all moved copies."""
         return topology(self.faces, self.patch_of_face, len(self.vertices))
+
+    @cached_property
+    def nodes(self) -> Ints:
+        """(e,k) the nodes of the elements, their corners first; of flat triangles ``faces``."""
+        return self.faces if self.order == 1 else element_nodes(self.faces, self.order)
 
     @cached_array
     def uncancelled(self) -> Floats:
@@ -394,4 +403,6 @@ class Surface(supports.Supported):
             other.__dict__["origin"] = self.origin
             if "faces" not in changes:
                 hand_over(self, other, "flat_pieces")
+        if "faces" not in changes:
+            hand_over(self, other, "nodes")
         return other

@@ -18,7 +18,7 @@ from ..base.compiled import compiled
 
 SHEET, CURVE, POINT = 0, 1, 2
 SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle's sides, in the order of the corners opposite
-FEW = 32  # sides in a bucket up to which sorting by insertion is fastest
+GAPS = (16001, 3301, 701, 301, 132, 57, 23, 10, 4, 1)  # of Shell's sort
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,15 +351,13 @@ def _number_edges(F: Ints, n: int) -> tuple[Ints, Ints, Ints]:
     count = 0
     for v in range(n):
         start, end = first[v], first[v + 1]
-        if end - start > FEW:
-            order = np.argsort(higher[start:end])
-            higher[start:end], place[start:end] = higher[start:end][order], place[start:end][order]
-        for i in range(start + 1, end):
-            high, where, j = higher[i], place[i], i
-            while j > start and higher[j - 1] > high:
-                higher[j], place[j] = higher[j - 1], place[j - 1]
-                j -= 1
-            higher[j], place[j] = high, where
+        for gap in GAPS:
+            for i in range(start + gap, end):
+                high, where, j = higher[i], place[i], i
+                while j >= start + gap and higher[j - gap] > high:
+                    higher[j], place[j] = higher[j - gap], place[j - gap]
+                    j -= gap
+                higher[j], place[j] = high, where
         for i in range(start, end):
             if i == start or higher[i] != higher[i - 1]:
                 edges[count, 0], edges[count, 1] = v, higher[i]

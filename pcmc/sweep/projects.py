@@ -54,7 +54,7 @@ def project_sweep(
         about["method"] = method
     flags = {"mesh_check": mesh_check, "search": search}
     about |= {name: True for name, value in flags.items() if validate.flag(name, value)}
-    sweep = Sweep(solve_project, grid, about | fixed)
+    sweep = Sweep(solve_varied, grid, about | fixed)
     projects.check_varied(path, dict(sweep.grid) | {name: [value] for name, value in fixed.items()})
     return sweep
 
@@ -69,7 +69,7 @@ def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[st
     return with_units(names, start.units, mine | {f"cable {name}" for name in cables})
 
 
-def solve_project(
+def solve_varied(
     project: str,
     project_digest: str,
     method: str | None = None,

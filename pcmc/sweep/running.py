@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -14,17 +13,16 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from ..base import validate
-from ..base.errors import OptionError, SweepError
+from ..base.errors import SweepError
 from ..base.interrupts import interrupts_handled, stop_requested
 from .grid import Sweep
 from .store import Record, open_store
 from .tables import table
-from .workers import OWN_VERSION, Submit, failed_outcome, open_workers
+from .workers import OWN_VERSION, Submit, Workers, failed_outcome
 
 if TYPE_CHECKING:
     import pandas as pd
 
-LONGEST = threading.TIMEOUT_MAX  # seconds that a time limit may have
 PACE = 0.05  # seconds between two transactions: each costs some milliseconds
 
 
@@ -86,7 +84,10 @@ def run(
     1        2  finished    1.0
     2        3  finished    1.5
     """
-    _check_options(executor, scheduler, workers, time_limit, on_record, on_resume)
+    crew = Workers(executor, scheduler, workers, time_limit)
+    for name, called in (("on_record", on_record), ("on_resume", on_resume)):
+        if not (called is None or callable(called)):
+            validate.refuse(name, called, "a function")
     with ExitStack() as stack:
         stored = None if store is None else stack.enter_context(open_store(store, sweep))
         records = {} if stored is None else dict(stored.records)
@@ -101,8 +102,8 @@ def run(
             finished = SimpleQueue[Future[dict[str, Any]] | None]()
             # Ctrl-C comes out of the queue, not in the middle of a write
             stack.enter_context(interrupts_handled(lambda *_: finished.put(None)))
-            opened = open_workers(sweep.case, time_limit, executor, scheduler, workers)
-            pending = stack.enter_context(_submitted(stack.enter_context(opened), todo, finished))
+            submit = stack.enter_context(crew.opened(sweep.case))
+            pending = stack.enter_context(_submitted(submit, todo, finished))
             progress = _progress(records, todo, len(sweep))
             for futures in _batches(finished, pending):
                 new: list[Record] = []
@@ -121,33 +122,6 @@ def run(
                     stop_requested(error)
                     break
     return table(records.values())
-
-
-def _check_options(
-    executor: Executor | None,
-    scheduler: str | None,
-    workers: int | None,
-    time_limit: float | None,
-    on_record: object,
-    on_resume: object,
-) -> None:
-    given = {"executor": executor, "scheduler": scheduler, "workers": workers}
-    names = [name for name, value in given.items() if value is not None]
-    if len(names) > 1:
-        text = f"{' and '.join(names)} exclude each other; give one of them"
-        raise OptionError(text, what=names[0], found=tuple(names))
-    for name, value, sound, expected in (
-        ("executor", executor, isinstance(executor, Executor), "one of concurrent.futures"),
-        ("scheduler", scheduler, isinstance(scheduler, str), "'tcp://host:8786'"),
-        ("on_record", on_record, callable(on_record), "a function of a SweepProgress"),
-        ("on_resume", on_resume, callable(on_resume), "a function of two numbers of cases"),
-    ):
-        if value is not None and not sound:
-            validate.refuse(name, value, expected)
-    if workers is not None:
-        validate.integer("workers", workers, least=1)
-    if time_limit is not None:
-        validate.number("time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST)
 
 
 def _progress(

@@ -8,8 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import MissingExtra, OptionError
+from ..base.errors import OptionError
 from ..base.files import atomic_write, suffix_of, writing
+from ..base.libraries import require
 from ..base.units import Units
 from ..surface.values import KINDS
 from .case_script import WORDS
@@ -83,11 +84,10 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
         if suffix == ".csv":
             frame.to_csv(temporary, lineterminator="\n")
             return
-        try:
-            import pyarrow as pa
-            import pyarrow.parquet as pq
-        except ImportError:
-            raise MissingExtra("pyarrow", "files") from None
+        require("pyarrow")
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
         columns = {}
         for name, column in frame.reset_index().items():
             try:

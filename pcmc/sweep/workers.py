@@ -16,12 +16,14 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from ..base.child_process import ChildError, ChildProcess
-from ..base.errors import MissingExtra, OptionError, SweepError
+from ..base import validate
+from ..base.errors import OptionError, SweepError
+from ..base.libraries import ChildError, ChildProcess, require
 from . import case_script
 from .case_script import version
 
@@ -144,36 +146,57 @@ def retire(team: str) -> None:
     mine.close()
 
 
-@contextmanager
-def open_workers(
-    case: str, time_limit: float | None, executor: Executor | None, scheduler: str | None, workers: int | None
-) -> Iterator[Submit]:
-    """A function that has a case run, given its parameters. At the end, the case processes are ended."""
-    team = uuid.uuid4().hex
-    if scheduler is not None:
-        with _cluster(team, scheduler) as cluster:
-            yield lambda parameters: cluster.submit(run_case, team, case, parameters, time_limit)
-        return
-    mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    pool = executor or ThreadPoolExecutor(workers or mine)  # the processors this process may use
-    try:
-        yield lambda parameters: pool.submit(run_case, team, case, parameters, time_limit)
-    finally:
-        retire(team)
-        if executor is None:
-            pool.shutdown()
+@dataclass(frozen=True)
+class Workers:
+    """Who runs cases, one of the first three or all processors, and for how many seconds a case at most."""
+
+    executor: Executor | None
+    scheduler: str | None
+    workers: int | None
+    time_limit: float | None
+
+    def __post_init__(self) -> None:
+        names = [name for name in ("executor", "scheduler", "workers") if getattr(self, name) is not None]
+        if len(names) > 1:
+            text = f"{' and '.join(names)} exclude each other; give one of them"
+            raise OptionError(text, what=names[0], found=tuple(names))
+        if not isinstance(self.executor, Executor | None):
+            validate.refuse("executor", self.executor, "one of concurrent.futures")
+        if not isinstance(self.scheduler, str | None):
+            validate.refuse("scheduler", self.scheduler, "'tcp://host:8786'")
+        if self.workers is not None:
+            validate.integer("workers", self.workers, least=1)
+        if self.time_limit is not None:
+            what = "time_limit (seconds; None for no limit)"
+            validate.number(what, self.time_limit, above=0.0, below=threading.TIMEOUT_MAX)
+
+    @contextmanager
+    def opened(self, case: str) -> Iterator[Submit]:
+        """A function that has a case run, given its parameters. At the end, the case processes are ended."""
+        team, limit = uuid.uuid4().hex, self.time_limit
+        if self.scheduler is not None:
+            with _cluster(team, self.scheduler) as cluster:
+                yield lambda parameters: cluster.submit(run_case, team, case, parameters, limit)
+            return
+        mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        pool = self.executor or ThreadPoolExecutor(self.workers or mine)  # the processors that it may use
+        try:
+            yield lambda parameters: pool.submit(run_case, team, case, parameters, limit)
+        finally:
+            retire(team)
+            if self.executor is None:
+                pool.shutdown()
 
 
 @contextmanager
 def _cluster(team: str, address: str) -> Iterator[Executor]:
-    """An executor on the workers of a Dask scheduler, each with the same version of pcmc."""
+    """An executor on the workers of a Dask scheduler."""
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
         text = f"scheduler: expected 'tcp://host:8786', found {address!r}"
         raise OptionError(text, what="scheduler", found=address, expected="tcp://host:8786")
-    try:
-        from distributed import Client
-    except ImportError:
-        raise MissingExtra("distributed", "distributed") from None
+    require("distributed", extra="distributed")
+    from distributed import Client
+
     try:
         client = Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -185,11 +208,6 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
         except TimeoutError as error:
             text = f"the Dask scheduler at {address!r} has no workers; start one with: dask worker {address}"
             raise SweepError(text, what="scheduler", found=address) from error
-        for worker, found in client.run(version, "pcmc", on_error="return").items():
-            if found != OWN_VERSION:
-                text = f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
-                text += " the same version there"
-                raise SweepError(text, what="pcmc", where=worker, found=found, expected=OWN_VERSION)
         try:
             yield client.get_executor(pure=False)
         finally:

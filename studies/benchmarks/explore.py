@@ -11,7 +11,7 @@ import numpy as np
 from generators import bezier_hall
 from pcmc import Surface
 from pcmc.explore import start
-from pcmc.explore.protocol import unpack
+from pcmc.explore.listening import unpack
 
 from .timing import Row
 

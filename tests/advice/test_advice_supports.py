@@ -10,7 +10,7 @@ import tomlkit
 from drawn import drawing
 
 from pcmc import cli, project
-from pcmc.advice.supports import point_masts, with_rings
+from pcmc.advice.rises import point_masts, with_rings
 from pcmc.base.errors import FileWarning, PlanWarning
 from pcmc.plan import Plan
 

@@ -16,7 +16,7 @@ import pcmc
 from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning, LostWarning, OptionError
-from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor, size_note
+from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor, unlikely_size
 from pcmc.io.mesh_data import in_new_unit, scaled_surface
 from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
@@ -327,6 +327,6 @@ def test_wrong_units_of_a_project_are_refused(tmp_path, lines, what, line):
     ],
 )
 def test_an_unlikely_size_is_named_with_the_unit_that_would_explain_it(size, drawn, note):
-    found = size_note(size, "m", drawn)
+    found = unlikely_size(size, "m", drawn)
     assert found.startswith(note)
     assert bool(found) == bool(note)

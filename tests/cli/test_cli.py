@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import os
 import subprocess
 import sys
@@ -11,6 +10,7 @@ from importlib.metadata import version
 import numpy as np
 import pandas as pd
 import pytest
+from nightly import at_night
 from small_project import SMALL
 
 import pcmc
@@ -31,6 +31,7 @@ COMMANDS = [
     "structure",
     "panels",
     "draw",
+    "equilibria",
     "sweep",
     "explore",
     "cache",
@@ -157,7 +158,7 @@ def test_sweep(folder, capsys):
 
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     seen = []
-    monkeypatch.setattr("pcmc.explore.start_roof", lambda *given: given)
+    monkeypatch.setattr("pcmc.explore.start", lambda *given, watch: (*given, watch))
     monkeypatch.setattr("pcmc.explore.open_and_wait", lambda given, page: seen.append((*given, page)))
     assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
     assert cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"]) == 0
@@ -235,7 +236,7 @@ def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
     assert "'a'" in out.split("case 1: ")[1]
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+@pytest.mark.parametrize("encoding", ["ascii", *at_night("cp1252")])
 def test_letters_that_the_terminal_lacks_are_written_otherwise(folder, encoding):
     text = SMALL.replace("roof = ", '"größe, ō" = ')
     (folder / "roof.toml").write_text(text, encoding="utf-8")
@@ -289,14 +290,7 @@ def test_what_a_file_says_of_its_surface_is_carried_over(solved, capsys):
 
 
 def test_without_typer_the_extra_is_named(monkeypatch, capsys):
-    real = builtins.__import__
-
-    def without(name, *rest, **more):
-        if name == "typer":
-            raise ModuleNotFoundError("No module named 'typer'", name="typer")
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "typer", None)
     assert cli.main(["--help"]) == 2
     err = capsys.readouterr().err
     assert "pcmc-surfaces[cli]" in err

@@ -235,7 +235,7 @@ def test_unused_vertices_are_left_out():
 
 
 def test_without_compas(monkeypatch):
-    monkeypatch.setitem(sys.modules, "compas.datastructures", None)
+    monkeypatch.setitem(sys.modules, "compas", None)
     with pytest.raises(MissingExtra, match=r"compas is not installed.*pcmc-surfaces\[compas\]"):
         rooms.to_meshes(tent())
     with pytest.raises(MissingExtra):

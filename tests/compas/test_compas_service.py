@@ -26,7 +26,7 @@ rooms = pytest.importorskip("pcmc.compas")
 from compas import rpc as compas_rpc  # noqa: E402
 from compas.datastructures import Mesh  # noqa: E402
 
-from pcmc.compas.__main__ import main as service_main  # noqa: E402
+from pcmc.compas.__main__ import command as service_main  # noqa: E402
 from pcmc.compas.server import set_up, settings_path  # noqa: E402
 
 

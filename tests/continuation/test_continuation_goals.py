@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from branches import AT_REST
+from nightly import at_night
 from refusals import refused
 from shapes import octahedron, pyramid
 
@@ -44,7 +45,7 @@ def test_a_branch_ends_to_the_last_digit_at_the_parameter_asked_for(control):
     assert branch.points.residual.iloc[-1] < 1e-10
 
 
-@pytest.mark.parametrize("above", [False, True])
+@pytest.mark.parametrize("above", [False, *at_night(True)])
 @pytest.mark.parametrize("goal", ["parameter", "energy"])
 def test_goal_that_a_step_passes_twice_is_met_the_first_time(small_cap, goal, above):
     """λ and E turn at the fold: both ends of the step over it lie on one side of the goal."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from branches import tension_of_height
+from nightly import at_night
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
@@ -47,7 +48,7 @@ def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
     assert after.residual <= 1e-9
 
 
-@pytest.mark.parametrize("largest", [0.15, 0.04])
+@pytest.mark.parametrize("largest", [0.15, *at_night(0.04)])
 def test_wall_comes_down_at_the_same_tensions_whatever_the_steps(largest):
     start = solve(two_squares(4, alpha_aux=1.0)).surface
     branch = follow(start, "wall", 3.0, largest=largest)

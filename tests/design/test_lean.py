@@ -90,7 +90,7 @@ NEAR = partial(refine_near, points=[6, 3, 0.5], levels=2, radius=1.5)
     [partial(remesh, edge_length=0.7), *at_night(refine, NEAR)],
     ids=["remeshed", "refined", "refined near"],
 )
-@pytest.mark.parametrize("turned", [0.0, 2.0])
+@pytest.mark.parametrize("turned", [0.0, *at_night(2.0)])
 def test_an_upright_wall_stays_upright_on_finer_meshes(finer, turned):
     """All of the wall, and the junction, stay in the plane; so do they once solved."""
     divider = Divider([[6 - turned, 0], [6 + turned, 6]], 3.0, upright=True)

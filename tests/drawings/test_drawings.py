@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import warnings
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -20,8 +21,8 @@ from generators import hypar_roof, spherical_cap, two_squares
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.drawings import FORMATS, drawing_set, pdf
-from pcmc.drawings.panel_sheets import panel_sheets
+from pcmc.drawings import FORMATS, drawing_set
+from pcmc.drawings.drawing_set import panels_at_true_size
 from pcmc.drawings.sheet import LAYERS, box, corner, drawing_area
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
@@ -93,7 +94,7 @@ def test_a_plane_through_vertices_gives_one_line_per_patch_and_one_at_the_rim_no
 @pytest.mark.parametrize(("name", "millimetres"), [("A4", 60.0), ("A3", 100.0), ("A1", 250.0)])
 def test_panels_on_sheets_are_congruent_apart_and_within_the_frame(squares, name, millimetres):
     schedule = pcmc.panels(squares, 0.01)
-    sheets = panel_sheets(schedule, name, millimetres)
+    sheets = panels_at_true_size(schedule, name, millimetres)
     assert len(sheets) > 1
     number = 0
     low, high = corner(), corner() + drawing_area(name)
@@ -118,7 +119,7 @@ def test_labels_of_neighbours_name_each_other_and_the_same_edge(squares):
     schedule = pcmc.panels(squares, 0.01)
     labels = {}
     number = 0
-    for sheet in panel_sheets(schedule, "A3", 100.0):
+    for sheet in panels_at_true_size(schedule, "A3", 100.0):
         texts = [text.text for text in sheet.texts if text.layer == "PCMC-LABEL"]
         for k in range(0, len(texts), 3):
             number += 1
@@ -153,7 +154,7 @@ def test_panels_larger_than_the_sheet_are_flat_at_true_size_in_model_space(tmp_p
     assert max(a.intersection(b).area for a, b in combinations(shapes, 2)) < 1e-9
     assert min(outline[:, 0].min() for outline in outlines) > squares.vertices[:, 0].max()
     longest = drawings.schedule.panels[["a", "b", "c"]].max(axis=1).median()
-    some = panel_sheets(drawings.schedule, "A3", 400.0 / longest)  # some fit, and some do not
+    some = panels_at_true_size(drawings.schedule, "A3", 400.0 / longest)  # some fit, and some do not
     assert {sheet.title.split()[1] == "larger" for sheet in some} == {True, False}
 
 
@@ -275,7 +276,7 @@ def test_all_files_appear_together_or_none(tmp_path, monkeypatch, drawings):
         raise OSError(28, "No space left on device")
 
     (tmp_path / "roof.dxf").write_text("old")
-    monkeypatch.setattr(pdf, "write_pdf", fail)
+    monkeypatch.setattr(sys.modules["pcmc.drawings.drawing_set"], "write_pages", fail)
     with refused(FileError, what=str(tmp_path / "roof.pdf")):
         drawings.write(tmp_path / "roof.dxf", tmp_path / "roof.pdf", tmp_path / "roof.svg")
     assert [path.name for path in tmp_path.iterdir()] == ["roof.dxf"]

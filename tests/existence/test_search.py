@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from nightly import at_night
 from random_meshes import random_surface
 from shapes import pyramid, tube
 from starts import sphere, spherical_cap, two_caps, two_squares
@@ -55,7 +56,7 @@ def test_every_cap_above_the_fold_is_found_from_any_height(alpha):
         )
 
 
-@pytest.mark.parametrize("alpha", [0.3, 0.45])
+@pytest.mark.parametrize("alpha", [*at_night(0.3), 0.45])
 def test_every_cap_below_the_fold_ends_with_balance_as_proof(alpha):
     for height in HEIGHTS[::2]:
         result = solve(paraboloid(height, alpha))
@@ -161,7 +162,8 @@ def test_the_flow_of_the_paper_is_not_rescued():
         assert result.proofs == result.tried == ()
 
 
-@pytest.mark.parametrize(("half", "target"), [(0.7, "minimum"), (0.7, "stationary"), (1.0, "minimum")])
+@pytest.mark.parametrize("target", ["minimum", *at_night("stationary")])
+@pytest.mark.parametrize("half", [0.7, *at_night(1.0)])
 def test_a_neck_between_rings_too_far_apart(half, target):
     result = solve(film(half), target=target)
     assert result.status is Status.NONE_FOUND

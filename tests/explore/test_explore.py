@@ -18,7 +18,7 @@ from pcmc import explore
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Verdict
 from pcmc.explore import server
-from pcmc.explore.protocol import pack, unpack
+from pcmc.explore.listening import pack, unpack
 
 CAP = spherical_cap(edge_length=0.25)
 

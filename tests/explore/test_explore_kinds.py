@@ -11,7 +11,7 @@ from nightly import night_but
 
 from pcmc.design import Target
 from pcmc.design.targets import measure
-from pcmc.explore import saving
+from pcmc.explore import roof as saving
 from pcmc.explore.roof import read_roof
 from pcmc.io import write
 from pcmc.plan import Plan

@@ -24,7 +24,7 @@ CAP = spherical_cap(edge_length=0.25)
 
 @pytest.fixture(scope="module")
 def explorer(hall_roof):
-    running = explore.start_roof(hall_roof)
+    running = explore.start(hall_roof)
     yield running
     running.close()
 
@@ -71,7 +71,7 @@ def test_targets_are_met_from_the_page(hall_session):
     assert state.message == "met: every target is reached"
     assert apex(state.surface, "west") == pytest.approx(1.4, rel=1e-6)
     assert state.undo == 1
-    assert hall_session.aims == aims
+    assert hall_session.now.aims == aims
     assert apex(hall_session.undo().surface, "west") == pytest.approx(1.2, rel=1e-6)
 
 
@@ -159,7 +159,7 @@ def test_an_unknown_patch_in_a_target_or_parameter_is_named(client):
         ("compare", {"number": 1.5}, "expected a whole number"),
         ("compare", {"number": 10**30}, "there is no variant"),
         ("save", {"name": 3}, "expected a name"),
-        ("save", {"name": ""}, "give the file a name"),
+        ("save", {"name": ""}, "a name without folder is needed"),
         ("save", {"name": "a.toml", "replace": 1}, "expected true or false"),
         ("save", {"name": "../a.toml"}, "a name without folder"),
         ("save", {"name": "/tmp/a.toml"}, "a name without folder"),

@@ -19,8 +19,8 @@ from generators import spherical_cap
 from pcmc import explore
 from pcmc.base.errors import FileError, OptionError
 from pcmc.design import Parameter, Target
-from pcmc.explore import saving
-from pcmc.explore.protocol import RequestError
+from pcmc.explore import roof as saving
+from pcmc.explore.listening import RequestError
 from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.panelling.distance import difference
@@ -51,7 +51,7 @@ def test_saving_what_the_page_met_writes_its_targets(hall_roof, hall_session):
     vary = Parameter("west", low=1.0, high=9.0), Parameter("east")
     state = hall_session.meet(targets, vary)
     assert state.message.startswith("met")
-    path, note = saving.save(hall_roof, state.surface, "met.toml", False, hall_session.aims)
+    path, note = saving.save(hall_roof, state.surface, "met.toml", False, hall_session.now.aims)
     assert note == "with its targets: apex of west, height at (9, 3)"
     again = read_roof(path, use_cache=False)
     assert again.aims[0] == targets
@@ -72,7 +72,7 @@ def test_a_named_point_keeps_its_name(tmp_path):
     met = Session(solved_start(roof.surface))
     targets = Target("height", (3, 3), 1.3, name="crown"), roof.aims[0][1]
     assert met.meet(targets, roof.aims[1]).message.startswith("met")
-    text, note, _ = saving.project_with(roof, met.surface, met.aims)
+    text, note, _ = saving.project_with(roof, met.surface, met.now.aims)
     assert note == "with its targets: height at crown, apex of east"
     assert tomllib.loads(text)["targets"]["meet"][0] == {"quantity": "height", "of": "crown", "value": 1.3}
 
@@ -140,7 +140,7 @@ def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
 
 
 def test_a_save_that_waits_saves_what_was_shown_when_it_was_asked_for(hall_roof, hall_folder):
-    running, taken = explore.start_roof(hall_roof), threading.Event()
+    running, taken = explore.start(hall_roof), threading.Event()
     session = running.open()[1]
     real = session.state
 
@@ -180,7 +180,7 @@ def test_surfaces_without_a_project_are_not_saved(tmp_path):
 
 
 def test_on_the_network_nothing_is_saved(hall_roof, hall_folder):
-    running = explore.start_roof(hall_roof, host="0.0.0.0")
+    running = explore.start(hall_roof, host="0.0.0.0")
     try:
         client = Client(running)
         header, _ = client.ask("/api/open")

@@ -15,7 +15,7 @@ from asking import asked
 from generators import spherical_cap
 from pcmc import explore
 from pcmc.explore import listening, server
-from pcmc.explore.protocol import unpack
+from pcmc.explore.listening import unpack
 
 CAP = spherical_cap(edge_length=0.5)
 DEEP = "[" * 100_000

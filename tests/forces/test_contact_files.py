@@ -16,7 +16,7 @@ from pcmc import certify
 from pcmc.base.errors import FileError, FileWarning, SurfaceError
 from pcmc.forces.pinching import find_walls, resting_vertices
 from pcmc.io import load
-from pcmc.io.patch_meshes import WALLS as KEY
+from pcmc.io.metadata import WALLS as KEY
 
 WHOLE = ["pcmc", "fe", "dmp", "obj", "ply", "vtp", "vtu"]
 APART = ["glb", "gltf", "3dm", "ifc"]

@@ -12,7 +12,8 @@ import pcmc
 from pcmc import cli
 from pcmc.base.errors import FileError
 from pcmc.io import FORMATS
-from pcmc.project import check_outputs, load
+from pcmc.project import load
+from pcmc.project.writing import check_outputs
 from tests.io.test_hostile_files import TRIANGLE, V, ply
 from tests.io.test_io_foreign import expected
 

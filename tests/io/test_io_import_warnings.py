@@ -164,7 +164,7 @@ def test_output_says_that_it_is_moved_and_what_it_lost_of_the_final_file(tmp_pat
 
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
-        project.write_all([(path, write)])
+        project.writing.write_all([(path, write)])
     lost, moved = (str(warning.message) for warning in found)
     assert lost.startswith(f"{path}: a .stl file cannot carry height, supports")
     assert moved.startswith(f"{path}: its coordinates are relative to")

@@ -23,7 +23,7 @@ def test_a_project_that_cannot_refer_to_its_drawing_is_not_written(tmp_path, cap
     (tmp_path / "other").mkdir()
     elsewhere = tmp_path / "other" / "hall.toml"
     with refused(FileError, what=str(elsewhere), found=str(file)):
-        project.drawing_reference(file, elsewhere)
+        project.planning.drawing_reference(file, elsewhere)
     assert cli.main(["plan", str(file), "-o", str(elsewhere), "--refer"]) == 2
     assert not elsewhere.exists()
     line = re.search(r"pcmc (plan \S+ -o (\S+) --refer)", capsys.readouterr().err)

@@ -60,7 +60,7 @@ def test_a_project_that_refers_to_its_drawing_follows_it(tmp_path):
         '[plan]\ndrawing = "nave.dxf"\nedge_length = 1.0\n[plan.patches]\napse = {tension = 9.0}\n'
         '[[plan.dividers]]\nname = "chancel"\nwall = 4.5\n'
     )
-    assert project.files_of(path) == [path, file]
+    assert project.drawn.files_of(path) == [path, file]
     before = project.digest(path)
     with pytest.warns(FileWarning, match="annotation"):
         loaded = project.load(path)

@@ -16,9 +16,11 @@ from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import SessionState
-from pcmc.plot import colors, pictures, raster
+from pcmc.plot import figure as colors
+from pcmc.plot import pictures
+from pcmc.plot import scene as raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
-from pcmc.project import draw_picture
+from pcmc.project.writing import draw_picture
 from pcmc.surface.colours import WALLS, patch_colors, rgb
 
 RENDERERS = [
@@ -239,7 +241,7 @@ def test_scalars_take_their_colours_and_nothing_is_grey():
 
 
 def test_signed_values_get_a_symmetric_scale():
-    from pcmc.plot.colors import color_scale
+    from pcmc.plot.figure import color_scale
 
     scale = color_scale([np.array([-1.0, np.nan, 3.0]), None], None, None)
     assert (scale.low, scale.high, scale.cmap.name) == (-3.0, 3.0, "RdBu_r")

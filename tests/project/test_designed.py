@@ -242,7 +242,7 @@ def test_other_tensions_are_solved_and_not_kept(folder):
 
 def test_explore_opens_the_designed_roof_also_if_it_misses_its_target(folder, monkeypatch, capsys):
     shown = []
-    monkeypatch.setattr("pcmc.explore.start_roof", lambda *given: given)
+    monkeypatch.setattr("pcmc.explore.start", lambda *given, watch: (*given, watch))
     monkeypatch.setattr("pcmc.explore.open_and_wait", lambda given, page: shown.append(given[0].surface))
     for name in ("roof.toml", "high.toml"):
         assert cli.main(["explore", name, "--no-browser"]) == 0

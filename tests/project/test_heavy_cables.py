@@ -14,7 +14,8 @@ from pcmc.explore.session import Session, solved_start
 from pcmc.forces.parameters import energy_by, gradient_by
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import CableLine, Divider, Hole, Plan
-from pcmc.project import designed, load, read_data, surface_of, varied
+from pcmc.project import designed, load, surface_of, varied
+from pcmc.project.file import read_data
 from pcmc.project.values import changeable_values, data_with_values
 from pcmc.surface.values import rates_of
 

@@ -326,7 +326,7 @@ def in_compas(roof: Roof) -> Facts:
 def on_the_page(roof: Roof) -> Facts:
     """The page, as its browser learns it."""
     opened = read_roof(roof.path)
-    explorer = explore.start_roof(opened)
+    explorer = explore.start(opened)
     try:
         header, _ = Client(explorer).ask("/api/open")
     finally:
@@ -355,7 +355,7 @@ def on_the_page(roof: Roof) -> Facts:
 
 def saved_from_the_page(roof: Roof) -> Facts:
     """Saved from the page under another name, and solved."""
-    explorer = explore.start_roof(read_roof(roof.path))
+    explorer = explore.start(read_roof(roof.path))
     try:
         client = Client(explorer)
         header, _ = client.ask("/api/open")

@@ -11,8 +11,10 @@ from small_project import changed
 
 import pcmc
 from pcmc.base.errors import FileError, OptionError, PcmcError
-from pcmc.project import build, check_names, check_outputs, run
+from pcmc.project import build, run
 from pcmc.project.checking import line_with
+from pcmc.project.settings import check_names
+from pcmc.project.writing import check_outputs
 
 ROOF = Path(__file__).resolve().parents[2] / "notebooks" / "roof.toml"
 

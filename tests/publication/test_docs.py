@@ -10,36 +10,10 @@ import pytest
 
 import pcmc
 from generators import spherical_cap
-from pcmc.plan.layers import MEANINGS
-from pcmc.project import reference, run, sections
+from pcmc.plan.strokes import MEANINGS
+from pcmc.project import reference, sections
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-
-
-def block(page, language):
-    return re.search(rf"```{language}\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.S)[1]
-
-
-def test_the_project_file_of_the_how_to_is_certified_and_meets_its_target(tmp_path):
-    path = tmp_path / "hall.toml"
-    path.write_text(block("how-to/project-file.md", "toml"), encoding="utf-8")
-    outcome = run(path)
-    assert outcome.good
-    west = outcome.surface.faces[outcome.surface.patch_of_face == 0]
-    assert abs(outcome.surface.vertices[west, 2].max() - 1.2) < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("number", "files"), [(0, 3), (2, 0), (3, 0), (4, 1)], ids=["sail", "snow", "bubble", "half"]
-)
-def test_the_projects_of_the_page_of_forces_are_certified(number, files, tmp_path):
-    """Block 1 is a part of a file only."""
-    text = (DOCS / "how-to" / "forces.md").read_text(encoding="utf-8")
-    path = tmp_path / "roof.toml"
-    path.write_text(re.findall(r"```toml\n(.*?)```", text, re.S)[number], encoding="utf-8")
-    outcome = run(path)
-    assert outcome.good
-    assert len(outcome.files) == files
 
 
 def test_the_branches_of_the_explanation_fold_and_split():

@@ -26,7 +26,7 @@ RUN = [page for page in PAGES if any(kind in ("python", "sh", "toml") for _, kin
 SCRIPTS = sorted(path.stem for path in (DOCS / "pictures").glob("*.py") if path.stem != "draw")
 
 
-@pytest.mark.parametrize("page", night_but(RUN, "README.md", "docs/index.md", "docs/installation.md"))
+@pytest.mark.parametrize("page", night_but(RUN))
 @pytest.mark.filterwarnings("ignore")
 def test_a_page_runs(page, tmp_path, monkeypatch):
     if page.endswith("under-load.md") and shutil.which("ccx") is None:

@@ -34,7 +34,8 @@ def test_code_runs_and_converges(code, tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("command", COMMANDS, ids=["reproduce", "pytest"])
 def test_commands_are_the_readmes_and_the_continuous_integrations(command):
     assert f"```sh\n{command}\n```" in README
-    assert command in (HOME / ".ci" / "run").read_text(encoding="utf-8")
+    script = (HOME / ".ci" / "run").read_text(encoding="utf-8")
+    assert [part for part in command.split(" && ") if part not in script] == []
 
 
 @pytest.mark.parametrize("leave_out", [" --margin pressure", *at_night("")])

@@ -160,6 +160,7 @@ def test_corner_of_example_2():
         assert out @ stability.tangent(patch) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.nightly
 def test_example_3_turns_into_a_saddle_as_its_walls_pull_harder(tmp_path, monkeypatch):
     family = stability.Family("fans", "Fans", four_fans, (5,), 20.0, 10.0, (0.5, 3.0), (5, 3.0))
     monkeypatch.setattr(stability, "FAMILIES", (family,))

@@ -6,7 +6,7 @@ import http.client
 import json
 from typing import Any
 
-from pcmc.explore.protocol import unpack
+from pcmc.explore.listening import unpack
 
 
 def asked(explorer: Any, method: str, path: str, body: str | None = None, **headers: str) -> Any:

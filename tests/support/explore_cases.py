@@ -39,7 +39,7 @@ def designed_hall(folder: Path) -> ShownRoof:
 def followed(path: Path) -> Iterator[Any]:
     """The page of a project's file, served, which follows the file."""
     read = partial(read_roof, path, use_cache=False)
-    running = explore.start_roof(read(), watch=read)
+    running = explore.start(read(), watch=read)
     try:
         yield running
     finally:

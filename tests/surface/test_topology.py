@@ -12,7 +12,7 @@ from shapes import cap, hexagon, octahedron, pyramid, three_patches
 
 from pcmc import Patch, Surface
 from pcmc.base.errors import SurfaceError
-from pcmc.surface.topology import CURVE, FEW, POINT, SHEET, components, curve_neighbours, topology
+from pcmc.surface.topology import CURVE, POINT, SHEET, components, curve_neighbours, topology
 
 
 def edges_by_hand(surface):
@@ -33,8 +33,8 @@ def two_bubbles():
 
 
 def umbrella():
-    """A vertex with more triangles than are sorted one by one, its number the lowest."""
-    angle = 2.0 * np.pi * np.arange(FEW + 5) / (FEW + 5)
+    """A vertex with many triangles, its number the lowest."""
+    angle = 2.0 * np.pi * np.arange(400) / 400
     X = np.vstack([[0, 0, 1], np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])])
     ring = np.random.default_rng(3).permutation(len(angle)) + 1  # neighbours out of order
     X[ring] = X[1:].copy()

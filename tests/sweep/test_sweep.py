@@ -18,7 +18,7 @@ from rich.console import Console
 from tables import same
 
 from pcmc.base.errors import FileError, SweepError
-from pcmc.cli.progress import sweeping
+from pcmc.cli.reports import sweeping
 from pcmc.sweep import Sweep, provenance, read_store, run, running, table, write_table
 
 CHAOS = Sweep(

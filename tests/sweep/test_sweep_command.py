@@ -143,7 +143,7 @@ def test_time_limit_and_failed_cases_again(roof, capsys):
 
 
 def test_a_table_without_its_library_is_refused_before_any_case(roof, capsys, monkeypatch):
-    monkeypatch.setattr("pcmc.cli.sweeping.find_spec", lambda name: None)
+    monkeypatch.setattr("pcmc.base.libraries.find_spec", lambda name: None)
     assert cli.main(["sweep", "roof.toml", *GRID[:1], "--csv", "t.parquet", "--store", "s"]) == 2
     assert "pcmc-surfaces[files]" in capsys.readouterr().err
     assert [p.name for p in roof.parent.iterdir()] == ["roof.toml"]

@@ -141,6 +141,6 @@ def test_clusters_that_cannot_be_used(cluster, monkeypatch):
         run(SWEEP, scheduler=cluster.address)
     cluster.start_worker("one")
     monkeypatch.setattr(workers_module, "CONNECT", 30.0)
-    monkeypatch.setattr(workers_module, "OWN_VERSION", "99.0")
+    monkeypatch.setattr("pcmc.sweep.running.OWN_VERSION", "99.0")
     with pytest.raises(SweepError, match=r"has pcmc .*, this is pcmc 99\.0; install the same"):
         run(SWEEP, scheduler=cluster.address)

@@ -6,7 +6,7 @@ import pytest
 import sweep_cases
 from tables import same
 
-from pcmc.base import child_process
+from pcmc.base import libraries as child_process
 from pcmc.base.compiled import threads
 from pcmc.base.errors import OptionError
 from pcmc.sweep import Sweep, case_script, provenance, read_store, run, workers

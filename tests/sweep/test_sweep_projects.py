@@ -16,7 +16,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, OptionError, PcmcError
 from pcmc.project import check_varied, designed, digest, run, varied
-from pcmc.sweep.projects import column_labels, project_sweep, solve_project
+from pcmc.sweep.projects import column_labels, project_sweep, solve_varied
 
 
 def test_numbers_of_the_file_and_of_patches_are_replaced(roof):
@@ -128,7 +128,7 @@ def test_numbers_that_the_file_leaves_out_vary_too(roof):
 
 
 def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
-    case = solve_project("roof.toml", digest(roof), **{"west.tension": 3.2, "wall 1.tension": 0.5})
+    case = solve_varied("roof.toml", digest(roof), **{"west.tension": 3.2, "wall 1.tension": 0.5})
     text = TEXT.replace("west = {tension = 3.0", "west = {tension = 3.2").replace("0.8", "0.5")
     roof.write_text(text, encoding="utf-8")
     alone = run(roof)
@@ -151,7 +151,7 @@ mirrors = [[[6, 0], [6, 4]]]
 )
 def test_a_case_has_the_figures_of_the_roof_that_the_project_shows(roof, output, extent):
     roof.write_text(HALF + output, encoding="utf-8")
-    case = solve_project("roof.toml", digest(roof))
+    case = solve_varied("roof.toml", digest(roof))
     outcome = designed(roof, use_cache=False)
     assert case["extent"] == extent
     for figure in outcome.figures:
@@ -204,7 +204,7 @@ def test_any_quantity_is_shown_and_drawn(roof, capsys, monkeypatch):
 def test_targets_and_remeshing_are_the_projects(roof):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 0.3}]\nvary = ["west"]\n'
     roof.write_text(TEXT + aim + "[remesh]\nedge_length = 0.9\n", encoding="utf-8")
-    case = solve_project("roof.toml", digest(roof), **{"east.tension": 3.1})
+    case = solve_varied("roof.toml", digest(roof), **{"east.tension": 3.1})
     assert case["targets_met"] is True
     assert case["triangles"] > 1.5 * varied(roof, {})[1].m
 

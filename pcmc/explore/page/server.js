@@ -1,6 +1,6 @@
 // Requests to the server. An answer is one run of bytes: a JSON header and the arrays that it names.
 
-/** Header and arrays of a message; see pcmc/explore/protocol.py. */
+/** Header and arrays of a message; see pcmc/explore/listening.py. */
 export function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));

@@ -1,0 +1,275 @@
+"""The commands on files: convert, plot, explore, plan, repair, schema, cache. Each returns the exit code."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import warnings
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from .. import project as projects
+from ..base.errors import FileError, FileWarning, OptionError, unknown
+from ..base.files import atomic_write, suffix_of
+from ..base.interrupts import defer_interrupts
+from ..base.units import LENGTHS
+from ..io import metres_note, write
+from ..io.repairing import HOLES, repair
+from ..project import Outcome, cache
+from ..project.planning import drawing_reference
+from ..project.settings import check_names
+from ..project.writing import check_outputs, draw_picture, surface_files, write_all
+from ..surface import Surface
+from . import NOT_CERTIFIED, OK, arguments, reports
+from .arguments import (
+    OUTPUT,
+    TOML,
+    Cache,
+    FileUnits,
+    Input,
+    Shown,
+    Start,
+    ViewName,
+    Whole,
+    amount,
+    count,
+    load,
+    option,
+    switch,
+)
+from .reports import working
+
+OUT = "File to write; its suffix selects the format."
+SCALAR = "Scalar of the file that colours the vertices of a .glb or .usda."
+EXAMPLE = "A generator, such as two_caps, instead of a file."
+PARAMETER = "Parameter of the example; may be repeated."
+WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
+COLOUR = "--colour", "--color"
+
+
+def convert(
+    *,
+    file: Input,
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=OUT)],
+    what: Shown,
+    units: FileUnits = "",
+    colour: Annotated[str, option("NAME", SCALAR, *COLOUR)] = "",
+    whole: Whole = False,
+) -> int:
+    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm .ifc .usda.
+
+    \b
+    Examples:
+      pcmc convert roof.pcmc roof.3dm
+      pcmc convert roof.toml roof.ifc
+      pcmc convert roof.pcmc roof.glb --colour error
+    """
+    arguments.output_of(file, files=[output])
+    roof = _good(file, what, whole, units)
+    if roof is None:
+        return NOT_CERTIFIED
+    written = write_all(surface_files(roof, [output], colour))
+    print(*(f"{note}\n" for note in metres_note([output], roof.units.length)), sep="", end="")
+    return reports.ended(True, written)
+
+
+def _good(file: Path, what: Shown, whole: bool, units: str = "") -> Outcome | None:
+    """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
+    with working() as progress:
+        roof = what.roof(load(file, units), progress, whole)
+    if roof.result is not None:
+        reports.report(roof)
+    if roof.result is None or roof.good:
+        return roof
+    print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
+    return None
+
+
+def plot(
+    *,
+    file: Input,
+    picture: Annotated[Path, typer.Argument(metavar="PNG")],
+    view: ViewName = "diagonal",
+    colour: Annotated[str, option("NAME", "patches, curvature, error or reactions.", *COLOUR)] = "patches",
+    what: Shown,
+    whole: Whole = False,
+) -> int:
+    """Draw a surface or a project's roof, by patch, mean curvature, curvature error, or with its reactions.
+
+    \b
+    Examples:
+      pcmc plot roof.pcmc roof.png --colour error
+      pcmc plot roof.toml start.png --start
+      pcmc plot half.pcmc roof.png --whole
+    """
+    seen = arguments.parsed_view(view)
+    arguments.output_of(file, picture=picture, view=seen, colour=colour)
+    roof = _good(file, what, whole)
+    if roof is None:
+        return NOT_CERTIFIED
+    painting = partial(draw_picture, roof.shown.surface, views=[seen], colour=colour, units=roof.units)
+    return reports.ended(True, write_all([(picture, painting)]))
+
+
+def explore(
+    file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
+    example: Annotated[str | None, option("NAME", EXAMPLE)] = None,
+    parameter: Annotated[list[str] | None, option("NAME=VALUE", PARAMETER, "--set")] = None,
+    host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, count("Port; 0 for any free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    watch: Annotated[bool, switch("--watch", WATCH)] = False,
+    start_shape: Start = False,
+    cache: Cache = True,
+) -> int:
+    """Explore a surface, or a project's roof, in the browser until Ctrl-C.
+
+    \b
+    Examples:
+      pcmc explore roof.pcmc
+      pcmc explore roof.toml --watch
+      pcmc explore --example two_caps --set edge_length=1.2
+    """
+    from ..explore import open_and_wait, start
+    from ..explore.roof import ShownRoof, read_roof
+
+    if (file is None) == (example is None):
+        raise OptionError("explore: give a file or --example, one of them", what="--example")
+    if watch and file is None:
+        raise OptionError("explore: --watch needs a file", what="--watch")
+    again = None
+    with working() as progress:
+        progress("building")
+        if file is not None:
+            arguments.check_suffix(file)
+            read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
+            roof, again = read(progress=progress, report=reports.report), read if watch else None
+        else:
+            values = {name: listed[0] for name, listed in map(arguments.named_values, parameter or ())}
+            roof = ShownRoof.of(_example(str(example), values), str(example))
+        progress("solving")
+        explorer = start(roof, host, port, watch=again)
+    open_and_wait(explorer, browser)
+    return OK
+
+
+def _example(name: str, parameters: dict[str, Any]) -> Surface:
+    """The surface of a generator, named 'two_caps' or 'package.module:function'."""
+    from ..sweep.case_script import resolve
+
+    try:
+        known: Any = () if ":" in name else resolve("generators:__all__")
+        if ":" not in name and name not in known:
+            raise OptionError(unknown("example", name, known), what="--example", found=name)
+        build = resolve(name if ":" in name else f"generators:{name}")
+        inspect.signature(build).bind(**parameters)
+    except OptionError:
+        raise
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise OptionError(f"--example {name}: {error}", what="--example", found=name) from None
+    return cast("Surface", build(**parameters))
+
+
+GAP = "Gaps between lines up to this length are closed; by default a thousandth of the outline's diagonal."
+LAYERS = "Layers: outline, divider NAME, hole NAME, support, mast NAME, height, patch NAME."
+REFER = "Refer to the drawing, so that the project follows it."
+MESH = "A mesh: .obj .ply .stl .off .dae .3ds .x3d and others."
+WELD = "Vertices nearer to each other than this become one; by default 1e-5 of the mesh's size."
+UNITS = "Unit of length wanted: m, cm, mm, ft or in; a file without one is taken to be in it."
+CLOSED = "Edges of the largest hole that is closed; 0 closes none."
+UP = "The axis that was up where the mesh was drawn: x, y or z; it is turned to be z."
+NEW_LENGTH = "Edge length of new triangles, for a scan; otherwise the triangles stay."
+
+
+def plan(
+    file: Annotated[Path, typer.Argument(metavar="DRAWING", help=f"A .dxf or .3dm. {LAYERS}")],
+    output: Annotated[Path, option("FILE", "Project to write (.toml).", *OUTPUT)],
+    units: Annotated[str, option("NAME", f"Unit of the project: {', '.join(LENGTHS)}.")] = "",
+    gap: Annotated[float | None, amount("LENGTH", GAP)] = None,
+    refer: Annotated[bool, switch("--refer", REFER)] = False,
+) -> int:
+    """Write the project file for a drawing: its lines, and tensions to begin with.
+
+    \b
+    Examples:
+      pcmc plan hall.dxf -o hall.toml
+      pcmc plan hall.3dm -o hall.toml --refer --units m
+    """
+    suffix_of(output, (TOML,), "a project")
+    if output.exists():
+        text = f"{output}: is there already; delete it, or name another file"
+        raise FileError(text, what=str(output))
+    check_outputs([output])
+    if refer:
+        drawing_reference(file, output)  # refuses a drawing elsewhere
+    with working() as progress:
+        progress("reading the drawing")
+        text, drawing = projects.project_text(file, output.parent, units=units, gap=gap, refer=refer)
+    for note in drawing.notes:
+        warnings.warn(f"{file}: {note}", FileWarning, stacklevel=1)
+    with atomic_write(output) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    print(f"written: {output}; solve it with: pcmc solve {output}")
+    return OK
+
+
+def repair_(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help=MESH)],
+    output: Annotated[Path, option("FILE", "File to write.", *OUTPUT)],
+    weld: Annotated[float | None, amount("LENGTH", WELD)] = None,
+    holes: Annotated[int, count(CLOSED)] = HOLES,
+    edge_length: Annotated[float | None, amount("LENGTH", NEW_LENGTH)] = None,
+    units: Annotated[str, option("NAME", UNITS)] = "",
+    up: Annotated[str, option("AXIS", UP)] = "z",
+) -> int:
+    """Repair a dirty mesh: weld, remove what is double or flat, close small holes. FILE stays as it is.
+
+    \b
+    Examples:
+      pcmc repair mesh.obj -o clean.obj
+      pcmc repair scan.ply -o clean.ply --weld 0.01 --edge-length 0.5
+      pcmc repair blender.obj -o hall.obj --units mm --up y
+    """
+    check_names([output])
+    check_outputs([output], inputs=[file])
+    with working() as progress:
+        progress("repairing")
+        repaired = repair(file, weld=weld, holes=holes, edge_length=edge_length, units=units, up=up)
+    with defer_interrupts():
+        write(output, repaired, units=repaired.units)
+    print(repaired, *metres_note([output], repaired.units.length), f"written: {output}", sep="\n")
+    return OK
+
+
+def schema() -> int:
+    """Print the JSON Schema of project files, from which editors complete their keys.
+
+    \b
+    Example:
+      pcmc schema > pcmc.schema.json
+    """
+    print(json.dumps(projects.json_schema(), indent=1))
+    return OK
+
+
+def cache_(clear: Annotated[bool, switch("--clear", "Remove all roofs that are kept.")] = False) -> int:
+    """Show where the roofs of projects solved before are kept, or remove them.
+
+    The variable PCMC_CACHE names another folder; PCMC_CACHE=off keeps nothing.
+
+    \b
+    Example:
+      pcmc cache --clear
+    """
+    folder = cache.cache_folder()
+    if folder is None:
+        print("no roofs are kept (PCMC_CACHE=off)")
+    elif clear:
+        print(f"{len(cache.clear_cache())} roofs removed from {folder}")
+    else:
+        files = cache.cached_files()
+        print(f"{len(files)} roofs in {folder}, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB")
+    return OK

@@ -1,0 +1,90 @@
+"""The command equilibria. Returns the exit code."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from .. import project as projects
+from ..base.errors import OptionError
+from ..project.drawn import files_of
+from ..project.writing import certified_files, check_outputs, write_all
+from . import OK, arguments
+from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load, option, switch
+from .reports import working
+
+ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
+SPAN = "Least and largest factor on it; by default 0.5,1.5. Of what is 0 now, least and largest value."
+STARTS = "Starts of deflated Newton around each equilibrium."
+CHECK = "Check the mesh of each: whether finer meshes have it, too."
+VERTICAL = "Vertical axis of the diagram: height, energy or volume."
+PICTURES, TABLE = (".png", ".svg", ".pdf"), ".csv"
+
+
+def equilibria(
+    *,
+    file: Input,
+    output: Annotated[list[Path] | None, MANY_FILES] = None,
+    along: Annotated[list[str] | None, option("NAME", ALONG)] = None,
+    span: Annotated[str | None, option("LOW,HIGH", SPAN)] = None,
+    starts: Annotated[int, count(STARTS)] = 6,
+    seed: Annotated[int, count("Seed of these starts.")] = 0,
+    axis: Annotated[str, option("NAME", VERTICAL)] = "height",
+    mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,
+    what: Shown,
+    units: FileUnits = "",
+) -> int:
+    """Search for all equilibria of a roof, stable or not, and for the energy barriers between them.
+
+    A .svg, .png or .pdf has the diagram of the branches and a picture of each equilibrium, a .csv the table;
+    of any other format each equilibrium is written as NAME-1, NAME-2 and so on. No search proves that there
+    is no further equilibrium: the last lines say what was searched.
+
+    \b
+    Examples:
+      pcmc equilibria roof.toml -o diagram.svg
+      pcmc equilibria roof.toml --along pressure --along "tension of hall" -o table.csv -o roof.pcmc
+    """
+    from ..equilibria import find_equilibria
+    from ..plot import equilibria as diagram
+    from ..plot.branches import SHOWN
+
+    files = output or []
+    surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
+    projects.Output(files=surfaces)  # refuses an unknown format
+    check_outputs(files, inputs=files_of(file))
+    arguments.validate.choice("--axis", axis, SHOWN)
+    with working() as progress:
+        roof = what.roof(load(file, units), progress, whole=False)
+        options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}
+        found = find_equilibria(
+            roof.surface, along or "pressure", callback=progress, span=_span(span), **options
+        )
+        jobs: list[Any] = []
+        for path in files:
+            if path.suffix.lower() in PICTURES:
+                jobs.append((path, partial(diagram, found, y=axis, units=roof.units)))
+            elif path.suffix.lower() == TABLE:
+                jobs.append((path, partial(found.table.to_csv, index=False)))
+            else:
+                for k, one in enumerate(found.found, 1):
+                    place = path.with_name(f"{path.stem}-{k}{path.suffix}")
+                    jobs += certified_files(one.surface, one.certificate, [place], roof.units)
+        written = write_all(jobs, progress)
+    print(found.text(roof.units))
+    if written:
+        print(f"written: {', '.join(map(str, written))}")
+    return OK
+
+
+def _span(text: str | None) -> tuple[float, float] | None:
+    """The numbers in LOW,HIGH."""
+    if text is None:
+        return None
+    try:
+        low, high = map(arguments.parsed_number, text.split(","))
+    except ValueError:
+        message = f"--span: expected LOW,HIGH such as 0.5,1.5, found {text!r}"
+        raise OptionError(message, what="--span", found=text) from None
+    return low, high

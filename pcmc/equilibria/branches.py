@@ -1,0 +1,126 @@
+"""Branches of equilibria in a parameter, and the equilibria on them at its present value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..base.errors import NoBranch, OptionError
+from ..base.tolerances import HOMOTOPY_END
+from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
+from ..margins.varied import Varied
+from ..solvers import solve
+from ..solvers.result import Progress, Result
+from ..surface import Surface
+
+Span = tuple[float, float]
+AROUND = 0.5  # of the present value: how far below and above it branches are followed
+FROM_ZERO = 4.0  # the same, of what is 0 now, in the unit of ``margin``
+STEPS = 80  # of a branch in each direction
+SWITCHED = 1e-6  # of the span: nearer to its present value, a switched branch has not left it
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A parameter λ of a surface: its name, its value there, and between which values it is followed."""
+
+    name: str
+    parameter: Direction | BoundaryMotion
+    value: float
+    span: Span
+
+    @classmethod
+    def of(cls, surface: Surface, what: Any, span: Span | None) -> Line:
+        """That of a name as of ``margin``, a Direction, or a BoundaryMotion."""
+        name, parameter = "parameter", what
+        if isinstance(what, str):
+            varied = Varied.of(surface, what)
+            name, parameter = varied.what, varied.direction
+        elif isinstance(what, BoundaryMotion):
+            name = "boundary"
+        elif not isinstance(what, Direction):
+            expected = "a name such as 'pressure' or 'tension of roof', a Direction or a BoundaryMotion"
+            raise OptionError(f"along: expected {expected}, found {what!r}", what="along", found=what)
+        value = parameter.line(surface).value
+        reach = AROUND * abs(value) or FROM_ZERO
+        low, high = span or (value - reach, value + reach)
+        if not low < value < high:
+            text = f"span: expected numbers below and above the present value {value:g}, found {(low, high)}"
+            raise OptionError(text, what="span", found=(low, high), expected=value)
+        return cls(name, parameter, value, (low, high))
+
+    def trace(self, surface: Surface, watch: Callable[[Progress], None]) -> Branch | None:
+        """The branch through a surface, both ways to the ends of the span; None if none starts there."""
+        try:
+            back, forth = (
+                self._ended(
+                    follow(surface, self.parameter, step=step, steps=STEPS, callback=self._within(watch))
+                )
+                for step in (-0.05, 0.05)
+            )
+        except NoBranch:
+            return None
+        return joined(back, forth)
+
+    def bifurcations(self, branch: Branch) -> Iterator[tuple[int, float]]:
+        """The rows of those within the span, and their values of λ."""
+        for row, value in branch.bifurcations.parameter.items():
+            if self.span[0] < value < self.span[1]:
+                yield int(str(row)), float(value)
+
+    def leaving(self, branch: Branch, row: int, watch: Callable[[Progress], None]) -> tuple[Branch, Branch]:
+        """The two branches that leave one at a bifurcation; OptionError where none is found."""
+        one, other = branch.switch(row, steps=STEPS, callback=self._within(watch))
+        return self._ended(one), self._ended(other)
+
+    def _ended(self, branch: Branch) -> Branch:
+        """A branch that ended by itself; KeyboardInterrupt where it was stopped."""
+        if branch.ending is Ending.STOPPED and not self._over(branch.points.iloc[-1]):
+            raise KeyboardInterrupt
+        return branch
+
+    def _over(self, row: Any) -> bool:
+        """Whether a branch ends with a point: outside the span, or where triangles are poor."""
+        return not self.span[0] <= row["parameter"] <= self.span[1] or row["quality"] < HOMOTOPY_END
+
+    def _within(self, watch: Callable[[Progress], None]) -> Callable[[Progress], None]:
+        def callback(progress: Progress) -> None:
+            watch(progress)
+            if self._over(progress.row):
+                raise StopIteration
+
+        return callback
+
+    def crossings(self, branch: Branch, surface: Surface) -> Iterator[Result]:
+        """The equilibria on a branch at the present value; ``surface`` has it, and the boundary."""
+        off = branch.points.parameter.to_numpy() - self.value
+        for i in np.flatnonzero((off[:-1] * off[1:] < 0.0) & (np.abs(off[:-1] - off[1:]) > SWITCHED)):
+            before, after = branch.surfaces[int(i)].vertices, branch.surfaces[int(i) + 1].vertices
+            X = before + off[i] / (off[i] - off[i + 1]) * (after - before)
+            X[surface.pinned] = surface.vertices[surface.pinned]
+            result = solve(surface.moved(X), target="stationary")
+            if result.converged:
+                yield result
+
+
+def joined(back: Branch, forth: Branch) -> Branch:
+    """Two branches from one surface as one, the first backwards."""
+    last = len(back.points) - 1
+    points = back.points.assign(arclength=-back.points.arclength, slope=-back.points.slope)[::-1]
+    swapped = {"index_before": back.events.index_after, "index_after": back.events.index_before}
+    events = back.events.assign(arclength=-back.events.arclength, **swapped)[::-1]
+    surfaces = {last - row: surface for row, surface in back.surfaces.items()}
+    at_events = {len(events) - 1 - row: surface for row, surface in back.event_surfaces.items()}
+    return replace(
+        forth,
+        points=pd.concat([points, forth.points[1:]], ignore_index=True),
+        events=pd.concat(
+            [frame for frame in (events, forth.events) if len(frame)] or [events], ignore_index=True
+        ),
+        surfaces=surfaces | {last + row: surface for row, surface in forth.surfaces.items()},
+        event_surfaces=at_events | {len(events) + row: s for row, s in forth.event_surfaces.items()},
+    )

@@ -1,0 +1,340 @@
+"""``find_equilibria``: branches, deflated Newton from many starts, and the ways down from each saddle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from .. import existence
+from ..accuracy import check_mesh
+from ..base import validate
+from ..base.errors import OptionError, SurfaceError
+from ..base.interrupts import stop_requested
+from ..base.tolerances import AT_REST
+from ..certificate import Certificate, certify
+from ..continuation import BoundaryMotion, Branch, Direction
+from ..solvers.result import Progress, Result, Status
+from ..solvers.starts import low_start
+from ..surface import Surface, expect_surface
+from .branches import Line, Span
+from .deflation import deflated_newton
+from .found import Equilibria, FoundEquilibrium, WayDown
+from .shapes import Shape
+from .ways_down import pass_between, way_down
+
+MODES = 8  # of the lowest modes a start is displaced along
+FAR = (0.05, 0.3)  # of the size: how far a start is displaced
+ENDS = {
+    Status.DIVERGED: "inflates without bound",
+    Status.VANISHED: "shrinks to nothing",
+    Status.DEGENERATE: "pinches off or collapses",
+}
+
+Along = str | Direction | BoundaryMotion
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How equilibria are searched for.
+
+    Parameters
+    ----------
+    span : between which values of the parameter branches are followed; by default from half its present
+        value to 1.5 times that, or from -4 to 4 where it is 0.
+    starts : of deflated Newton around each equilibrium.
+    depth : how often a branch may leave another at a bifurcation.
+    most : equilibria; the search ends there.
+    seed : of the random starts.
+    mesh_check : whether ``check_mesh`` is done on each equilibrium.
+
+    Examples
+    --------
+    >>> SearchOptions(starts=-1)
+    Traceback (most recent call last):
+        ...
+    pcmc.base.errors.OptionError: starts: expected a whole number ≥ 0, found -1
+    """
+
+    span: Span | None = None
+    starts: int = 6
+    depth: int = 2
+    most: int = 24
+    seed: int = 0
+    mesh_check: bool = False
+
+    def __post_init__(self) -> None:
+        if self.span is not None:
+            if not isinstance(self.span, Sequence) or len(self.span) != 2:
+                validate.refuse("span", self.span, "two numbers, the least and the largest value")
+            for value in self.span:
+                validate.number("span", value)
+        for name in ("starts", "depth", "seed"):
+            validate.integer(name, getattr(self, name))
+        validate.integer("most", self.most, least=1)
+        validate.flag("mesh_check", self.mesh_check)
+
+
+def find_equilibria(
+    surface: Surface | Result,
+    along: Along | Sequence[Along] = "pressure",
+    *,
+    callback: Callable[[str], None] | None = None,
+    **options: Any,
+) -> Equilibria:
+    """Search for all equilibria of a surface, with their indices, energies, and the barriers between them.
+
+    Parameters
+    ----------
+    surface : a surface, or what ``solve`` gave; if it is not at rest, it is solved first.
+    along : the parameters in which branches are followed, each as for ``margin`` ("pressure", "tension of
+        roof", "volume") or ``follow``. A branch that folds or bifurcates leads back to further equilibria at
+        the present value. None: ``()``.
+    callback : called with a sentence at each step. Raise StopIteration in it to stop.
+    options : fields of ``SearchOptions``.
+
+    Returns
+    -------
+    Equilibria
+        What was found, and what was searched. No search proves that there is no further equilibrium.
+
+    Raises
+    ------
+    SurfaceError : the surface comes to rest from no start.
+    OptionError : an unknown parameter or option, or a value out of range.
+
+    Notes
+    -----
+    Three searches feed each other until nothing new is found. (1) Through each new equilibrium its branch is
+    followed in each parameter, and from bifurcations those that leave it; where one passes the present value,
+    there is an equilibrium. (2) Deflated Newton starts near it, displaced at random along its lowest modes.
+    (3) From saddles the ways down lead to minima, and between two minima that no saddle joins the highest
+    surface on the straight way is a start for the pass between them.
+
+    Two equilibria are one if their shapes are nearer to each other than a quarter of an edge
+    (``shape_distance``) and their indices agree: other triangles change a shape by about as much.
+
+    Examples
+    --------
+    The film of tension 1 over a square tent, under a pressure of 0.9, is a pyramid of height h with
+    E = 4 √(1 + h²) - 1.2 h: one equilibrium.
+
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("tent", 1.0, 0.9)], fixed=range(4))
+    >>> equilibria = find_equilibria(tent)
+    >>> len(equilibria), equilibria[1].index, round(equilibria[1].height, 6)
+    (1, 0, 0.314485)
+    """
+    given = surface.surface if isinstance(surface, Result) else surface
+    expect_surface(given)
+    if callback is not None and not callable(callback):
+        validate.refuse("callback", callback, "a function of a sentence")
+    chosen = validate.build(SearchOptions, "find_equilibria", options)
+    every = [along] if isinstance(along, str | Direction | BoundaryMotion) else list(along)
+    lines = [Line.of(given, what, chosen.span) for what in every]
+    search = _Search(given, lines, chosen, callback)
+    try:
+        search.run()
+    except (StopIteration, KeyboardInterrupt) as error:
+        stop_requested(error)
+        search.stopped = True
+    return search.result()
+
+
+class _Search:
+    """What is known so far. Numbers count from 0 here, in the order in which equilibria are found."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        lines: Sequence[Line],
+        options: SearchOptions,
+        callback: Callable[[str], None] | None,
+    ) -> None:
+        self.surface, self.lines, self.options, self.callback = surface, lines, options, callback
+        self.found: list[FoundEquilibrium] = []
+        self.shapes: list[Shape] = []
+        self.on_branch: set[int] = set()  # those that a branch has led to
+        self.ways: list[WayDown] = []
+        self.branches: dict[str, list[Branch]] = {line.name: [] for line in lines}
+        self.left: dict[str, list[Shape]] = {
+            line.name: [] for line in lines
+        }  # bifurcations that were left there
+        self.tried: set[tuple[int, int]] = set()  # pairs of minima
+        self.failed: list[str] = []
+        self.starts = self.arrived = 0
+        self.stopped = False
+
+    def run(self) -> None:
+        self.tell("solving")
+        self.first()
+        done = 0
+        while done < len(self.found):
+            while done < len(self.found):
+                if done not in self.on_branch:
+                    for line in self.lines:
+                        self.follow(line, done)
+                self.descend(done)
+                self.deflate(done)
+                done += 1
+            self.connect()
+        if self.options.mesh_check:
+            for k, one in enumerate(self.found):
+                self.tell(f"mesh check of equilibrium {k + 1}")
+                self.found[k] = replace(one, mesh_check=check_mesh(one.surface))
+
+    def tell(self, step: str) -> None:
+        if self.callback is not None:
+            self.callback(f"{step}; {len(self.found)} found")
+
+    def first(self) -> None:
+        """The surface given, solved if necessary, and the minimum from a low start."""
+        surface = self.surface
+        certificate = certify(surface, modes=min(MODES, surface.n))
+        if certificate.index is not None and certificate.residual <= AT_REST:
+            self.add(surface, "given", certificate)
+        else:
+            result = existence.solve(surface)
+            if not result.converged:
+                result = existence.solve(surface, target="stationary")
+            if result.status is Status.STOPPED:
+                raise KeyboardInterrupt
+            if not result.converged:
+                text = f"find_equilibria: no equilibrium was found to begin with; {result.message}"
+                raise SurfaceError(text, what="surface", found=result.status.name)
+            self.add(result.surface, "from the start given")
+        low = low_start(surface)
+        if low is not None and (result := existence.solve(low)).converged:
+            self.add(result.surface, "from a low start")
+
+    def add(self, surface: Surface, how: str, certificate: Certificate | None = None) -> int | None:
+        """The number of an equilibrium, new if its shape or index is; None if it cannot be certified."""
+        certificate = certificate or certify(surface, modes=min(MODES, surface.n))
+        if certificate.index is None or certificate.residual > AT_REST:
+            return None
+        shape = Shape.of(surface)
+        for k, other in enumerate(self.shapes):
+            if certificate.index == self.found[k].index and shape.same_as(other):
+                return k
+        if len(self.found) >= self.options.most:
+            self.failed.append(f"The search ended at {len(self.found)} equilibria; raise most to go on.")
+            raise StopIteration
+        self.found.append(FoundEquilibrium(surface, certificate, how))
+        self.shapes.append(shape)
+        return len(self.found) - 1
+
+    def follow(self, line: Line, number: int) -> None:
+        """The branch through an equilibrium, those that leave it, and the equilibria on them."""
+
+        def watch(_: Progress) -> None:
+            self.tell(f"following the {line.name} from equilibrium {number + 1}")
+
+        branch = line.trace(self.found[number].surface, watch)
+        if branch is None:
+            self.failed.append(
+                f"No branch in {line.name} starts at the equilibrium {self.found[number].found}."
+            )
+            return
+        level, how = [branch], f"on a branch in {line.name}"
+        for depth in range(self.options.depth + 1):
+            following = list[Branch]()
+            for branch in level:
+                self.branches[line.name].append(branch)
+                for result in line.crossings(branch, self.surface):
+                    k = self.add(result.surface, how)
+                    if k is not None:
+                        self.on_branch.add(k)
+                if depth < self.options.depth:
+                    following += self.leaving(line, branch, watch)
+            level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
+
+    def leaving(self, line: Line, branch: Branch, watch: Callable[[Progress], None]) -> list[Branch]:
+        """The branches that leave one at bifurcations where no other was left before."""
+        found = list[Branch]()
+        for row, value in line.bifurcations(branch):
+            shape = Shape.of(branch.event_surfaces[row])
+            if not any(shape.same_as(other) for other in self.left[line.name]):
+                self.left[line.name].append(shape)
+                try:
+                    found += line.leaving(branch, row, watch)
+                except OptionError as error:
+                    self.failed.append(f"At {line.name} {value:.4g} no branch was followed: {error}.")
+        return found
+
+    def descend(self, number: int) -> None:
+        """The ways down from a saddle, on both sides of each unstable mode that is known."""
+        one = self.found[number]
+        for mode in one.certificate.modes[: one.index]:
+            self.tell(f"going down from equilibrium {number + 1}")
+            for side in (mode, -mode):
+                surface, status = way_down(one.surface, side)
+                if status is Status.STOPPED:
+                    raise KeyboardInterrupt
+                rests = status is Status.CONVERGED
+                to = self.add(surface, "on the way down from a saddle") if rests else None
+                if one.index == 1:
+                    end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
+                    self.ways.append(WayDown(number, to, end))
+
+    def deflate(self, number: int) -> None:
+        """Deflated Newton from starts around an equilibrium."""
+        one, size = self.found[number], self.surface.size
+        random = np.random.default_rng([self.options.seed, number])
+        modes = one.certificate.modes
+        unit = modes / np.linalg.norm(modes, axis=2).max(axis=1)[:, None, None]
+        for _ in range(self.options.starts if len(modes) else 0):
+            self.tell(f"deflated Newton around equilibrium {number + 1}")
+            d = np.tensordot(random.standard_normal(len(unit)), unit, axes=1)
+            d *= random.uniform(*FAR) * size / np.linalg.norm(d, axis=1).max()
+            start = one.surface.moved(one.surface.onto_supports(one.surface.vertices + d))
+            self.starts += 1
+            result = deflated_newton(start, self.shapes)
+            if result is not None and self.add(result.surface, "by deflation") is not None:
+                self.arrived += 1
+
+    def connect(self) -> None:
+        """Try the straight way between minima that no saddle joins."""
+        joined = {
+            k: {way.to for way in self.ways if way.saddle == k} for k in {way.saddle for way in self.ways}
+        }
+        minima = [k for k, one in enumerate(self.found) if one.index == 0]
+        for pair in combinations(minima, 2):
+            one, other = (self.found[k].surface for k in pair)
+            if (
+                set(pair) in joined.values()
+                or pair in self.tried
+                or not np.array_equal(one.faces, other.faces)
+            ):
+                continue
+            self.tried.add(pair)
+            self.tell("looking for a pass between two minima")
+            result = pass_between(one, other)
+            if result is not None:
+                self.add(result.surface, "between two minima")
+
+    def result(self) -> Equilibria:
+        """The equilibria by energy, the numbers of the ways down with them."""
+        order = sorted(range(len(self.found)), key=lambda k: self.found[k].energy)
+        number = {k: place for place, k in enumerate(order, 1)}
+        ways = [WayDown(number[w.saddle], None if w.to is None else number[w.to], w.end) for w in self.ways]
+        every = [(line, self.branches[line.name]) for line in self.lines]
+        searched = [
+            f"Branches followed in {line.name}, from {line.span[0]:.4g} to {line.span[1]:.4g}"
+            f" (now {line.value:.4g}): {len(branches)}."
+            for line, branches in every
+        ]
+        searched.append(f"Deflated Newton: {self.starts} starts, {self.arrived} came to rest.")
+        return Equilibria(
+            tuple(self.found[k] for k in order),
+            tuple(sorted(ways, key=lambda way: way.saddle)),
+            tuple(self.lines),
+            {line.name: tuple(branches) for line, branches in every},
+            tuple(searched),
+            tuple(dict.fromkeys(self.failed)),
+            self.stopped,
+        )

@@ -1,0 +1,173 @@
+"""Curved elements: Lagrange triangles of order p, whose nodes are the vertices of a subdivided triangle.
+
+1→4 refinement cuts a triangle log₂ p times into p² small ones. Their (p+1)(p+2)/2 vertices, at barycentric
+coordinates λ = l/p with whole numbers l, are the nodes of one element
+
+    x(λ) = Σ N_l(λ) x_l,     N_l(λ) = Π_c Π_{s<l_c} (p λ_c - s) / (s + 1),
+
+N_l the polynomial of degree p that is 1 at node l and 0 at all others. Order 1 is the flat triangle. In the
+plane of (ξ, η) with λ = (1 - ξ - η, ξ, η), integrals are sums over points of a quadrature.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import ceil
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats, Ints, read_only
+from ..base.errors import PcmcError, SurfaceError
+
+ORDERS = (1, 2, 4, 8)
+
+
+class Lattice(NamedTuple):
+    """The nodes of an element, the corners first, and where the small triangles have them."""
+
+    nodes: Ints  # (k,3) l = p λ
+    face: Ints  # (k,) a small triangle with the node
+    corner: Ints  # (k,) and which corner of it
+    node: Ints  # (p²,3) the node at each corner of the small triangles
+
+
+class Shapes(NamedTuple):
+    """The N_l and their derivatives at the q points of a quadrature, whose weights add up to ½."""
+
+    value: Floats  # (q,k)
+    along_u: Floats  # (q,k) ∂N/∂ξ
+    along_v: Floats  # (q,k) ∂N/∂η
+    weight: Floats  # (q,)
+
+
+def known_order(order: object, error: type[PcmcError] = SurfaceError) -> int:
+    """The order, if there are such elements.
+
+    >>> known_order(3)
+    Traceback (most recent call last):
+        ...
+    pcmc.base.errors.SurfaceError: order: expected 1, 2, 4 or 8, found 3
+    """
+    if isinstance(order, bool) or order not in ORDERS:
+        validate.refuse("order", order, "1, 2, 4 or 8", error=error)
+    return int(order)  # type: ignore[call-overload,no-any-return]
+
+
+def checked_order(given: object, F: Ints, patch: Ints) -> int:
+    """The order, if small triangles (m,3) of the patches (m,) are parts of elements of that order."""
+    order = known_order(given)
+    if order > 1:
+        element_nodes(F, order)
+        mixed = np.flatnonzero(np.ptp(patch.reshape(-1, order**2), axis=1))
+        if len(mixed):
+            face = int(mixed[0]) * order**2
+            message = f"order {order}: the element of the {order**2} faces from face {face} on"
+            message += " is in two patches; give order=1 for flat triangles"
+            raise SurfaceError(message, what="order", where=face, found=order)
+    return order
+
+
+def expect_flat(surface: Any, what: str) -> None:
+    """Refuse a Surface of curved elements where ``what`` is about flat triangles.
+
+    >>> from pcmc import Patch, Surface
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=[0])
+    >>> expect_flat(flat, "the panels")
+    """
+    if surface.order > 1:
+        message = f"{what}: only for flat triangles, and the elements are of order {surface.order}; pass"
+        message += " surface.rebuilt(order=1), the triangles that join their nodes"
+        raise SurfaceError(message, what="order", found=surface.order, expected=1)
+
+
+@cache
+def lattice(order: int) -> Lattice:
+    """The nodes of an element of order p.
+
+    >>> lattice(2).node.tolist()
+    [[0, 3, 4], [1, 5, 3], [2, 4, 5], [5, 4, 3]]
+    """
+    cut = order * np.eye(3, dtype=np.int64)[None]
+    for _ in range(order.bit_length() - 1):  # as ``meshing.refinement`` numbers them
+        a, b, c = cut[:, 0], cut[:, 1], cut[:, 2]
+        bc, ca, ab = (b + c) // 2, (c + a) // 2, (a + b) // 2
+        cut = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3, 3)
+    first, node = np.unique(cut.reshape(-1, 3), axis=0, return_index=True, return_inverse=True)[1:]
+    places = cut.reshape(-1, 3)[first]
+    rank = np.lexsort((-places[:, 1], -places[:, 0], places.max(axis=1) < order))
+    node = np.argsort(rank)[np.ravel(node)].reshape(-1, 3)
+    return Lattice(places[rank], first[rank] // 3, first[rank] % 3, node)
+
+
+def element_nodes(F: Ints, order: int) -> Ints:
+    """(e,k) the nodes of the elements that the small triangles (m,3) are parts of, p² in a row each.
+
+    SurfaceError if they are not such triangles.
+    """
+    here = lattice(order)
+    whole = len(F) // order**2 * order**2
+    cut = F[:whole].reshape(-1, order**2, 3)
+    nodes = cut[:, here.face, here.corner]
+    wrong = np.flatnonzero((nodes[:, here.node] != cut).any(axis=(1, 2)))
+    if len(wrong) or whole < len(F):
+        face = int(wrong[0]) * order**2 if len(wrong) else whole
+        message = f"order {order}: the {order**2} faces from face {face} on are not one triangle cut by"
+        message += " 1→4 refinement, in its order; give order=1 for flat triangles"
+        raise SurfaceError(message, what="order", where=face, found=order)
+    return read_only(np.ascontiguousarray(nodes))
+
+
+@cache
+def shapes(order: int) -> Shapes:
+    """The shape functions at points that integrate (x, x_ξ × x_η) exactly.
+
+    >>> [len(shapes(order).weight) for order in ORDERS]
+    [1, 7, 36, 144]
+    """
+    points, weight = _quadrature(order)
+    return Shapes(*(read_only(np.ascontiguousarray(a)) for a in (*shape_functions(order, points), weight)))
+
+
+def shape_functions(order: int, points: Floats) -> tuple[Floats, Floats, Floats]:
+    """(q,k) each: N and its derivatives along ξ and η, at barycentric coordinates (q,3).
+
+    >>> [values.tolist() for values in shape_functions(1, np.array([[0.5, 0.25, 0.25]]))]
+    [[[0.5, 0.25, 0.25]], [[-1.0, 1.0, 0.0]], [[-1.0, 0.0, 1.0]]]
+    """
+    value = np.ones((order + 1, *points.shape))  # Π_{s<l} (p λ_c - s) / (s + 1) for l = 0, 1, …, p
+    slope = np.zeros_like(value)
+    for s in range(order):
+        factor = order * points - s
+        value[s + 1] = value[s] * factor / (s + 1)
+        slope[s + 1] = (slope[s] * factor + value[s] * order) / (s + 1)
+    power = lattice(order).nodes
+    parts = np.stack([value[power[:, c], :, c] for c in range(3)])  # (3,k,q)
+    turns = np.stack([slope[power[:, c], :, c] for c in range(3)])
+    by = [turns[c] * parts[c - 1] * parts[c - 2] for c in range(3)]
+    return parts.prod(axis=0).T, (by[1] - by[0]).T, (by[2] - by[0]).T
+
+
+def _quadrature(order: int) -> tuple[Floats, Floats]:
+    """Barycentric points (q,3) and weights (q,), exact for the degree 3p - 2 of volumes.
+
+    Up to order 2 the rules of degree 1 and 5 that treat the corners alike (Radon 1948); above, Gauss's in ξ
+    and in η/(1 - ξ), with Jacobi's weight (Stroud, Approximate Calculation of Multiple Integrals, 1971).
+    """
+    if order == 1:
+        return np.full((1, 3), 1.0 / 3.0), np.array([0.5])
+    if order == 2:
+        root = np.sqrt(15.0)
+        inner, outer = (6.0 - root) / 21.0, (6.0 + root) / 21.0
+        rings = [np.full((3, 3), near) + (1.0 - 3.0 * near) * np.eye(3) for near in (inner, outer)]
+        weights = np.repeat([270.0, 155.0 - root, 155.0 + root], [1, 3, 3]) / 2400.0
+        return np.concatenate([np.full((1, 3), 1.0 / 3.0), *rings]), weights
+    from scipy.special import roots_jacobi, roots_legendre  # they take long to import
+
+    count = ceil((3 * order - 1) / 2)
+    (s, s_weight), (t, t_weight) = roots_jacobi(count, 1, 0), roots_legendre(count)
+    xi, share = np.meshgrid(0.5 * (1.0 + s), 0.5 * (1.0 + t), indexing="ij")
+    eta = (1.0 - xi) * share
+    points = np.stack([1.0 - xi - eta, xi, eta], axis=-1).reshape(-1, 3)
+    return points, np.outer(s_weight, t_weight).ravel() / 8.0

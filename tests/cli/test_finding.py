@@ -1,0 +1,47 @@
+"""The command equilibria: what it prints and writes, and what it refuses."""
+
+import pandas as pd
+import pytest
+
+import pcmc
+from generators import spherical_cap
+from pcmc import cli
+
+
+@pytest.fixture
+def cap(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pcmc.write("cap.pcmc", spherical_cap(0.35))
+    return tmp_path
+
+
+def test_a_table_a_diagram_and_every_surface(cap, capsys):
+    outputs = [word for name in ("cap.svg", "cap.png", "cap.csv", "roof.pcmc") for word in ("-o", name)]
+    assert cli.main(["equilibria", "cap.pcmc", "--starts", "0", "--axis", "energy", *outputs]) == 0
+    out = capsys.readouterr().out
+    assert "inflates without bound" in out
+    assert "No search of this kind proves" in out
+    assert out.endswith("written: cap.svg, cap.png, cap.csv, roof-1.pcmc, roof-2.pcmc\n")
+    table = pd.read_csv("cap.csv")
+    assert table["index"].tolist() == [0, 1]
+    for number, energy in zip(table.number, table.energy, strict=True):
+        assert pcmc.certify(pcmc.read(f"roof-{number}.pcmc")).energy == pytest.approx(energy, rel=1e-12)
+    assert (cap / "cap.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--span", "1"], "--span: expected LOW,HIGH such as 0.5,1.5, found '1'"),
+        (["--span", "1.2,1.5"], "span: expected numbers below and above the present value 1"),
+        (["--along", "presure"], "did you mean 'pressure'?"),
+        (["--axis", "widht"], "unknown --axis 'widht'"),
+        (["-o", "a.jpeg"], "a.jpeg: "),
+        (["-o", "cap.pcmc", "-o", "nowhere/a.svg"], "cap.pcmc"),
+    ],
+)
+def test_wrong_input_is_refused_in_one_line(cap, capsys, arguments, said):
+    assert cli.main(["equilibria", "cap.pcmc", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1

@@ -1,0 +1,148 @@
+"""Curved elements: derivatives, identities, and the order of closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generators import spherical_cap, spherical_cap_exact
+from pcmc import Patch, Surface, energy, solve
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.diagnostics import check_gradient, check_hessian, taylor
+from pcmc.forces.functional import energy_and_gradient, patch_areas, patch_volumes
+from pcmc.forces.mesh import energy_mesh
+from pcmc.forces.second_variation import add_products, hessian
+from pcmc.forces.volume_below import volume_below, volume_below_gradient
+from pcmc.meshing.elevation import elevate
+from pcmc.meshing.refinement import refine
+
+
+def onto_rim(points):
+    """Points of the unit circle's polygon on the circle."""
+    return points / np.linalg.norm(points[:, :2], axis=1)[:, None]
+
+
+def shaken(order, seed=0, **values):
+    """A cap's mesh of elements of an order, all nodes moved at random; nothing is held at its place."""
+    flat = refine(spherical_cap(0.5), order.bit_length() - 1)
+    moves = 0.05 / order**2 * np.random.default_rng(seed).standard_normal((flat.n, 3))
+    surface = flat.rebuilt(vertices=flat.vertices + moves, order=order)
+    return surface.retensioned(**{kind: {"cap": value} for kind, value in values.items()})
+
+
+@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize("weight", [0.0, 0.7])
+def test_taylor_slopes(order, weight):
+    surface = shaken(order, weights=weight)
+    assert check_gradient(surface).passed
+    assert check_hessian(surface).passed
+
+
+@pytest.mark.nightly
+def test_taylor_slopes_of_order_8():
+    surface = shaken(8, weights=0.7)
+    assert check_gradient(surface).passed
+    assert check_hessian(surface).passed
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_products_are_those_of_the_matrix(order):
+    surface = shaken(order, weights=0.7)
+    d = np.random.default_rng(1).standard_normal((surface.n, 3))
+    product = add_products(surface, energy_mesh(surface), surface.vertices, d, np.zeros_like(d))
+    np.testing.assert_allclose(product.ravel(), hessian(surface) @ d.ravel(), atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_area_is_of_degree_two_and_volume_of_degree_three(order):
+    area, both = (shaken(order, tensions=1.0, pressures=p) for p in (0.0, 1.0))
+    X = area.vertices
+    (A, dA), (E, dE) = (energy_and_gradient(surface, supports=False) for surface in (area, both))
+    HA, H = hessian(area), hessian(both)
+    for degree, value, first, second in ((2, A, dA, HA), (3, A - E, dA - dE, HA - H)):
+        assert (X * first).sum() == pytest.approx(degree * value, rel=1e-12)
+        np.testing.assert_allclose(second @ X.ravel(), (degree - 1) * first.ravel(), atol=1e-11)
+    assert pytest.approx([patch_areas(area)[0], patch_volumes(area)[0]]) == [A, A - E]
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**20), st.sampled_from([2, 4]))
+def test_rigid_motions_change_no_area(seed, order):
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    surface = shaken(order, seed)
+    moved = surface.rebuilt(vertices=surface.vertices @ turn.T + rng.standard_normal(3))
+    assert patch_areas(moved)[0] == pytest.approx(patch_areas(surface)[0], rel=1e-12)
+    G = energy_and_gradient(surface.retensioned(pressures={"cap": 0.0}), supports=False)[1]
+    assert np.abs(G.sum(axis=0)).max() < 1e-12
+    assert np.abs(np.cross(surface.vertices, G).sum(axis=0)).max() < 1e-12
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_flat_elements_are_flat_triangles(order):
+    flat = spherical_cap(0.5).retensioned(weights={"cap": 0.3})
+    curved = refine(flat, order.bit_length() - 1).rebuilt(order=order)
+    assert energy(curved) == pytest.approx(energy(flat), rel=1e-14)
+    assert volume_below(curved) == pytest.approx(volume_below(flat), rel=1e-14)
+
+
+def test_volume_below_and_its_gradient():
+    surface = shaken(2)
+    grown = lambda X: volume_below(surface.rebuilt(vertices=X, fixed=range(3)))  # noqa: E731
+    move = 0.1 * np.random.default_rng(2).standard_normal((surface.n, 3))
+    found = taylor(grown, surface.vertices, move, volume_below_gradient(surface, np.ones(1)))
+    assert found.passed
+
+
+@pytest.mark.parametrize(("order", "energy_order", "position_order"), [(2, 3.6, 3.5), (4, 5.6, 5.2)])
+def test_a_cap_of_curved_elements(order, energy_order, position_order):
+    exact, errors = spherical_cap_exact(), []
+    for h in (0.25, 0.125):
+        start = elevate(solve(spherical_cap(h)).surface, order, onto_rim)
+        result = solve(start)
+        here = result.surface
+        assert (result.converged, here.order, result.certificate.index) == (True, order, 0)
+        away = np.sqrt((exact.distance(here) ** 2).mean())
+        below = abs(volume_below(here) - exact.volume)
+        errors.append(
+            [abs(result.energy - exact.energy), below, abs(patch_areas(here)[0] - exact.area), away]
+        )
+    energies, volumes, areas, positions = np.log2(np.array(errors[0]) / errors[1])
+    assert min(energies, volumes, areas) > energy_order
+    assert positions > position_order
+    assert errors[1][0] < {2: 1e-6, 4: 1e-10}[order] * exact.energy
+
+
+def test_the_variational_curvature_is_exact_at_rest():
+    result = solve(elevate(solve(spherical_cap(0.25)).surface, 2, onto_rim))
+    assert result.certificate.curvature_error < 1e-9
+
+
+def test_wrong_elements_are_refused():
+    surface = refine(spherical_cap(0.5), 1)
+    with pytest.raises(SurfaceError, match=r"^order: expected 1, 2, 4 or 8, found 3$"):
+        surface.rebuilt(order=3)
+    with pytest.raises(SurfaceError, match=r"^order 2: the 4 faces from face 4 on are not one triangle cut"):
+        surface.rebuilt(order=2, faces=surface.faces[[0, 1, 2, 3, 5, 4, *range(6, surface.m)]])
+    with pytest.raises(SurfaceError, match=r"^order 2: the 4 faces from face 92 on are not"):
+        surface.rebuilt(order=2, faces=surface.faces[:-1], patch_of_face=surface.patch_of_face[:-1])
+    patch = surface.patch_of_face.copy()
+    patch[6] = 1
+    patches = [*surface.patches, Patch("other", 1.0)]
+    with pytest.raises(SurfaceError, match=r"^order 2: the element of the 4 faces from face 4 on is in two"):
+        surface.rebuilt(order=2, patch_of_face=patch, patches=patches)
+    with pytest.raises(SurfaceError, match=r"^order: the surface is of order 2 already; give order=2$"):
+        elevate(surface.rebuilt(order=2), 4)
+
+
+def test_solve_raises_the_order_itself():
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.2]]
+    roof = Surface(
+        corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4, [Patch("roof", 1.0)], range(4)
+    )
+    result = solve(roof, order=2, levels=1)
+    assert (result.converged, result.surface.order, len(result.surface.nodes)) == (True, 2, 16)
+    assert result.history.level.max() == 2
+    assert solve(result.surface).surface.order == 2  # stays
+    with pytest.raises(OptionError, match=r"^order: expected 1, 2, 4 or 8, found 5$"):
+        solve(roof, order=5)
