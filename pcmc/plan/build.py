@@ -112,21 +112,21 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
     have ``factor`` times the tension, and no snow."""
     n, normal, faces = surface.n, np.array(surface.plane.normal), _without_ears(surface)
     number = np.where(surface.fixed, np.arange(n), n + np.cumsum(~surface.fixed) - 1)
-    free = surface.vertices[~surface.fixed]
+    inner = ~surface.fixed
+    free = surface.vertices[inner]
     image = free - 2.0 * surface.plane.height(free)[:, None] * normal
     below = [
         replace(patch, name=f"{patch.name} below", tension=factor * patch.tension, snow=0.0)
         for patch in surface.patches
     ]
-    planes = [(plane, np.flatnonzero(mask)) for plane, mask in surface.on_planes]
     return Surface(
         np.concatenate([surface.vertices, image]),
         np.concatenate([faces, number[faces][:, ::-1]]),
         np.concatenate([surface.patch_of_face, surface.patch_of_face + len(surface.patches)]),
         (*surface.patches, *below),
-        np.flatnonzero(surface.fixed),
+        np.concatenate([surface.fixed, np.zeros(len(free), dtype=bool)]),
         plane=surface.plane,
-        on_planes=[(plane, np.union1d(on, number[on])) for plane, on in planes],
+        on_planes=tuple((plane, np.concatenate([on, on[inner]])) for plane, on in surface.on_planes),
         curves=surface.curves,
     )
 
