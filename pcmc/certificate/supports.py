@@ -10,7 +10,7 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PARALLEL, SAME_PLACE
-from ..surface import Plane, Surface
+from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, EdgeCurve, vertex_kind
 from .forces import Forces, at_both_ends, held_boundary, load_places, sheet_pulls
@@ -181,7 +181,8 @@ def _sources(acting: Forces) -> Iterator[_Source]:
     """All supports, by the forces that they share."""
     surface, topo = acting.surface, acting.surface.topology
     support, patch = _support_of_edge(surface), _patch_of_edge(surface)
-    of_plane = [_kind(surface, plane) for plane, _ in surface.on_planes]
+    upright = [abs(float(np.dot(p.normal, surface.plane.normal))) <= PARALLEL for p, _ in surface.on_planes]
+    of_plane = ["upright plane" if steep else "plane" for steep in upright]
     kinds = [*of_plane, "plane", "line", "ground"]  # -2 and -1 count from the end
     boundary = [_line(surface, "", curve) for curve in held_curves(surface)]
     yield _Source(acting.along, [part._replace(kind=kinds[support[part.edges[0]]]) for part in boundary])
@@ -283,8 +284,3 @@ def _support_of_edge(surface: Surface) -> Ints:
         if not plane.mirror:
             support[(support > k) & at_both_ends(mask, edges)] = k
     return support
-
-
-def _kind(surface: Surface, plane: Plane) -> str:
-    steep = abs(float(np.dot(plane.normal, surface.plane.normal))) <= PARALLEL
-    return "upright plane" if steep else "plane"

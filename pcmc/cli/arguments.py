@@ -89,6 +89,8 @@ Cache = Annotated[bool, switch("--cache/--no-cache", CACHE)]
 Whole = Annotated[bool, switch("--whole", WHOLE)]
 MeshCheck = Annotated[bool | None, switch("--mesh-check/--no-mesh-check", MESH_CHECK)]
 FileUnits = Annotated[str, option("NAME", UNITS)]
+SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
+SheetFormat = Annotated[str | None, option("NAME", SHEET)]
 OUTPUT = "-o", "--output"
 MANY_FILES = option("FILE", "File to write; may be repeated.", *OUTPUT)
 
@@ -236,6 +238,14 @@ def _value(text: str) -> Any:
     except (ValueError, SyntaxError):
         return text
     return number if isinstance(number, int | float) else text
+
+
+def numbers(text: str, flag: str, expected: str = "numbers, with commas between them") -> list[float]:
+    """The numbers in X,Y,..."""
+    try:
+        return [validate.parsed(part) for part in text.split(",")]
+    except ValueError:
+        validate.refuse(flag, text, expected)
 
 
 def parsed_view(text: str) -> Any:

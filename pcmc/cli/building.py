@@ -27,6 +27,7 @@ from .arguments import (
     FileUnits,
     Input,
     MeshCheck,
+    SheetFormat,
     ViewName,
     amount,
     count,
@@ -43,9 +44,8 @@ MIRRORED = "alike: of one family; or apart."
 TOLERANCE = (
     "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 )
-SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
 HEIGHT = "Section at this height; may be repeated."
-LINE = "Section along this line; may be repeated."
+LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
 TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
 DATE = "Date to print; by default the project's. No clock is read."
@@ -123,7 +123,7 @@ def draw_(
     file: Input,
     output: Annotated[list[Path], MANY_FILES],
     units: FileUnits = "",
-    sheet: Annotated[str | None, option("NAME", SHEET)] = None,
+    sheet: SheetFormat = None,
     scale: Annotated[int | None, count("1 to this; by default it fits.")] = None,
     height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
     line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
@@ -140,7 +140,10 @@ def draw_(
     """
     arguments.output_of(file, drawings=output)
     heights = None if height is None else [parsed_number(text) for text in height]
-    lines = None if line is None else [_ends(text) for text in line]
+    points = [arguments.numbers(text, "--line", FOUR) for text in line or ()]
+    if wrong := [text for text, ends in zip(line or (), points, strict=True) if len(ends) != 4]:
+        validate.refuse("--line", wrong[0], FOUR)
+    lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)
         progress("drawing")
@@ -196,15 +199,6 @@ def report_(
 def _documents(roof: projects.Outcome, **given: Any) -> Output:
     """What a project says about its documents, with what the command line says instead."""
     return replace(roof.output, **{name: value for name, value in given.items() if value is not None})
-
-
-def _ends(text: str) -> Any:
-    """Two points from X,Y,X,Y."""
-    try:
-        a, b, c, d = map(validate.parsed, text.split(","))
-    except ValueError:
-        validate.refuse("--line", text, "four numbers X,Y,X,Y")
-    return (a, b), (c, d)
 
 
 @dataclass(frozen=True)

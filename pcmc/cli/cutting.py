@@ -15,7 +15,7 @@ from ..plot import strains
 from ..project.settings import of_material
 from ..project.writing import write_all
 from . import arguments, reports
-from .arguments import MANY_FILES, Build, FileUnits, Input, ViewName, amount, count, option
+from .arguments import MANY_FILES, Build, FileUnits, Input, SheetFormat, ViewName, amount, count, option
 from .reports import working
 
 WIDTH = "Width of the cloth: no strip is wider, with its allowances."
@@ -26,7 +26,6 @@ STIFFNESS = "Force per length of warp and weft, from which the compensation foll
 ALLOWANCE = "Cloth added outside of seams."
 HEM = "Cloth added at rims; by default the allowance."
 NOTCHES = "Distance of the marks along seams, 0 for none; by default the mean width of strips."
-SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
 PICTURE = "Picture to draw: the strips on the roof, coloured by strain."
 
 
@@ -54,24 +53,16 @@ class Cutting:
                 values.pop(other, None)
         for one, other in (("compensation", "stiffness"), ("stiffness", "compensation")):
             if one in given:
-                given[one] = _numbers(given[one], f"--{one}")
+                given[one] = arguments.numbers(given[one], f"--{one}")
                 if other not in given:
                     values.pop(other, None)
         if "seam" in given:
-            lines = [_numbers(text, "--seam") for text in given.pop("seam")]
+            lines = [arguments.numbers(text, "--seam") for text in given.pop("seam")]
             for line in lines:
                 if len(line) % 2 or len(line) < 4:
                     validate.refuse("--seam", ",".join(map(str, line)), "points X,Y,X,Y and so on")
             given["seams"] = [[line[k : k + 2] for k in range(0, len(line), 2)] for line in lines]
         return CuttingOptions(**(values | given))
-
-
-def _numbers(text: str, flag: str) -> list[float]:
-    """The numbers in X,Y,..."""
-    try:
-        return [validate.parsed(part) for part in text.split(",")]
-    except ValueError:
-        validate.refuse(flag, text, "numbers, with commas between them")
 
 
 def pattern(
@@ -81,7 +72,7 @@ def pattern(
     picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
     given: Cutting,
-    sheet: Annotated[str | None, option("NAME", SHEET)] = None,
+    sheet: SheetFormat = None,
     units: FileUnits = "",
     build: Build,
 ) -> int:

@@ -21,6 +21,8 @@ Span = tuple[float, float]
 AROUND = 0.5  # of the present value: how far below and above it branches are followed
 FROM_ZERO = 4.0  # the same, of what is 0 now, in the unit of ``margin``
 STEPS = 80  # of a branch in each direction
+FIRST = 0.05  # step of a branch
+LARGEST = (0.15, 0.03, 0.006)  # steps at most; the next where one is too long
 SWITCHED = 1e-6  # of the span: nearer to its present value, a switched branch has not left it
 
 
@@ -56,15 +58,22 @@ class Line:
     def trace(self, surface: Surface, watch: Callable[[Progress], None]) -> Branch | None:
         """The branch through a surface, both ways to the ends of the span; None if none starts there."""
         try:
-            back, forth = (
-                self._ended(
-                    follow(surface, self.parameter, step=step, steps=STEPS, callback=self._within(watch))
-                )
-                for step in (-0.05, 0.05)
-            )
+            return joined(*(self._half(surface, sign, watch) for sign in (-1.0, 1.0)))
         except NoBranch:
             return None
-        return joined(back, forth)
+
+    def _half(self, surface: Surface, sign: float, watch: Callable[[Progress], None]) -> Branch:
+        """One way; again in short steps where contact and index change on one, which hides a bifurcation."""
+        for largest in LARGEST:
+            step, callback = sign * min(FIRST, largest), self._within(watch)
+            branch = follow(
+                surface, self.parameter, step=step, largest=largest, steps=STEPS, callback=callback
+            )
+            events = self._ended(branch).events
+            contacts = events.arclength[events.kind == "contact"]
+            if not events.arclength[events.kind == "index"].isin(contacts).any():
+                break
+        return branch
 
     def bifurcations(self, branch: Branch) -> Iterator[tuple[int, float]]:
         """The rows of those within the span, and their values of λ."""
@@ -72,10 +81,10 @@ class Line:
             if self.span[0] < value < self.span[1]:
                 yield int(str(row)), float(value)
 
-    def leaving(self, branch: Branch, row: int, watch: Callable[[Progress], None]) -> tuple[Branch, Branch]:
-        """The two branches that leave one at a bifurcation; OptionError where none is found."""
-        one, other = branch.switch(row, steps=STEPS, callback=self._within(watch))
-        return self._ended(one), self._ended(other)
+    def leaving(self, branch: Branch, row: int, watch: Callable[[Progress], None]) -> list[Branch]:
+        """The two branches that leave one at a bifurcation, from there on; OptionError if none is found."""
+        two = branch.switch(row, steps=STEPS, callback=self._within(watch))
+        return [_from_event(self._ended(one), branch, row) for one in two]
 
     def _ended(self, branch: Branch) -> Branch:
         """A branch that ended by itself; KeyboardInterrupt where it was stopped."""
@@ -100,11 +109,26 @@ class Line:
         off = branch.points.parameter.to_numpy() - self.value
         for i in np.flatnonzero((off[:-1] * off[1:] < 0.0) & (np.abs(off[:-1] - off[1:]) > SWITCHED)):
             before, after = branch.surfaces[int(i)].vertices, branch.surfaces[int(i) + 1].vertices
-            X = before + off[i] / (off[i] - off[i + 1]) * (after - before)
+            share = off[i] / (off[i] - off[i + 1])
+            if branch.points.slope[i] == 0.0:  # λ grows with the square of the distance from a pitchfork
+                share = share**0.5
+            X = before + share * (after - before)
             X[surface.pinned] = surface.vertices[surface.pinned]
             result = solve(surface.moved(X), target="stationary")
             if result.converged:
                 yield result
+
+
+def _from_event(branch: Branch, other: Branch, row: int) -> Branch:
+    """A branch that leaves another at an event, with the event as its first point."""
+    event, first = other.events.loc[row], branch.points.iloc[0]
+    there = first.to_dict() | {name: event[name] for name in branch.points.columns.intersection(event.index)}
+    there |= {"arclength": -FIRST, "slope": 0.0}
+    return replace(
+        branch,
+        points=pd.concat([pd.DataFrame([there]), branch.points], ignore_index=True),
+        surfaces={0: other.event_surfaces[row]} | {k + 1: one for k, one in branch.surfaces.items()},
+    )
 
 
 def joined(back: Branch, forth: Branch) -> Branch:

@@ -106,12 +106,6 @@ class PageHandler(BaseHTTPRequestHandler):
     wbufsize = -1  # header and body leave together
     server: Listener
 
-    def do_GET(self) -> None:
-        self._answer(self._get)
-
-    def do_POST(self) -> None:
-        self._answer(self._post)
-
     def handle_one_request(self) -> None:
         self.server.limit(self.connection)
         super().handle_one_request()
@@ -119,17 +113,19 @@ class PageHandler(BaseHTTPRequestHandler):
     def log_message(self, format: str, *args: Any) -> None:
         """Nothing: the terminal is the user's."""
 
-    def _answer(self, act: Any) -> None:
+    def do_POST(self) -> None:
         try:
             content = self._read_content()
             self._check_sender()
-            act(content)
+            self._respond(content)
         except (RequestError, PcmcError, MissingExtra) as error:
             self._refuse(str(error), getattr(error, "status", HTTPStatus.BAD_REQUEST))
         except OSError:
             raise  # the browser has left
         except Exception as error:  # the net: no request may end without an answer
             self._refuse(f"{type(error).__name__}: {error}", HTTPStatus.INTERNAL_SERVER_ERROR)
+
+    do_GET = do_POST
 
     def _read_content(self) -> bytes:
         """What follows the headers: all of it, or what is left would be read as another request."""
@@ -162,35 +158,22 @@ class PageHandler(BaseHTTPRequestHandler):
             text = "open the address that pcmc explore printed: its token is missing here, or of another run"
             raise RequestError(text, HTTPStatus.FORBIDDEN)
 
-    def _get(self, content: bytes) -> None:
-        parts = urlsplit(self.path)
-        match parts.path.strip("/").split("/"):
-            case [""]:
+    def _respond(self, content: bytes) -> None:
+        parts, explorer = urlsplit(self.path), self.server.explorer
+        match [self.command, *parts.path.strip("/").split("/")]:
+            case ["GET", ""]:
                 self._send_file("index.html")
-            case ["page", name]:
+            case ["GET", "page", name]:
                 self._send_file(name)
-            case ["api", session, "export"]:
+            case ["GET", "api", session, "export"]:
                 suffix = parse_qs(parts.query).get("suffix", [""])[0]
-                name, body = self.server.explorer.export(session, suffix)
+                name, body = explorer.export(session, suffix)
                 self._send(body, BYTES, f"attachment; filename*=UTF-8''{quote(name, safe='')}")
+            case ["POST", "api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
+                asked = json_object(content)
+                self._send(explorer.answer("".join(session), act, asked, self._gone), BYTES)
             case _:
                 raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
-
-    def _post(self, content: bytes) -> None:
-        try:
-            asked = json.loads(content or b"{}")
-        except RecursionError:
-            raise RequestError("not JSON: nested too deep") from None
-        except ValueError as error:
-            raise RequestError(f"not JSON: {error}") from None
-        if not isinstance(asked, dict):
-            raise RequestError("expected a JSON object")
-        match urlsplit(self.path).path.strip("/").split("/"):
-            case ["api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
-                body = self.server.explorer.answer("".join(session), act, asked, self._gone)
-            case _:
-                raise RequestError(f"there is nothing at {self.path:.60}", HTTPStatus.NOT_FOUND)
-        self._send(body, BYTES)
 
     def _gone(self) -> bool:
         """Whether the page has closed the connection, and waits for no answer."""
@@ -250,6 +233,19 @@ def check_request(keys: Mapping[str, Check], asked: Mapping[str, Any], where: st
         raise RequestError(where + unknown("key", odd[0][:60], known))
     given = (key for key in known if key in asked or key in keys)
     return {key: known[key](where + key, asked.get(key)) for key in given}
+
+
+def json_object(content: bytes) -> dict[str, Any]:
+    """The body of a request; without one it is empty."""
+    try:
+        asked = json.loads(content or b"{}")
+    except RecursionError:
+        raise RequestError("not JSON: nested too deep") from None
+    except ValueError as error:
+        raise RequestError(f"not JSON: {error}") from None
+    if not isinstance(asked, dict):
+        raise RequestError("expected a JSON object")
+    return asked
 
 
 def or_null(check: Check) -> Check:

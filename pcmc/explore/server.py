@@ -100,18 +100,15 @@ class Explorer:
             return pack(*self._opening(name, self.session(name).state()))
         session = self.session(name)
         given = check_request(REQUESTS[act], asked)
-        answer = self._act if act in ACTS else self._question
-        return pack(*(answer(session, act, given, gone) or ({"superseded": True},)))
-
-    def _act(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
-        """The state that an act leads to; None if newer values have arrived meanwhile."""
+        if act not in ACTS:
+            return pack(*(self._question(session, act, given, gone) or ({"superseded": True},)))
         values = (given,) if act in ("follow", "settle") else ()
         options = {} if values else given | ({"gone": gone} if act == "meet" else {})
         state = getattr(session, act)(*values, **options)
-        if state.superseded:
-            return None
+        if state.superseded:  # newer values have arrived meanwhile
+            return pack({"superseded": True})
         about = page_data.state_data(state, self.origin, moving=act == "follow")
-        return {"superseded": False, **about}, page_data.fields(state, self.origin)
+        return pack({"superseded": False, **about}, page_data.fields(state, self.origin))
 
     def _question(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
         """What is asked about the surface shown; None if the page shows another one before it is found."""

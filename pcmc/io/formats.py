@@ -92,9 +92,7 @@ FORMATS = {
     ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices")),
-    ".stl": Format(
-        "stl", separate=True, bare=True, loses=tuple(name for name, part in PARTS.items() if part.words)
-    ),
+    ".stl": Format("stl", separate=True, bare=True, loses=TOLD),
     ".vtp": Format("vtk", scalars="both", reserved=OURS),
     ".vtu": Format("vtk", scalars="both", reserved=OURS),
     ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),

@@ -97,7 +97,14 @@ def write(
             walls = encode_walls(surface, shown)
     bare = getattr(solved, "bare", ())
     metadata = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
-    content = Content(metadata, carried, colour, _values(certificate), walls, units, bare)
+    findings: Any = certificate or {}
+    if not isinstance(findings, Mapping):
+        if not hasattr(findings, "FILED"):
+            found = type(certificate).__name__
+            text = f"certificate: expected a Certificate, found {found}"
+            raise FileError(text, what="certificate", found=found)
+        findings = {name: getattr(certificate, name) for name in findings.FILED}
+    content = Content(metadata, carried, colour, findings, walls, units, bare)
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
             text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
@@ -113,18 +120,6 @@ def write(
         warnings.warn(text, LostWarning, stacklevel=2)
     if note:
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
-
-
-def _values(certificate: Any) -> Mapping[str, Any]:
-    """The certificate's public values by name."""
-    if certificate is None or isinstance(certificate, Mapping):
-        return certificate or {}
-    names = getattr(certificate, "FILED", None)
-    if names is None:
-        found = type(certificate).__name__
-        text = f"certificate: expected a Certificate, found {found}"
-        raise FileError(text, what="certificate", found=found)
-    return {name: getattr(certificate, name) for name in names}
 
 
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:

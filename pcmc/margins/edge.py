@@ -112,7 +112,8 @@ def find_end(
         down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
-            detail += f" near {_worst_place(there)}"
+            worst = there.faces[worst_face(there, ~there.roof)[0]]  # of walls, triangles may vanish
+            detail += f" near ({', '.join(f'{x:.3g}' for x in there.vertices[worst].mean(axis=0))})"
     last = branch.last.vertices
     before = branch.surfaces.get(len(branch.points) - 2, branch.last).vertices
     motion = last - before if before.shape == last.shape else np.zeros_like(last)
@@ -139,12 +140,6 @@ def _follow(
     if branch.ending is Ending.STOPPED and not over[0]:
         raise KeyboardInterrupt
     return branch
-
-
-def _worst_place(surface: Surface) -> str:
-    """Where the worst triangle of the roof is, walls left out as their triangles may vanish."""
-    worst = surface.faces[worst_face(surface, ~surface.roof)[0]]
-    return f"({', '.join(f'{x:.3g}' for x in surface.vertices[worst].mean(axis=0))})"
 
 
 def _compression(branch: Branch) -> float | None:

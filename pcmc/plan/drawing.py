@@ -126,7 +126,14 @@ class _Reader:
 
     def drawing(self, path: Path) -> Drawing:
         """All parts, each checked."""
-        outline = self._outline()
+        loops = self._loops(self.edge)
+        if len(loops) > 1:
+            ends = ", ".join(f"{listed(loop.labels)} at {point_text(loop.ends[0])}" for loop in loops[:3])
+            where = f"layer {loops[0].layer!r}"
+            text = f"{where} has {len(loops)} closed curves ({ends}); a roof has one outline"
+            text += ": put the edges of openings on a layer 'hole NAME'"
+            raise PlanError(text, what=where, found=len(loops), expected=1)
+        outline, self.layers["the outline"] = loops[0].curve, loops[0].source
         holes: dict[str, Curve] = {}
         self._add("hole", hole_label, "hole", holes, self._loops)
         check_count("holes", len(holes))
@@ -220,17 +227,6 @@ class _Reader:
             text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
             raise PlanError(text, what=where, where=(_plain(one[1]), _plain(two[1])), found=gap)
         return paths
-
-    def _outline(self) -> Curve:
-        paths = self._loops(self.edge)
-        if len(paths) > 1:
-            ends = ", ".join(f"{listed(path.labels)} at {point_text(path.ends[0])}" for path in paths[:3])
-            where = f"layer {paths[0].layer!r}"
-            text = f"{where} has {len(paths)} closed curves ({ends}); a roof has one outline"
-            text += ": put the edges of openings on a layer 'hole NAME'"
-            raise PlanError(text, what=where, found=len(paths), expected=1)
-        self.layers["the outline"] = paths[0].source
-        return paths[0].curve
 
     def _add(
         self,

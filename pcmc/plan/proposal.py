@@ -128,7 +128,11 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     for spec, (key, value) in product(specs, common.items()):
         spec.setdefault(key, value)
     tensions = [spec["tension"] for spec in specs]
-    edge_length = values.setdefault("edge_length", _edge_length(parts, drawing))
+    area = sum(part.area.area for part in parts)
+    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
+    rims = (curve.length / 12.0 for curve in drawing.holes.values())  # finer where parts or holes are small
+    usual = min([most, *(part.radius / ACROSS for part in parts), *rims])
+    edge_length = values.setdefault("edge_length", two_digits(max(usual, least)))
     outline = PlanLine("the outline", Kind.OUTLINE, drawing.outline)
     tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
@@ -173,15 +177,6 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     if drawing.level != 0.0:
         plan["plane"] = {"point": [0.0, 0.0, drawing.level]}
     return plan | values
-
-
-def _edge_length(parts: Sequence[Part], drawing: Drawing) -> float:
-    """An edge length that gives about 1500 triangles, more where parts or holes are small; two digits."""
-    area = sum(part.area.area for part in parts)
-    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
-    holes = [curve.length / 12.0 for curve in drawing.holes.values()]
-    wanted = min([most, *(part.radius / ACROSS for part in parts), *holes])
-    return two_digits(max(wanted, least))
 
 
 def _wall_tension(

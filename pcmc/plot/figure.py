@@ -111,9 +111,16 @@ def finish(figure: Any, path: Path | None) -> Image:
     if path is None:
         return image
     suffix_of(path, SUFFIXES, "a picture")
-    kind = os.path.splitext(path)[1].lower()
+    kind, nobody = os.path.splitext(path)[1].lower(), {".svg": {"Date": None}}
+    nobody[".pdf"] = dict.fromkeys(("CreationDate", "Creator", "Producer"))
     with writing(path), atomic_write(path) as temporary:
-        temporary.write_bytes(png(image) if kind == ".png" else _vector(figure, kind.removeprefix(".")))
+        if kind == ".png":
+            temporary.write_bytes(png(image))
+            return image
+        from matplotlib import rc_context
+
+        with rc_context({"svg.hashsalt": "pcmc", "pdf.fonttype": 42}):
+            figure.savefig(temporary, format=kind[1:], metadata=nobody[kind], dpi=DPI)
     return image
 
 
@@ -122,17 +129,6 @@ def png(image: Image) -> bytes:
 
     stream = io.BytesIO()
     Pillow.fromarray(image).save(stream, format="PNG", compress_level=EFFORT)
-    return stream.getvalue()
-
-
-def _vector(figure: Any, kind: str) -> bytes:
-    from matplotlib import rc_context
-
-    nobody: dict[str, Any] = {"svg": {"Date": None}}
-    nobody["pdf"] = dict.fromkeys(("CreationDate", "Creator", "Producer"))
-    stream = io.BytesIO()
-    with rc_context({"svg.hashsalt": "pcmc", "pdf.fonttype": 42}):
-        figure.savefig(stream, format=kind, metadata=nobody[kind], dpi=DPI)
     return stream.getvalue()
 
 

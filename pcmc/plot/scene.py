@@ -140,7 +140,11 @@ def scene(
         if of_vertices and len(F) <= CELLS_UP_TO:
             P, colors = _cells(P, known[F], light)
         else:
-            base = _mean_known(values[F]) if of_vertices else known[shown]
+            base = known[shown] if not of_vertices else rgb(NO_VALUE)
+            if of_vertices:  # the mean of the corners' colours that exist
+                there = ~np.isnan(values[F][..., :1])
+                count, total = there.sum(axis=1), np.where(there, values[F], 0.0).sum(axis=1)
+                base = np.where(count > 0, total / np.maximum(count, 1), base)
             colors = base[:, None] * light[..., None]
     there = np.zeros(len(topo.edges), dtype=bool)
     there[topo.edge_of_face[shown]] = True
@@ -203,14 +207,6 @@ def _cells(P: Floats, known: Floats, light: Floats) -> tuple[Floats, Floats]:
             shade = np.stack([light[:, k], half_light, bright], axis=1)
             colors.append(known[:, k, None] * shade[..., None])
     return np.concatenate(corners), np.concatenate(colors)
-
-
-def _mean_known(corner: Floats) -> Floats:
-    """(m,3) mean of the corners' colours (m,3,3) that exist."""
-    there = ~np.isnan(corner[..., :1])
-    count = there.sum(axis=1)
-    total = np.where(there, corner, 0.0).sum(axis=1)
-    return np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
 
 
 def mean_edge(surface: Surface) -> float:

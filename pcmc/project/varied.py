@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from difflib import get_close_matches
@@ -19,6 +20,8 @@ from .. import io
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
 from ..base.files import PathLike, as_path, read_bytes
+from ..base.units import Units
+from ..certificate.quantities import dimension_of
 from ..forces.rooms import refuse_varied_pressure
 from ..plan import Curve, Divider, Hole, Plan
 from ..surface import Plane, Surface
@@ -37,6 +40,11 @@ CABLE = "cable "  # before the name of a cable, where a patch has the same
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
 Item = tuple[tuple[str, ...], KeyPath, Any]  # names, path and value of something in a file
+
+DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
+# of numbers of a project that are no quantities of a roof
+DIMENSIONS |= {"wall": "tension", "cable_weight": "tension"}
+OF_CABLES = {kind.field: kind.dimension for kind in KINDS.values() if kind.parts == "cables"}
 
 
 def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surface]:
@@ -249,6 +257,26 @@ def _moved(part: Any, by: Floats, plane: Plane) -> Any:
     if not isinstance(part, Curve):
         return moved(np.array([part]))[0].tolist()
     return replace(part, pieces=tuple(replace(p, points=moved(p.points, bool(p.sweep))) for p in part.pieces))
+
+
+def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
+    """The names of numbers with their units in brackets, as far as these are known.
+
+    ``cables`` are names of cables, whose tension is a force.
+
+    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
+    ['west.tension [kN/m]', 'hem.tension [kN]']
+    """
+    shown = {}
+    for name in names if units else ():
+        stem, _, quantity = name.rpartition(".")
+        if quantity == "margin_value":
+            quantity = stem.partition(" of ")[0]
+        cable = OF_CABLES.get(quantity) if stem in cables or stem.startswith("plan.cables.") else None
+        with suppress(OptionError):
+            dimension = cable or DIMENSIONS.get(quantity) or dimension_of(quantity)
+            shown[name] = f"{name} [{units.behind(dimension).strip()}]"
+    return shown
 
 
 def digest(path: PathLike) -> str:

@@ -144,23 +144,14 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
     return path, partial(write_structure, model=model)
 
 
-def analysis_paths(path: Path) -> dict[str, Path]:
-    """The files of an analysis beside the structural model, by what they hold."""
-    names = {name: f"{path.stem}-{name}.csv" for name in ("cases", "patches", "supports", "cables")}
-    return {name: path.with_name(file) for name, file in names.items()} | {
-        "picture": path.with_name(f"{path.stem}-cases.png")
-    }
-
-
 def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
     """The tables and the picture of an analysis beside the structural model."""
     from ..plot import under_load  # needs the extra plot
 
-    paths = analysis_paths(path)
-    jobs: FileJobs = [
-        (paths[name], partial(table.to_csv, index=False)) for name, table in analysis.tables.items()
-    ]
-    return [*jobs, (paths["picture"], partial(under_load, analysis))]
+    jobs: FileJobs = [(path.with_name(f"{path.stem}-cases.png"), partial(under_load, analysis))]
+    for name, table in analysis.tables.items():
+        jobs.insert(-1, (path.with_name(f"{path.stem}-{name}.csv"), partial(table.to_csv, index=False)))
+    return jobs
 
 
 def draw_picture(

@@ -18,7 +18,6 @@ from ..base.compiled import compiled
 
 SHEET, CURVE, POINT = 0, 1, 2
 SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle's sides, in the order of the corners opposite
-GAPS = (16001, 3301, 701, 301, 132, 57, 23, 10, 4, 1)  # of Shell's sort
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +59,8 @@ class Topology:
     @cached_array
     def one_way_edge(self) -> Bools:
         """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
-        one_way: Bools = _one_way(self.faces, self.edge_of_face, self.valence)
-        return one_way
+        total = np.bincount(self.edge_of_face.ravel(), self.sense.ravel(), len(self.edges))
+        return (self.valence == 2) & (total != 0.0)
 
     @cached_array
     def fans(self) -> Ints:
@@ -303,15 +302,6 @@ def _components(edges: Ints, n: int) -> Ints:
 
 
 @compiled
-def _one_way(F: Ints, edge_of_face: Ints, valence: Ints) -> Bools:
-    total = np.zeros(len(valence), dtype=np.int32)
-    for f in range(len(F)):
-        for k in range(3):
-            total[edge_of_face[f, k]] += 1 if F[f, k - 2] < F[f, k - 1] else -1
-    return (valence == 2) & (total != 0)
-
-
-@compiled
 def _fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
     parent = np.arange(2 * len(edges)).astype(np.int32)  # node 2 e + s is the end edges[e, s] of edge e
     for f in range(len(F)):
@@ -351,13 +341,17 @@ def _number_edges(F: Ints, n: int) -> tuple[Ints, Ints, Ints]:
     count = 0
     for v in range(n):
         start, end = first[v], first[v + 1]
-        for gap in GAPS:
+        gap = 1  # Shell's sort: by insertion, of buckets with many sides at large distances first
+        while 9 * gap < end - start:
+            gap = 3 * gap + 1
+        while gap > 0:
             for i in range(start + gap, end):
                 high, where, j = higher[i], place[i], i
                 while j >= start + gap and higher[j - gap] > high:
                     higher[j], place[j] = higher[j - gap], place[j - gap]
                     j -= gap
                 higher[j], place[j] = high, where
+            gap //= 3
         for i in range(start, end):
             if i == start or higher[i] != higher[i - 1]:
                 edges[count, 0], edges[count, 1] = v, higher[i]

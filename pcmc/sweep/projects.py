@@ -12,10 +12,10 @@ from typing import Any
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
+from ..project.varied import with_units
 from ..solvers import find_method
 from .grid import Sweep
 from .solving import case_row, mesh_columns
-from .tables import with_units
 
 
 def project_sweep(

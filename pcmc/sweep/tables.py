@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Container, Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import OptionError
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.libraries import require
-from ..base.units import Units
-from ..surface.values import KINDS
 from .case_script import WORDS
 from .store import Record
 
@@ -25,10 +22,6 @@ TABLES = (".csv", ".parquet")
 FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met")
 USUAL = ("apex", "rise", "area", "reaction per length")  # the first of each patch, the others of the roof
 GOOD = ("stable", "neutral")
-DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
-# of numbers of a project that are no quantities of a roof
-DIMENSIONS |= {"wall": "tension", "cable_weight": "tension"}
-OF_CABLES = {kind.field: kind.dimension for kind in KINDS.values() if kind.parts == "cables"}
 
 
 def table(records: Iterable[Record]) -> pd.DataFrame:
@@ -126,28 +119,6 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
     shown = [column for name in show for column in columns_of(table, name, parameters)] if show else usual
     wanted = dict.fromkeys([*parameters, *FIRST, *shown])
     return table[[name for name in wanted if name in table]]
-
-
-def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
-    """The names of numbers with their units in brackets, as far as these are known.
-
-    ``cables`` are names of cables, whose tension is a force.
-
-    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
-    ['west.tension [kN/m]', 'hem.tension [kN]']
-    """
-    from ..certificate.quantities import dimension_of  # takes long to import
-
-    shown = {}
-    for name in names if units else ():
-        stem, _, quantity = name.rpartition(".")
-        if quantity == "margin_value":
-            quantity = stem.partition(" of ")[0]
-        cable = OF_CABLES.get(quantity) if stem in cables or stem.startswith("plan.cables.") else None
-        with suppress(OptionError):
-            dimension = cable or DIMENSIONS.get(quantity) or dimension_of(quantity)
-            shown[name] = f"{name} [{units.behind(dimension).strip()}]"
-    return shown
 
 
 def draw_sweep(

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from convergence import orders
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nightly import at_night
@@ -36,11 +37,6 @@ def on_sphere(longitude, latitude):
 
 def laid(X, F):
     return flattened(X, F, np.zeros(len(X), dtype=int), NONE, np.ones((len(X), 2)))
-
-
-def orders(errors):
-    """The orders of convergence of errors where a step is halved each time."""
-    return np.log2(np.array(errors[:-1]) / errors[1:])
 
 
 @cache

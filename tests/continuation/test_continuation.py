@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from branches import AT_REST, tension_of_height
+from convergence import orders
 from shapes import pyramid
 from tables import same
 
@@ -11,11 +12,6 @@ from pcmc import Direction, Parameter, certify, follow, solve
 from pcmc.base.errors import OptionError
 from pcmc.continuation import Ending
 from pcmc.plot import diagram
-
-
-def orders(errors):
-    errors = np.abs(errors)
-    return np.log2(errors[:-1] / errors[1:])
 
 
 @pytest.fixture(scope="module")

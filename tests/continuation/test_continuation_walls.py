@@ -27,6 +27,7 @@ def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
         assert certify(solve(near, target="stationary", min_quality=0.0).surface).index == index
 
 
+@pytest.mark.nightly
 def test_fold_of_two_caps_on_a_coarse_mesh():
     start = solve(two_caps(1.2), target="stationary").surface
     branch = follow(start, Direction({"large": -1.0, "small": -1.0}, relative=True), folds=1)

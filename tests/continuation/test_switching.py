@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from convergence import orders
 from refusals import refused
 from scipy.spatial import cKDTree
 from shapes import pyramid
@@ -21,11 +22,6 @@ from pcmc import BoundaryMotion, certify, follow, solve
 from pcmc.base.errors import OptionError
 from pcmc.continuation import Branch, Ending
 from pcmc.continuation.state import BranchMesh, BranchState
-
-
-def orders(errors):
-    errors = np.abs(errors)
-    return np.log2(errors[:-1] / errors[1:])
 
 
 def rings(surface):

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from convergence import orders
 from refusals import refused
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from shapes import pyramid
-from volume_cases import cap, order
+from volume_cases import cap
 
 import generators
 import pcmc
@@ -71,8 +72,8 @@ def test_a_heavy_bubble_has_the_profile_of_its_weight():
         foot = X[result.surface.on_plane]
         heights.append(X[:, 2].max() - height)
         radii.append(np.linalg.norm(foot - foot.mean(axis=0), axis=1).mean() - radius)
-    assert order(heights)[-1] == pytest.approx(2.0, abs=0.3)
-    assert order(radii)[-1] == pytest.approx(2.0, abs=0.3)
+    assert orders(heights)[-1] == pytest.approx(2.0, abs=0.3)
+    assert orders(radii)[-1] == pytest.approx(2.0, abs=0.3)
     assert max(abs(heights[-1]), abs(radii[-1])) < 0.01
 
 

@@ -4,10 +4,19 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from generators import catenoid, catenoid_exact, spherical_cap, spherical_cap_exact
-from pcmc import BoundaryMotion, Direction, find_equilibria
+from generators import (
+    catenoid,
+    catenoid_exact,
+    cylinder,
+    enneper,
+    enneper_exact,
+    spherical_cap,
+    spherical_cap_exact,
+)
+from pcmc import BoundaryMotion, Direction, find_equilibria, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import shape_distance
+from studies.reference import evolver
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)
 
@@ -61,6 +70,32 @@ def test_the_wide_catenoid_breaks_over_the_deep_one():
     assert found[1].energy == pytest.approx(wide.energy, rel=0.02)
     assert found[2].energy == pytest.approx(deep.energy, rel=0.02)
     assert found.barriers[0].end == "pinches off or collapses"  # to two discs
+
+
+def test_enneper_s_surface_is_the_pass_between_two_that_are_images_of_each_other():
+    found = find_equilibria(solve(enneper(0.3, radius=1.2), target="stationary"), (), starts=0)
+    assert [one.index for one in found.found] == [0, 0, 1]
+    assert found[1].energy == pytest.approx(found[2].energy, rel=1e-4)
+    assert found[3].energy == pytest.approx(enneper_exact(radius=1.2).area, rel=0.01)
+    assert found.barrier(1, 2) == pytest.approx(found[3].energy - found[1].energy, rel=1e-12)
+    assert {barrier.to for barrier in found.barriers} == {1, 2}
+
+
+@pytest.mark.skipif(not evolver.available(), reason="Surface Evolver is not installed")
+def test_two_unduloids_leave_the_cylinder_of_length_2_pi():
+    """The index of the cylinder rises where L = 2πR; both lean back over shorter cylinders."""
+    edge, length = 2.0 * np.pi / 14, 6.0
+    tube = cylinder(edge, length=length, exact=True)
+    tube = solve(tube.moved(tube.vertices - [0.0, 0.0, 0.5 * length]), target="stationary").surface
+    x, y, z = tube.vertices[tube.fixed].T
+    longer = BoundaryMotion(lambda L: np.stack([x, y, 0.5 * np.sign(z) * L], axis=1), start=length)
+    found = find_equilibria(tube, longer, starts=0, span=(5.8, 6.6))
+    assert [one.index for one in found.found] == [1, 2, 2]
+    assert found[2].energy == pytest.approx(found[3].energy, rel=1e-6)
+    cylinders, one, other = found.branches["boundary"]
+    assert cylinders.bifurcations.parameter.iloc[0] == pytest.approx(2.0 * np.pi, rel=0.01)
+    assert one.points.parameter[0] == other.points.parameter[0] == cylinders.bifurcations.parameter.iloc[0]
+    assert [evolver.inertia(one.surface).negative for one in found.found] == [1, 2, 2]
 
 
 # ---- shapes -------------------------------------------------------------------------------------

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from convergence import orders
 from refusals import refused
 from shapes import octahedron, pyramid
-from volume_cases import cap, cap_height, order, raised
+from volume_cases import cap, cap_height, raised
 
 import generators
 import pcmc
@@ -74,8 +75,8 @@ def test_taylor_slopes_of_the_lagrangian():
     value, slope = lagrangian(0.0)
     second = [abs(lagrangian(t)[0] - value - t * slope) for t in steps]
     third = [abs(lagrangian(t)[0] - value - 0.5 * t * (slope + lagrangian(t)[1])) for t in steps]
-    assert order(second) == pytest.approx(2.0, abs=0.1)
-    assert order(third) == pytest.approx(3.0, abs=0.1)
+    assert orders(second) == pytest.approx(2.0, abs=0.1)
+    assert orders(third) == pytest.approx(3.0, abs=0.1)
 
 
 def test_taylor_slopes_of_a_volume():
@@ -85,7 +86,7 @@ def test_taylor_slopes_of_a_volume():
     steps = 0.1 * 0.5 ** np.arange(5)
     values = np.array([room_volumes(surface.moved(surface.vertices + t * d))[0] for t in steps])
     errors = values - room_volumes(surface)[0] - steps * slope
-    assert order(errors) == pytest.approx(2.0, abs=0.1)
+    assert orders(errors) == pytest.approx(2.0, abs=0.1)
 
 
 def test_rooms_that_do_not_close_are_refused():
@@ -210,8 +211,8 @@ def test_caps_on_both_sides_of_the_hemisphere(volume):
         assert (result.certificate.verdict.name, result.certificate.index) == ("STABLE", 0)
         heights.append(result.surface.vertices[:, 2].max() - height)
         pressures.append(result.surface.pressures[0] - 1.2 / radius)
-    assert order(heights)[-1] == pytest.approx(2.0, abs=0.3)
-    assert order(pressures)[-1] == pytest.approx(2.0, abs=0.3)
+    assert orders(heights)[-1] == pytest.approx(2.0, abs=0.3)
+    assert orders(pressures)[-1] == pytest.approx(2.0, abs=0.3)
     # the same surface under the pressure reached, without the condition, has the known index
     free = replace(result.surface, rooms=())
     assert Equilibrium.of(free).factorised().negative == (0 if volume < 2.09 else 1)

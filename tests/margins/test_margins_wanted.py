@@ -14,10 +14,10 @@ from pcmc.cli import main
 from pcmc.explore.page_data import target_choices
 from pcmc.explore.session import Session, solved_start
 from pcmc.project import run
+from pcmc.project.varied import with_units
 from pcmc.sweep import run as sweep
 from pcmc.sweep import short_table
 from pcmc.sweep.projects import project_sweep
-from pcmc.sweep.tables import with_units
 
 
 @pytest.fixture(scope="module")

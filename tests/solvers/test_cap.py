@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
+from convergence import orders
 
 from generators import spherical_cap, spherical_cap_exact
 from pcmc import curvature_error, energy, gradient, solve
 
 EXACT = {"energy": 1.5039191689, "height": 0.5366750419}
 EDGES = (0.25, 0.125, 0.0625, 0.03125)
-
-
-def orders(errors):
-    errors = np.abs(errors)
-    return np.log2(errors[:-1] / errors[1:])
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ theory says: at lengths π r k of a cylinder, at conjugate points of unduloids a
 
 import numpy as np
 import pytest
+from convergence import orders
 from refusals import refused
 from scipy.optimize import brentq
 from scipy.special import lpmv
@@ -43,11 +44,6 @@ from pcmc.base.errors import OptionError
 from pcmc.forces.functional import patch_areas, volume
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
-
-
-def orders(errors):
-    errors = np.abs(errors)
-    return np.log2(errors[:-1] / errors[1:])
 
 
 def stationary(start):

@@ -145,7 +145,7 @@ def test_a_junction_that_slips_along_its_support_is_named():
     assert solve(start).certificate.verdict is Verdict.STABLE  # from a lower start
 
 
-@pytest.mark.parametrize("tensions", [{"wall": 2.0}, *at_night({"small": 4.0}, {"large": 5.0})])
+@pytest.mark.parametrize("tensions", at_night({"wall": 2.0}, {"small": 4.0}, {"large": 5.0}))
 def test_a_wall_whose_bottom_is_held_does_not_slip(tensions):
     """Example 2 with tensions at which it slips while the wall's bottom slides."""
     surface = two_caps(0.4).retensioned(tensions)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from convergence import orders
 from scipy.optimize import brentq
-from volume_cases import DOUBLE, TRIPLE, connected_caps, cylinder, order
+from volume_cases import DOUBLE, TRIPLE, connected_caps, cylinder
 
 import generators
 import pcmc
@@ -36,7 +37,7 @@ def test_bubbles_of_volume_1_that_nothing_holds(make, area, motions):
         assert certificate.eigenvalues[0] > 1.0
         assert certificate.curvature_error < 1e-6
         errors.append(patch_areas(result.surface).sum() - area)
-    assert order(errors)[-1] == pytest.approx(2.0, abs=0.15)
+    assert orders(errors)[-1] == pytest.approx(2.0, abs=0.15)
     assert abs(errors[-1]) < 5e-3 * area
     with pytest.warns(FreeSurfaceWarning):  # without the condition the bubbles grow or shrink
         free = replace(result.surface, rooms=())
@@ -102,7 +103,7 @@ def test_a_cylinder_of_prescribed_volume_is_stable_up_to_a_length(between, limit
 
     span = 0.95 * limit, 1.01 * limit
     errors = [brentq(softest, *span, args=(h,), xtol=1e-4) - limit for h in (0.6, 0.3, 0.15)]
-    assert order(errors) == pytest.approx(2.0, abs=0.25)
+    assert orders(errors) == pytest.approx(2.0, abs=0.25)
     assert abs(errors[-1]) < 0.0025 * limit
 
 
@@ -143,4 +144,4 @@ def test_volumes_between_planes_are_those_enclosed_and_their_gradients():
     steps = 0.1 * 0.5 ** np.arange(4)
     values = np.array([room_volumes(surface.moved(surface.vertices + t * d))[0] for t in steps])
     errors = values - room_volumes(surface)[0] - steps * slope
-    assert order(errors)[-1] == pytest.approx(2.0, abs=0.1)
+    assert orders(errors)[-1] == pytest.approx(2.0, abs=0.1)

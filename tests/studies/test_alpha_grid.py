@@ -65,6 +65,7 @@ def test_a_patch_held_all_around_folds_below_half_its_radius():
     assert solve(weak, target="stationary").status is not Status.CONVERGED
 
 
+@pytest.mark.nightly
 def test_branches_arrive_or_fold_with_a_way_down_opening():
     found = branch_case([[3.0, 3.0, 2.0], [4.0, 3.0, 2.0]], 1.2)
     assert found["ending"] == "fold"

@@ -29,12 +29,6 @@ def raised(height: float = 0.5) -> Surface:
     return replace(roof, vertices=roof.vertices + height * np.eye(3)[2])
 
 
-def order(errors) -> np.ndarray:
-    """Observed orders on meshes of halved edges."""
-    errors = np.abs(errors)
-    return np.log2(errors[:-1] / errors[1:])
-
-
 def connected_caps(volume: float) -> Surface:
     """Two caps over unit discs apart from each other, with one pressure and one volume together."""
     one = generators.spherical_cap(0.34, height=1.3)

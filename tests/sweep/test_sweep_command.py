@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -143,7 +145,7 @@ def test_time_limit_and_failed_cases_again(roof, capsys):
 
 
 def test_a_table_without_its_library_is_refused_before_any_case(roof, capsys, monkeypatch):
-    monkeypatch.setattr("pcmc.base.libraries.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert cli.main(["sweep", "roof.toml", *GRID[:1], "--csv", "t.parquet", "--store", "s"]) == 2
     assert "pcmc-surfaces[files]" in capsys.readouterr().err
     assert [p.name for p in roof.parent.iterdir()] == ["roof.toml"]
