@@ -171,8 +171,8 @@ def _moved_levels(
         if (cloth.sheet[wide] < 0).any() or (len(wide) and number == ROUNDS - 1) or stuck:
             k = int(wide[np.lexsort((-widths[wide], cloth.sheet[wide]))[0]])
             name = cloth.surface.patches[cloth.patches[k]].name
-            place = point_text(cloth.mesh.X[cloth.mesh.F[cloth.strip_of_face == k]].mean(axis=(0, 1)))
-            text = f"width: a strip of {name!r} around {place} is {widths[k]:.4g} wide,"
+            around = point_text(cloth.mesh.X[cloth.mesh.F[cloth.strip_of_face == k]].mean(axis=(0, 1)))
+            text = f"width: a strip of {name!r} around {around} is {widths[k]:.4g} wide,"
             text += f" and {net:.4g} is there between allowances; draw seams in it"
             raise OptionError(text, what="width", found=options.width)
     else:
