@@ -62,6 +62,7 @@ class Divider:
         the name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch,
         give the parts on both sides to that patch with ``at``.
     cable_weight : of that cable, force per length, against Π's normal; ``cable`` is its tension at Π then.
+    member : name of the arch, beam or cable that takes the place of the wall in the structural model.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
@@ -71,6 +72,7 @@ class Divider:
     cable: float | None = None
     upright: bool = False
     cable_weight: float = 0.0
+    member: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,7 @@ class Hole:
     name : for messages.
     cable : tension of that cable, force.
     cable_weight : of that cable, force per length; ``cable`` is its tension at Π then.
+    member : name of the ring that carries a held edge in the structural model.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
@@ -98,6 +101,7 @@ class Hole:
     name: str = ""
     cable: float | None = None
     cable_weight: float = 0.0
+    member: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -270,7 +270,8 @@ class Outcome:
 
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
-        return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units)
+        plan = None if self.project is None else self.project.plan
+        return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
 
     @property
     def pattern_wanted(self) -> CuttingOptions | None:

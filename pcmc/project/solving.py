@@ -217,7 +217,7 @@ def _check_wishes(project: Project, surface: Surface) -> None:
     with in_file(project.path):
         structure, output = project.structure, project.output
         if structure is not None and (output.structure is not None or structure.run):
-            structure.check(surface)
+            structure.check(surface, project.plan)
         if structure is not None and structure.run and (output.structure or output.report):
             expect_program()
         if project.pattern is not None and (output.pattern or output.report):
