@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from .structure import (
         Gas,
         Material,
+        Member,
+        Profile,
         SelfWeight,
         Snow,
         StructuralModel,
@@ -75,6 +77,7 @@ __all__ = [
     "Line",
     "Margin",
     "Material",
+    "Member",
     "MeshCheck",
     "MeshVerdict",
     "PanelNet",
@@ -82,6 +85,7 @@ __all__ = [
     "Parameter",
     "Patch",
     "Plane",
+    "Profile",
     "Repaired",
     "Room",
     "SelfWeight",
@@ -145,6 +149,8 @@ _NAMES = {
     "structure": (
         "Gas",
         "Material",
+        "Member",
+        "Profile",
         "SelfWeight",
         "Snow",
         "StructuralModel",

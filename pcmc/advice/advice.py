@@ -172,7 +172,8 @@ def _mended(task: Task, plan: Plan, result: Result) -> Mended:
     """
     sail, masts = as_sail(plan, task.rises), point_masts(plan)
     base = plan if sail is None else sail
-    for share in SHARES if masts else () if sail is None else (0.0,):
+    fit = all(mast.has_room for mast in masts)
+    for share in SHARES if masts and fit else () if masts or sail is None else (0.0,):
         changed = with_rings(base, masts, share) if masts else base
         other = _tried(task, changed, result)
         if other is not None and other.certificate.certified:

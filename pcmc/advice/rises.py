@@ -154,6 +154,7 @@ def first_tension(least: float, pressure: float, rise: float) -> float:
 
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried
+LEAST = 0.25  # smallest radius of a ring over the length of edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,15 +164,21 @@ class Mast:
     number: int  # its place among the plan's supports
     point: Floats  # (3,) in the coordinates of Π
     clearance: float  # distance in plan to the nearest line or other point that is held
+    least: float  # the smallest radius of a ring that the triangles beside it can follow
 
     @property
     def text(self) -> str:
         """The point as it is typed: [x, y, z]."""
         return f"[{', '.join(f'{value:.6g}' for value in self.point)}]"
 
+    @property
+    def has_room(self) -> bool:
+        """Whether a ring fits between it and what is next to it."""
+        return self.clearance > 2.0 * self.least
+
     def radius(self, share: float) -> float:
         """The radius of a ring around it."""
-        return two_digits(share * self.clearance)
+        return two_digits(max(share * self.clearance, self.least))
 
 
 def point_masts(plan: Plan) -> list[Mast]:
@@ -196,7 +203,8 @@ def point_masts(plan: Plan) -> list[Mast]:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))
     found = zip(given, points, away.tolist(), inside, strict=True)
-    return [Mast(number, point, clearance) for number, point, clearance, free in found if free]
+    least = LEAST * plan.edge_length
+    return [Mast(number, point, clearance, least) for number, point, clearance, free in found if free]
 
 
 def with_rings(plan: Plan, masts: Sequence[Mast], share: float) -> Plan:
@@ -230,11 +238,15 @@ def mast_note(plan: Plan) -> str:
     if not masts:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
-    line = ring_lines(masts[:1], SHARES[1], drawn=False)[2]
+    change = (
+        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[1], drawn=False)[2]}"
+    )
+    if tight := [mast for mast in masts if not mast.has_room]:
+        change = f"{tight[0].text} is too near to what is held beside it for a ring: move it there, or away"
     return (
         f"the roof is held at {'a single point' if len(masts) == 1 else 'single points'} inside, {points}:"
-        " there it has a peak as thin as the triangles, which comes to rest on some meshes and not on others;"
-        f" hold it on a ring, in [[plan.holes]], instead: {line}"
+        " there it has a peak as thin as the triangles, which comes to rest on some meshes and not on"
+        f" others; {change}"
     )
 
 

@@ -283,8 +283,9 @@ def structure(
     """Write a structural model for CalculiX: prestressed membranes, supports, loads; and run it.
 
     A project is solved first; its [structure] has the values that no option gives. With --run each case and
-    combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv and
-    NAME-cases.png come beside the model. A case that is not carried as a whole ends with the code 1.
+    combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv,
+    NAME-members.csv, NAME-member-forces.csv and NAME-cases.png come beside the model. A case that is not
+    carried as a whole ends with the code 1.
 
     \b
     Examples:
@@ -303,7 +304,7 @@ def structure(
         values |= {"thickness": thick[patches[0]] if even else thick} if thick else {}
         values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
         wanted = Structure(**values)
-        wanted.check(start)
+        wanted.check(start, project.plan)
         if run := wanted.run if run is None else run:
             expect_program()
         roof = build.roof(project, progress)

@@ -47,8 +47,9 @@ class Target:
         prescribed volume; of a cable ``"sag"``, the largest distance of its vertices from the chord between
         its ends, its ``"length"``, and its ``"force"``, which is its tension.
     of : name of the patch, room or cable; what a margin varies, such as ``"tension of west"``, by default
-        the pressure; for ``"height"`` the point (x, y) in the coordinates of Π. None: all patches under
-        pressure together (for reactions all edges that are held), where the quantity is not of one alone.
+        the pressure; for ``"height"`` the point (x, y) in the coordinates of Π. By default all patches
+        under pressure together (for reactions all edges that are held), where the quantity is not of one
+        alone.
     value, at_most, at_least : a value, or limits. ``pcmc.sensitivities`` needs none.
     name : of the point of a height, such as ``"crown"``: shown instead of its coordinates.
 

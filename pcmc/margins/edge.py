@@ -207,7 +207,12 @@ class Margin:
         holds = f"stays a saddle of index {self.index}" if self.index else "holds"
         none_now = math.isnan(self.factor)
         number = self.value if none_now else self.factor
-        of = {"tension": "tensions", "cable": "tensions of the cables"}.get(self.what, self.what)
+        many = {
+            "tension": "tensions",
+            "cable": "tensions of the cables",
+            "cable_weight": "weights of cables",
+        }
+        of = many.get(self.what, self.what)
         at_least, mesh = self.ends_by in OPEN, " on this mesh" * (self.ends_by is MarginEnd.MESH)
         shown = f"{number:.4g}" if at_least else with_bar(number, self.bar)
         shown += f"{units.behind(self.dimension)} of {self.what}" if none_now else f" times the {of}"
@@ -237,9 +242,10 @@ def margin(
     Parameters
     ----------
     surface : at rest.
-    what : ``"pressure"``, ``"snow"``, ``"weight"``, ``"tension"`` (with cables), ``"cable"`` or ``"volume"``:
-        all of a kind in proportion; or one of them, such as ``"pressure of hall"``; the name of a patch or
-        cable alone means its tension. What is 0 now is added, alike on all patches.
+    what : ``"pressure"``, ``"snow"``, ``"weight"`` and ``"tension"`` (both with cables), ``"cable"``,
+        ``"cable_weight"`` or ``"volume"``: all of a kind in proportion; or one of them, such as
+        ``"pressure of hall"``; the name of a patch or cable alone means its tension. What is 0 now is added,
+        alike on all patches or cables.
     towards : ``"more"`` or ``"less"``; by default loads and walls pull more, sheets and cables less.
     most : followed up to this factor, or down to 1 over it; of what is 0 now, up to so many times the
         largest pressure, or tension over size.

@@ -58,7 +58,9 @@ def measured_margin(surface: Surface, of: str | None) -> Measurement:
     patches = [patch.name for patch in end.patches]
     named = dict.fromkeys(("tension", "pressure", "weight", "snow"), patches)
     slopes = {}
-    for kind, names in {**named, "cable": [cable.name for cable in end.cables]}.items():
+    cables = [cable.name for cable in end.cables]
+    named |= {"cable": cables, "cable_weight": cables}
+    for kind, names in named.items():
         across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
         multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
         slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along

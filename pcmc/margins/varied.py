@@ -36,10 +36,6 @@ class Varied:
         if towards is not None:
             validate.choice("towards", towards, ("more", "less"))
         walls = {patch.name for patch, wall in zip(surface.patches, surface.walls, strict=True) if wall}
-        heavy = next((cable.name for cable in surface.cables if cable.weight != 0.0), "")
-        if what == "weight" and heavy:
-            text = f"margin: 'weight' varies the patches alone, and cable {heavy!r} has a weight of its own"
-            raise OptionError(f"{text}; name one patch: 'weight of PATCH'", what="what", found=what)
         pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
         more = not pulls if towards is None else towards == "more"
         values = np.array([Parameter(name, kind).value(surface) for kind, name in parts])
@@ -51,6 +47,8 @@ class Varied:
         if not more:
             raise OptionError(f"margin: the {what} is 0, and cannot become less", what="towards", found=0.0)
         usual = float(np.abs(surface.pressures).max()) or float(surface.tensions.max()) / surface.size
+        if parts[0][0] == "cable_weight":  # per length
+            usual *= surface.size
         return cls(what, parts, values, more, usual)
 
     @property
@@ -81,11 +79,14 @@ def named(surface: Surface) -> Mapping[str, tuple[Part, ...]]:
     sheets = [name for name, wall in zip(every, surface.walls, strict=True) if not wall]
     cables = dict.fromkeys(cable.name for cable in surface.cables)
     owners = {"pressure": sheets, "snow": sheets, "weight": every, "tension": every, "cable": [*cables]}
+    owners["cable_weight"] = [*cables]
     owners["volume"] = [room.name for room in surface.rooms]
     listed = {kind: tuple((kind, name) for name in names) for kind, names in owners.items() if names}
     tensions = listed["tension"] + listed.get("cable", ())
     pulling = tuple(part for part in tensions if Parameter(part[1], part[0]).value(surface) > 0.0)
-    together = {**listed, "tension": pulling} if pulling else listed
+    weights = listed["weight"] + listed.get("cable_weight", ())
+    heavy = tuple(part for part in weights if Parameter(part[1], part[0]).value(surface) != 0.0)
+    together = listed | ({"tension": pulling} if pulling else {}) | ({"weight": heavy} if heavy else {})
     single = {Parameter(name, kind).label: ((kind, name),) for kind, name in sum(listed.values(), ())}
     plain = {name: ((kind, name),) for kind, name in tensions[::-1]}
     return {**together, **single, **plain}

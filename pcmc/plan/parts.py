@@ -49,8 +49,8 @@ class Divider:
         or inside a hole are left out.
     wall : tension of the wall, force/length, ≥ 0; "balanced", chosen so that the junction balances with room
         to spare: the difference of the neighbours' tensions and 0.3 of the smaller one, less where the wall
-        runs into a corner or the roof is flat; None or false for no wall. Between patches of different
-        pressures the wall takes the difference.
+        runs into a corner or the roof is flat; false for no wall. Between patches of different pressures
+        the wall takes the difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
     bottom : "held" on Π in all directions; "sliding" on Π; or "sloped": held in all directions on the
@@ -58,10 +58,11 @@ class Divider:
         bottom is held at its ends by the mesh alone: on finer meshes it slips, or the shape is a saddle.
     upright : whether a vertical plane holds the wall and the junction on it, in which they slide; the line
         must be straight. The plane takes the pull across it.
-    cable : tension of a cable along the line, force; None for no cable. Without a wall the cable has the
-        name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch, give
-        the parts on both sides to that patch with ``at``.
+    cable : tension of a cable along the line, force; by default there is none. Without a wall the cable has
+        the name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch,
+        give the parts on both sides to that patch with ``at``.
     cable_weight : of that cable, force per length, against Π's normal; ``cable`` is its tension at Π then.
+    member : name of the arch, beam or cable that takes the place of the wall in the structural model.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
@@ -71,6 +72,7 @@ class Divider:
     cable: float | None = None
     upright: bool = False
     cable_weight: float = 0.0
+    member: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,7 @@ class Hole:
     name : for messages.
     cable : tension of that cable, force.
     cable_weight : of that cable, force per length; ``cable`` is its tension at Π then.
+    member : name of the ring that carries a held edge in the structural model.
     """
 
     curve: Any = field(metadata={"kind": "a curve"})
@@ -98,6 +101,7 @@ class Hole:
     name: str = ""
     cable: float | None = None
     cable_weight: float = 0.0
+    member: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +160,7 @@ class PatchSpec:
     tension : α, force/length.
     pressure : p, force/area.
     weight : of the patch, force per area of the patch, against Π's normal; negative for a lift.
-    snow : s, force per area of the plan; None for that of the plan. A load s on the plan area has the
+    snow : s, force per area of the plan; by default that of the plan. A load s on the plan area has the
         potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
     volume : of the room under the patch, between its walls, length³, instead of a pressure, which is then a
         result. A patch with a negative volume hangs below Π.

@@ -29,15 +29,15 @@ CURVES = {"kind": "a list of curves or tables"}  # of keys
 class Plan:
     """A roof given by the lines of its plan.
 
-    Curves are Curves or their plain data (see ``curve``).
+    Curves are Curves or their plain data (see ``curve``); patches are a mapping or PatchSpecs.
 
     Attributes
     ----------
     outline : a closed curve; it may leave Π, but its course in plan must not cross itself.
     dividers : lines between patches: Dividers, or curves (with walls whose tension is chosen).
     holes : openings: Holes, or curves (with fixed edges).
-    patches : a PatchSpec for each part into which the dividers cut the plan, or a mapping from names to
-        their attributes; without patches ``tension`` holds for every part.
+    patches : the parts into which the dividers cut the plan: by name, the attributes of each. Without them
+        ``tension`` holds for every part.
     edge_length : of the triangles, length. Edges on lines are nearly as long. Corners, crossings and the
         points where a curve is farthest along x or y are vertices; between two of them edges are equal.
     edge : the support of the outline: "fixed"; "sliding" on Π, where the roof is at rest if it meets Π
@@ -64,8 +64,11 @@ class Plan:
     cables : parts of the outline and of holes that are free and carry a cable of their own: CableLines.
     mirrors : straight lines, each two points, along edges of the outline: the plan is one half of a
         symmetric roof, or a quarter, and goes on behind these edges as its mirror image.
-    rooms : a mapping from names to ``patches`` and ``volume``: rooms under several patches whose volume is
-        given, instead of their pressure. For a room under one patch give that patch a ``volume``.
+    rooms : rooms under several patches whose volume is given, instead of their pressure: by name, their
+        ``patches`` and ``volume``. For a room under one patch give that patch a ``volume``.
+    cushion : a factor: there is a second sheet below, held at the same rim, which has the pressure of the
+        first one and its tension times this factor; 1 for its mirror image in Π, more for a flatter sheet.
+        Each patch NAME has one there called "NAME below".
 
     Raises
     ------
@@ -116,6 +119,7 @@ class Plan:
     mirrors: Sequence[Any] = field(default=(), metadata=CURVES)
     rooms: Any = field(default=(), metadata={"kind": "a table"})
     points: Any = field(default_factory=dict, metadata={"kind": "a table"})
+    cushion: float | None = None
 
     def __post_init__(self) -> None:
         for key in parts.MOST:
@@ -133,8 +137,9 @@ class Plan:
         for key in ("pressure", "weight", "snow"):
             validate.number(key, getattr(self, key))
         validate.positive("edge_length", self.edge_length)
-        if self.rise is not None:
-            validate.positive("rise", self.rise)
+        for key in ("rise", "cushion"):
+            if getattr(self, key) is not None:
+                validate.positive(key, getattr(self, key))
         if bool(self.patches) == (self.tension is not None):
             problem = "a plan needs either patches, each with its tension, or one tension= for all"
             raise OptionError(problem, what="tension")

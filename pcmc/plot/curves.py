@@ -294,13 +294,20 @@ def label_axes(axes: Any, x: str, y: str) -> None:
 
 
 def add_legend(axes: Any, count: int) -> None:
-    """A legend of the curves, where there are several; beside the axes if it is long."""
+    """A legend of the curves, where there are several; beside the axes if it is long or would cover one."""
     text = {"fontsize": SMALL, "labelcolor": INK}
-    if count > LEGEND_INSIDE:
-        axes.figure.legend(handlelength=2.4, frameon=False, loc="outside right upper", **text)
-    elif count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
+    if count <= LEGEND_INSIDE:
+        if count <= 1 and axes.get_legend_handles_labels()[1] in ([], [""]):
+            return
         box = {"facecolor": "white", "framealpha": 0.8, "edgecolor": "none", "borderpad": 0.2}
-        axes.legend(handlelength=3.2, **box, **text)
+        legend = axes.legend(handlelength=3.2, **box, **text)
+        axes.figure.draw_without_rendering()
+        inside, paths = legend.get_window_extent(), (line.get_path() for line in axes.lines)
+        drawn = (path.transformed(line.get_transform()) for path, line in zip(paths, axes.lines, strict=True))
+        if not any(path.intersects_bbox(inside, filled=False) for path in drawn):
+            return
+        legend.remove()
+    axes.figure.legend(handlelength=2.4, frameon=False, loc="outside right upper", **text)
 
 
 def table_ticks(

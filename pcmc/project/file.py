@@ -20,6 +20,7 @@ from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
+from ..structure.member_keys import members_of
 from ..structure.section import Structure
 from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
@@ -212,6 +213,12 @@ def project_of(
         if mesh is None:
             plan = plan_from(data["plan"])
             plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
+        named = [] if plan is None else [p.member for p in (*plan.dividers, *plan.holes) if p.member]
+        if structure is not None:
+            members_of(structure.members, plan)
+        elif named:
+            text = f"member {named[0]!r} has no section; add [structure] with young and thickness of the roof"
+            raise OptionError(f"{text}, and [structure.members.{named[0]}]", what="member", found=named[0])
         if "targets" in data:
             own, sought = _search(data["targets"], plan)
             if plan is not None:

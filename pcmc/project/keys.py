@@ -17,6 +17,7 @@ from ..cloth.settings import CuttingOptions
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
+from ..structure.member_keys import MemberSection
 from ..structure.section import PatchMaterial, Structure, Zone
 from ..surface import Plane
 from ..surface.curve_data import CURVES
@@ -64,6 +65,7 @@ KINDS: dict[str, Schema] = {
     "a list of points": _list_of(_LIST),
     "a list of lines": _list_of(_LIST),
     "a number or a table": _any_of(_NUMBER, TABLE),
+    "two numbers or a table": _any_of(_list_of(_NUMBER) | {"minItems": 2, "maxItems": 2}, TABLE),
     "two numbers": _list_of(_NUMBER) | {"minItems": 2, "maxItems": 2},
     "a curve": _any_of(_LIST, TABLE),
     "a point [x, y, z]": _list_of(_NUMBER) | {"minItems": 3, "maxItems": 3},
@@ -198,6 +200,7 @@ def main_sections() -> tuple[Section, ...]:
         "remesh": "Other triangles, before or after solving; [[remesh]] if there are several.",
         "structure": "The structural model that `pcmc structure` writes, in the units of the surface.",
         "material": "The material of a patch, where it is another one; NAME is the patch's name.",
+        "member": "An arch, a beam or a cable; NAME is what dividers and holes call it.",
         "zone": "Snow or wind on a part of the roof; those with the same case act together.",
         "pattern": "The cutting pattern that `pcmc pattern` writes, in the units of the surface.",
         "output": "What to write: all of it, or nothing. Without it nothing is written.",
@@ -216,6 +219,7 @@ def main_sections() -> tuple[Section, ...]:
         Section("remesh", help_of["remesh"], _of_class(Remeshing)),
         Section("structure", help_of["structure"], _of_class(Structure)),
         Section("structure.patches.NAME", help_of["material"], _of_class(PatchMaterial)),
+        Section("structure.members.NAME", help_of["member"], _of_class(MemberSection)),
         Section("structure.zones", help_of["zone"], _of_class(Zone)),
         Section("pattern", help_of["pattern"], _of_class(CuttingOptions)),
         Section("output", help_of["output"], _of_class(Output)),

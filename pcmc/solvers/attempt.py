@@ -44,9 +44,9 @@ class NewtonOptions:
     levels : number of 1→4 refinements; the surface is solved before the first and after each.
     min_quality : vertices are redistributed along the shape while the worst triangle has less quality.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
-    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
+    backend : factorisation, ``"pardiso"`` or ``"superlu"``; by default the fastest here.
     order : of the elements of the result: flat triangles are solved first, on all levels, and then, as
-        elements of order 2, 4 or 8, once more; None for the order of the surface.
+        elements of order 2, 4 or 8, once more; by default the order of the surface.
     """
 
     tolerance: float = 1e-12

@@ -28,7 +28,7 @@ class LbfgsOptions:
 
     Parameters
     ----------
-    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to go on until no step helps. Where
+    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 to go on until no step helps. Where
         all forces are small it is taken relative to them; see ``converged_below``.
     evaluations : the most evaluations of E and ∇E; NLopt counts no iterations.
     memory : number of pairs of moves and gradient changes that approximate the Hessian; 0 lets NLopt choose.

@@ -26,12 +26,13 @@ class NesterovOptions:
     xi : ξ ≥ 0 of the Armijo test (25).
     tau : τ in (0, 1), each trial step is τ times the last.
     floor_power : the smallest trial step is t0 τ^floor_power; it is taken even if it fails the test.
-    momentum : False for plain descent (23), γ = 0.
-    line_search : False to take t0 always; the history still shows whether it passes the test.
+    momentum : whether to take it; without it, plain descent (23), γ = 0.
+    line_search : whether to shorten steps; without it, t0 always. The history still shows whether that passes
+        the test.
     armijo : ``"printed"``, Eq. (25) as printed, E(Q) ≤ E(Y) + ξ t ‖∇E(Q)‖², which lets E rise; or
         ``"sufficient"``, the standard test of the source cited there, E(Q) ≤ E(Y) - ξ t ‖∇E(Y)‖².
         Here Y = P + γ d and Q = Y - t ∇E(Y).
-    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to run all iterations. Where all
+    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 to run all iterations. Where all
         forces are small it is taken relative to them; see ``converged_below``.
     iterations : the most iterations.
     inflation : diverged when the bounding box is more than this many times its first diagonal.

@@ -4,7 +4,10 @@ from .analysis import Analysis, Case, analyse
 from .gas import Gas
 from .inp import write_structure
 from .loads import SelfWeight, Snow, Step, Wind
-from .model import Material, StructuralModel
+from .material import Material
+from .members import Member
+from .model import StructuralModel
+from .profile import Profile
 from .results import StepResults, read_results
 
 __all__ = [
@@ -12,6 +15,8 @@ __all__ = [
     "Case",
     "Gas",
     "Material",
+    "Member",
+    "Profile",
     "SelfWeight",
     "Snow",
     "Step",

@@ -20,6 +20,7 @@ from ..surface.geometry import face_areas
 from .calculix import CalculixError, expect_program, run_as_far
 from .gas import balanced_pressure
 from .loads import Step
+from .member_forces import MemberForces, member_tables, members_in, sentences
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
@@ -28,6 +29,7 @@ NOWHERE = 1e-9  # of the size: a smaller coordinate is 0
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
+MESH = "beyond the first slack part a share depends on the mesh; the share before that hardly does"
 OnCase = Callable[[str], object]  # called with a few words before each case
 
 
@@ -54,6 +56,11 @@ class Case:
     def carried(self) -> bool:
         """Whether all of the load is carried."""
         return self.share >= 1.0
+
+    @cached_property
+    def members(self) -> tuple[MemberForces, ...]:
+        """What the beams carry."""
+        return members_in(self.results)
 
     @property
     def taut(self) -> float:
@@ -159,10 +166,21 @@ class Analysis:
         return pd.DataFrame(rows, columns=["case", "cable", "least", "largest"])
 
     @property
+    def members(self) -> pd.DataFrame:
+        """A row per case and beam; see ``member_tables``."""
+        return member_tables((case.name, case.members) for case in self.cases)[0]
+
+    @property
+    def member_forces(self) -> pd.DataFrame:
+        """A row per case and point of a beam; see ``member_tables``."""
+        return member_tables((case.name, case.members) for case in self.cases)[1]
+
+    @property
     def tables(self) -> dict[str, pd.DataFrame]:
-        """All tables by name; that of cables only if there are any."""
+        """All tables by name; those of cables and members only if there are any."""
         tables = {"cases": self.table, "patches": self.patches, "supports": self.supports}
-        return tables | ({"cables": self.cables} if len(self.cables) else {})
+        others = {"cables": self.cables, "members": self.members, "member-forces": self.member_forces}
+        return tables | {name: table for name, table in others.items() if len(table)}
 
     def place_of_least(self, case: Case) -> Floats:
         """(3,) the middle of the triangle whose least principal force is the smallest."""
@@ -203,6 +221,8 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
+        if any(case.taut < case.share < 1.0 for case in self.cases):
+            lines.append(MESH)
         if self.remedy:
             factor = f"{self.remedy:.3g} times as large"
             lines.append(
@@ -224,7 +244,9 @@ class Analysis:
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
-        return "\n".join([*units, numbers, *self.answers()])
+        members = [self.members.to_string(index=False, float_format="{:.4g}".format)]
+        members = [*members, *sentences(self.model, self.model.units)] if len(self.members) else []
+        return "\n".join([*units, numbers, *members, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:

@@ -83,6 +83,9 @@ def run_as_far(
             raise CalculixError(f"{PROGRAM}: the results of step {steps[0].name!r}: {text}") from None
     if not found or found[0].share < 1.0:
         text = f"{PROGRAM} finds no equilibrium under the form-finding load alone; is the surface certified?"
+        if model.lines:
+            share = 100.0 * found[0].share if found else 0.0
+            text = f"the members carry only {share:.0f} % of what walls and supports do; make them stiffer"
         raise CalculixError(text, what=steps[0].name)
     return found
 

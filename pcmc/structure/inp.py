@@ -16,8 +16,11 @@ from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
 from ..surface.geometry import area_vectors
+from .frames import bar_axes
 from .loads import Step
-from .model import Material, StructuralModel, expect_model
+from .material import Material
+from .member_forces import forces_on_members, held_turns
+from .model import StructuralModel, expect_model
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
 POINTS, CABLE_POINTS = 2, 8  # integration points: one above the other; a truss is expanded to a brick
@@ -67,8 +70,11 @@ def _sections(model: StructuralModel, steps: Sequence[Step], every: bool) -> Ite
     yield "*NODE, NSET=NALL\n"
     yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)
     yield from _elements(model)
+    yield from _beams(model)
     yield from _supports(model)
     yield from _prestress(model)
+    if model.lines:  # members take over from what held the form, while its pressure stays
+        yield "*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n*AMPLITUDE, NAME=RELEASED\n0.,1.,1.,0.\n"
     for k, step in enumerate(steps):
         yield from _step(model, step, k == 0, every)
 
@@ -98,14 +104,61 @@ def _elements(model: StructuralModel) -> Iterator[str]:
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
     yield from (_material(f"MEMBRANE_{k}", material) for k, material in enumerate(materials, 1))
 
-    if not surface.cables:
-        return
-    for k, (cable, area, numbers, _) in enumerate(model.cable_edges(), 1):
+    used = list(dict.fromkeys(material for _, material in model.cable_sections))
+    for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
         yield f"*ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}\n"
         yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))
-        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE\n{short(area)}\n"
-    yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(model.cable_areas)))
-    yield _material("CABLE", replace(model.material_of_cables, weft=None, shear=None))
+        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{used.index(material) + 1}\n{short(area)}\n"
+    if used:
+        yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(surface.cables)))
+    yield from (_material(f"CABLE_{k}", material) for k, material in enumerate(used, 1))
+
+
+def _beams(model: StructuralModel) -> Iterator[str]:
+    """Members, as rectangles with the stiffness of their profiles, and what holds their ends.
+
+    They have nodes of their own, tied to those of the sheets: where membranes and beams share nodes, the
+    constraints that CalculiX makes for them contradict each other from one increment to the next.
+    """
+    X, up, vertices = model.standing.vertices, np.array(model.surface.plane.normal), model.beam_vertices
+    number = np.zeros(len(X), dtype=np.int64)
+    number[vertices] = model.surface.n + 1 + np.arange(len(vertices))
+    if len(vertices):
+        yield "*NODE, NSET=BEAMS\n"
+        yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", number[vertices], *X[vertices].T)
+    for k, (line, elements) in enumerate(model.beam_elements(), 1):
+        width, height, factor = line.member.profile.equal_rectangle
+        yield f"** MEMBER_{k}: {_line(line.name)}\n*ELEMENT, TYPE=B31, ELSET=MEMBER_{k}\n"
+        yield format_rows("%d,%d,%d\n", elements, *number[line.pairs].T)
+        across = bar_axes(X, line.pairs, up)[0][:, 1].round(9) + 0.0
+        rows, which = np.unique(across, axis=0, return_inverse=True)
+        for a, row in enumerate(rows):
+            yield _set(f"MEMBER_{k}_{a + 1}", elements[which.ravel() == a] - 1, "ELSET")
+            yield f"*BEAM SECTION, ELSET=MEMBER_{k}_{a + 1}, MATERIAL=MEMBER_{k}, SECTION=RECT\n"
+            yield f"{short(width)},{short(height)}\n{','.join(map(short, row))}\n"
+        m = line.member.material
+        yield _material(f"MEMBER_{k}", replace(m, young=factor * m.young, density=factor * m.density))
+    turns = held_turns(model, X)
+    for v, node in zip(vertices.tolist(), number[vertices].tolist(), strict=True):
+        stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
+        if v in turns or stops not in ("", "123"):
+            axes = _completed(turns[v]) if v in turns else model.axes[v]
+            yield f"*NSET, NSET=BEAM_{node}\n{node}\n*TRANSFORM, NSET=BEAM_{node}, TYPE=R\n"
+            yield ",".join(FIELD % c for c in axes[:2].ravel()) + "\n"
+        yield "".join(f"*BOUNDARY\n{node},{axis},{axis}\n" for axis in stops)
+        if v in turns:
+            yield f"*BOUNDARY\n{node},4,{3 + len(turns[v])}\n"
+        for axis in sorted({"1", "2", "3"} - set(stops)):
+            yield f"*EQUATION\n2\n{node},{axis},1.,{v + 1},{axis},-1.\n"
+    yield _set("ENDS", number[vertices[model.held[vertices]]] - 1)
+
+
+def _completed(rows: Floats) -> Floats:
+    """(3,3) right-handed axes that begin with rows (k,3) at right angles."""
+    if len(rows) == 1:
+        second = np.cross(rows[0], np.eye(3)[np.abs(rows[0]).argmin()])
+        rows = np.vstack([rows, second / np.linalg.norm(second)])
+    return np.vstack([rows[:2], np.cross(rows[0], rows[1])])
 
 
 def _material(name: str, material: Material) -> str:
@@ -145,7 +198,7 @@ def _prestress(model: StructuralModel) -> Iterator[str]:
     stress = np.eye(3) - normals[:, :, None] * normals[:, None, :]
     stress *= model.prestress[:, None, None]
     yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, stress, POINTS)
-    for cable, area, numbers, along in model.cable_edges():
+    for cable, area, _, numbers, along in model.cable_edges():
         pull = pull_along(surface, cable, cable.edges)[:, None, None]
         stress = pull / area * along[:, :, None] * along[:, None, :]
         yield _stresses(numbers, stress, CABLE_POINTS)
@@ -162,7 +215,8 @@ def _stresses(elements: Ints, stress: Floats, points: int) -> str:
 def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterator[str]:
     """A step of the analysis, with all loads that act at its end."""
     yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n"
-    yield f"{1.0 if form else INCREMENT},1.,{LEAST_INCREMENT},1.\n"
+    released = form and bool(model.lines)
+    yield f"{1.0 if form and not released else INCREMENT},1.,{LEAST_INCREMENT},1.\n"
     sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)
     label, pressures = KINDS[model.elements][2], step.pressures[model.active]
     patch_of, rows = model.standing.patch_of_face[model.active], list[str]()
@@ -178,25 +232,35 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterat
         down = ",".join(short(-c) for c in model.standing.plane.normal)
         heavy = {f"PATCH_{k + 1}": model.materials[k].density for k in np.unique(patch_of)}
         heavy = {"EALL": 1.0} if all(heavy.values()) else heavy
-        heavy |= dict.fromkeys(sets[1:], model.material_of_cables.density)
+        heavy |= {f"CABLE_{k}": of.density for k, (_, of) in enumerate(model.cable_sections, 1)}
+        heavy |= {f"MEMBER_{k}": line.member.material.density for k, line in enumerate(model.beams, 1)}
         rows += [f"{name},GRAV,{short(step.gravity)},{down}\n" for name, dense in heavy.items() if dense]
     if not rows:  # without a line the loads of the step before would stay
         rows = [f"EALL,{label},0.\n"]
-    yield "".join(["*DLOAD, OP=NEW\n", *rows])
-    forces = np.einsum("nij,nj->ni", model.axes, step.forces)
-    vertex, axis = np.nonzero(forces * model.nodes[:, None])
-    if len(vertex):
-        yield "*CLOAD, OP=NEW\n"
-        yield format_rows(f"%d,%d,{FIELD}\n", vertex + 1, axis + 1, forces[vertex, axis])
+    yield "".join([f"*DLOAD, OP=NEW{', AMPLITUDE=WHOLE' if released else ''}\n", *rows])
+    if released:
+        yield "*CLOAD, OP=NEW, AMPLITUDE=RELEASED\n"
+        yield from _forces(model, -forces_on_members(model, step) * model.on_members[:, None])
+    if step.forces[model.nodes].any():
+        yield f"*CLOAD{', AMPLITUDE=WHOLE' if released else ', OP=NEW'}\n"
+        yield from _forces(model, step.forces)
     elif not form:
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
     often = 1 if every else 1000
     printed = [("NODE", "NSET=NALL", "U"), *([("NODE", "NSET=HELD", "RF")] if model.held.any() else [])]
+    printed += [("NODE", "NSET=ENDS", "RF")] if model.held[model.beam_vertices].any() else []
     for kind, name, what in (*printed, *(("EL", f"ELSET={name}", "S") for name in sets)):
         yield f"*{kind} PRINT, {name}, GLOBAL=YES, FREQUENCY={often}\n{what}\n"
     if not every:
         yield "*NODE FILE, OUTPUT=2D, GLOBAL=YES, FREQUENCY=1000\nU,RF\n*EL FILE, OUTPUT=2D, GLOBAL=YES\nS\n"
     yield "*END STEP\n"
+
+
+def _forces(model: StructuralModel, forces: Floats) -> Iterator[str]:
+    """Forces (n,3) on the nodes, in the axes of these."""
+    forces = np.einsum("nij,nj->ni", model.axes, forces)
+    vertex, axis = np.nonzero(forces * model.nodes[:, None])
+    yield format_rows(f"%d,%d,{FIELD}\n", vertex + 1, axis + 1, forces[vertex, axis])
 
 
 def _set(name: str, members: Ints, kind: str = "NSET") -> str:

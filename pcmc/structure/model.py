@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,6 @@ from ..forces.cables import directions
 from ..forces.pinching import standing_part
 from ..forces.triangles import effective_tensions
 from ..surface import Surface, expect_surface
-from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Cable
@@ -34,55 +33,12 @@ from .loads import (
     check_loads,
     load_steps,
 )
+from .material import Material
+from .members import Member, MemberLine, lines_on
+from .pulls import at_vertices, balancing_force, corner_forces
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
-
-
-@dataclass(frozen=True)
-class Material:
-    """A linear elastic material: isotropic, or a cloth with a warp and a weft.
-
-    Parameters
-    ----------
-    young : E > 0, force per area; of a cloth along its warp.
-    poisson : ν, 0 ≤ ν < 0.5; of a cloth the contraction along the weft under tension along the warp.
-    density : ρ ≥ 0, mass per volume, in the mass that a unit of force accelerates by a unit of length per
-        s²: t/m³ with kN and m, t/mm³ with N and mm, slug/ft³ with lbf and ft.
-    weft, shear : of a cloth: E along the weft, and the shear modulus G, force per area; without them the
-        material is isotropic. Its stiffness needs ν² weft < young.
-    warp : of a cloth: a direction in space; in each triangle the warp is its projection onto the plane.
-
-    >>> Material(young=1e6)
-    Material(young=1000000.0, poisson=0.3, density=0.0, weft=None, shear=None, warp=(1.0, 0.0, 0.0))
-    """
-
-    young: float
-    poisson: float = 0.3
-    density: float = 0.0
-    weft: float | None = None
-    shear: float | None = None
-    warp: Sequence[float] = (1.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        most: dict[str, Any] = {"most": LARGEST}
-        stiff = {"least": SMALLEST, **most}
-        limits = {"young": stiff, "poisson": {"least": 0.0, "below": 0.5}, "density": {"least": 0.0, **most}}
-        if (self.weft is None) != (self.shear is None):
-            missing = "shear" if self.shear is None else "weft"
-            text = f"Material.{missing} is missing: a cloth needs young, weft and shear"
-            raise OptionError(text, what=f"Material.{missing}")
-        for name, bounds in (limits | ({"weft": stiff, "shear": stiff} if self.cloth else {})).items():
-            vars(self)[name] = validate.number(f"Material.{name}", getattr(self, name), **bounds)
-        if self.weft is not None and self.poisson**2 * self.weft >= self.young:
-            text = f"Material.weft: expected less than young/poisson² = {self.young / self.poisson**2:.4g}"
-            raise OptionError(f"{text}, found {self.weft:g}", what="Material.weft", found=self.weft)
-        vars(self)["warp"] = validate.vector("Material.warp", self.warp)
-
-    @property
-    def cloth(self) -> bool:
-        """Whether it has a warp and a weft."""
-        return self.weft is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +63,8 @@ class StructuralModel:
         of the steps, and "form" for the form-finding load, such as {"uls": {"form": 1, "snow": 1.5}}. Each
         is one more step. The form-finding load and self-weight have the factor 1 where they are not named.
     gas : what is enclosed and changes its pressure with its volume; see ``Gas``. ``analyse`` finds it.
+    members : beams and cables in the place of walls, along edges, or with a profile for a cable of the
+        surface; see ``Member``. A wall with a member is left out of the model.
 
     Raises
     ------
@@ -136,6 +94,7 @@ class StructuralModel:
     units: Units = NO_UNITS
     combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gas: Gas | None = None
+    members: Sequence[Member] = ()
 
     def __post_init__(self) -> None:
         solved: Any = self.surface  # or a surface, which has neither of these
@@ -149,7 +108,6 @@ class StructuralModel:
                 validate.refuse("material", material, "a Material", where, hint)
         thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
-        checked_areas(self.cable_area, surface)
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
         if self.cable_material is None and surface.cables and isinstance(self.material, Mapping):
@@ -160,6 +118,10 @@ class StructuralModel:
             validate.refuse("gas", self.gas, "a Gas or None")
         if self.gas is not None:
             self.gas.check(surface, self.units)
+        if not all(isinstance(member, Member) for member in self.members):
+            validate.refuse("members", self.members, "a sequence of Members")
+        vars(self)["members"] = tuple(self.members)
+        self.cable_sections  # noqa: B018
         if self.weights and not any(material.density for material in self.materials):
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
@@ -195,11 +157,6 @@ class StructuralModel:
         """The material of each patch."""
         return tuple(material for _, material in _each(self.material, self.surface.patches))
 
-    @property
-    def material_of_cables(self) -> Material:
-        """The material of the cables: their own, or that of the patches along its warp."""
-        return self.cable_material or self.materials[0]
-
     def warps(self, patch: int) -> Floats:
         """(k,2,3) the directions of warp and weft in the elements of a patch of cloth; OptionError where the
         warp stands across a triangle."""
@@ -234,27 +191,80 @@ class StructuralModel:
         return effective_tensions(s, s.vertices, faces, patch) / self.thicknesses[patch]
 
     @cached_property
-    def cable_areas(self) -> tuple[float, ...]:
-        """The area of each cable's section, length²; its elements come after the faces' numbers."""
-        return checked_areas(self.cable_area, self.surface)
+    def cable_sections(self) -> tuple[tuple[float, Material], ...]:
+        """Of each cable of the standing surface the area of its section, length², and its material: those of
+        a member, or of all cables, by default the patches' along their warp."""
+        own = {str(member.on): (member.profile.area, member.material) for member in self.members}
+        own |= {line.name: (line.member.profile.area, line.member.material) for line in self.lines}
+        others = checked_areas(self.cable_area, self.surface, without=own)
+        usual = self.cable_material or replace(self.materials[0], weft=None, shear=None)
+        return tuple(own.get(c.name, (others.get(c.name, 0.0), usual)) for c in self.standing.cables)
 
-    def cable_edges(self) -> Iterator[tuple[Cable, float, Ints, Floats]]:
-        """Each cable, the area of its section, and the numbers (k,) and directions (k,3) of its elements."""
+    def cable_edges(self) -> Iterator[tuple[Cable, float, Material, Ints, Floats]]:
+        """Each cable, the area of its section, its material, and the numbers (k,) and directions (k,3) of its
+        elements, which come after the faces' numbers."""
         first = self.surface.m + 1
-        for cable, area in zip(self.standing.cables, self.cable_areas, strict=True):
+        for cable, (area, material) in zip(self.standing.cables, self.cable_sections, strict=True):
             along = directions(self.standing.vertices, cable.edges)[0]
-            yield cable, area, first + np.arange(len(along)), along
+            yield cable, area, material, first + np.arange(len(along)), along
             first += len(along)
+
+    @cached_array
+    def beam_vertices(self) -> Ints:
+        """The vertices of beams; their nodes come after the vertices' numbers."""
+        return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
+
+    def beam_elements(self) -> Iterator[tuple[MemberLine, Ints]]:
+        """Each beam, and the numbers (k,) of its elements, which come after those of the cables."""
+        first = self.surface.m + 1 + sum(len(cable.edges) for cable in self.standing.cables)
+        for line in self.beams:
+            yield line, first + np.arange(len(line.pairs))
+            first += len(line.pairs)
+
+    @cached_property
+    def lines(self) -> tuple[MemberLine, ...]:
+        """The lines of the members, but for those of the surface's own cables."""
+        return lines_on(self.surface, self.members)
+
+    @cached_property
+    def beams(self) -> tuple[MemberLine, ...]:
+        """Those that are beams."""
+        return tuple(line for line in self.lines if line.member.kind == "beam")
 
     @cached_property
     def standing(self) -> Surface:
-        """The surface without pinched walls: its vertices, and the faces that are elements."""
-        return standing_part(self.surface).surface
+        """The surface without pinched walls: its vertices, and the faces that are elements. Members that are
+        cables are cables of it."""
+        s = standing_part(self.surface).surface
+        more = [
+            Cable(line.name, self._tension_of(s, line), np.sort(line.pairs, axis=1))
+            for line in self.lines
+            if line.member.kind == "cable"
+        ]
+        return s.rebuilt(cables=(*s.cables, *more)) if more else s
+
+    def _tension_of(self, s: Surface, line: MemberLine) -> float:
+        """Of a cable in the place of a wall: it balances the sheets best."""
+        wall = s.patch_index(line.wall)
+        faces = s.faces[s.patch_of_face == wall]
+        P = s.vertices[faces]
+        normal = area_vectors(P)
+        load = s.net_pressures[wall] / 3.0 * normal[:, None]
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        tensors = s.tensions[wall] * (np.eye(3) - normal[:, :, None] * normal[:, None])
+        of_wall = at_vertices(corner_forces(P, tensors) + load, faces, s.n)
+        N, _ = balancing_force(s.vertices[line.vertices], -of_wall[line.vertices], line.closed)
+        if N <= 0.0:
+            text = f'member {line.name!r}: the sheets press along it; no cable can; kind = "beam" does'
+            raise OptionError(text, what="Member.kind", where=line.name, found="cable")
+        return N
 
     @cached_array
     def active(self) -> Ints:
-        """(e,) the faces of the standing surface with a tension or a pressure: the others carry nothing."""
+        """(e,) the faces of the standing surface with a tension or a pressure, but for walls with a member in
+        their place: the others carry nothing."""
         pulls = (self.surface.tensions != 0.0) | (self.surface.net_pressures != 0.0)
+        pulls[[self.surface.patch_index(line.wall) for line in self.lines if line.wall]] = False
         return np.flatnonzero(pulls[self.standing.patch_of_face])
 
     @cached_array
@@ -267,20 +277,40 @@ class StructuralModel:
         """(n,) the vertices of elements."""
         used = np.zeros(self.surface.n, dtype=bool)
         used[self.standing.faces[self.active]] = True
-        for cable in self.standing.cables:
-            used[cable.edges] = True
+        for ends in (*(cable.edges for cable in self.standing.cables), *(line.pairs for line in self.beams)):
+            used[ends] = True
         return used
+
+    @cached_array
+    def on_members(self) -> Bools:
+        """(n,) the vertices that members carry in the place of walls and supports."""
+        found = np.zeros(self.surface.n, dtype=bool)
+        for line in self.lines:
+            found[line.vertices] = True
+        return found & ~self.held
+
+    @cached_array
+    def freed(self) -> Ints:
+        """(n,) what a member carries in the place of a support: 1 where it is propped, 2 where it is not."""
+        found = np.zeros(self.surface.n, dtype=np.int64)
+        for line in self.lines:
+            if not line.wall:
+                found[line.carried] = 1 if line.member.propped else 2
+        return found
 
     @cached_array
     def allowed(self) -> Floats:
         """(n,3,3) the projection onto the directions in which the supports let each vertex move."""
         columns = [apply_supports(self.standing, np.tile(axis, (self.surface.n, 1))) for axis in np.eye(3)]
-        return np.stack(columns, axis=2)
+        allowed, up = np.stack(columns, axis=2), np.array(self.surface.plane.normal)
+        allowed[self.freed == 1] = np.eye(3) - np.outer(up, up)
+        allowed[self.freed == 2] = np.eye(3)
+        return allowed
 
     @cached_array
     def held(self) -> Bools:
         """(n,) the nodes that a support holds."""
-        return self.nodes & self.standing.held
+        return self.nodes & self.standing.held & (self.freed < 2)
 
     @cached_array
     def freedom(self) -> Ints:
@@ -318,18 +348,14 @@ class StructuralModel:
         X = s.vertices if displacements is None else s.vertices + displacements
         per_face = step.pressures[:, None] * area_vectors(X[s.faces])
         density = np.array([material.density for material in self.materials])
-        mass = (density * self.thicknesses)[s.patch_of_face] * face_areas(s.vertices[s.faces])
-        per_face += step.gravity * mass[:, None] * down
+        masses = (density * self.thicknesses)[s.patch_of_face] * face_areas(s.vertices[s.faces])
+        per_face += step.gravity * masses[:, None] * down
         forces = step.forces + vertex_sums(per_face[self.active] / 3.0, s.faces[self.active], s.n)
-        for cable, area, *_ in self.cable_edges():
-            half = (
-                0.5
-                * self.material_of_cables.density
-                * area
-                * step.gravity
-                * segment_lengths(s.vertices, cable.edges)
-            )
-            forces += np.bincount(cable.edges.ravel(), np.repeat(half, 2), s.n)[:, None] * down
+        lengths = [(c.edges, area * of.density) for c, area, of, *_ in self.cable_edges()]
+        lengths += [(b.pairs, b.member.profile.area * b.member.material.density) for b in self.beams]
+        for ends, mass in lengths:  # per length
+            half = 0.5 * step.gravity * mass * segment_lengths(s.vertices, ends)
+            forces += np.bincount(ends.ravel(), np.repeat(half, 2), s.n)[:, None] * down
         return forces
 
 
@@ -348,15 +374,16 @@ def checked_thickness(given: object, surface: Surface) -> float | dict[str, floa
     return {name: validate.number("thickness", value, where=name, **limits) for name, value in values}
 
 
-def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
-    """The area of each cable's section, from one number or one by name."""
+def checked_areas(given: object, surface: Surface, without: Container[str] = ()) -> dict[str, float]:
+    """The area of each cable's section by name, from one number or one by name; not of those ``without``."""
     limits: dict[str, Any] = {"least": (THINNEST * surface.size) ** 2, "most": surface.size**2}
-    if given is None and surface.cables:
-        name = surface.cables[0].name
+    wanting = [cable for cable in surface.cables if cable.name not in without]
+    if given is None and wanting:
+        name = wanting[0].name
         message = f"cable_area is missing: give the area of the section of cable {name!r}, length²"
         raise OptionError(message, what="cable_area", where=name)
-    areas = _each(given, surface.cables, "cable")
-    return tuple(validate.number("cable_area", area, where=name, **limits) for name, area in areas)
+    areas = [(name, area) for name, area in _each(given, surface.cables, "cable") if name not in without]
+    return {name: validate.number("cable_area", area, where=name, **limits) for name, area in areas}
 
 
 def _each(given: Any, parts: Iterable[Any], kind: str = "") -> list[tuple[str, Any]]:

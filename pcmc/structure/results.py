@@ -36,6 +36,7 @@ class StepResults:
     reactions: Floats  # (n,3) forces of the supports on the structure; zero at vertices that nothing holds
     stresses: Floats  # (m,3,3) tensors in the axes of space, force/area, the mean over the thickness
     cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force; from a .dat alone
+    step: Step  # its loads, as far as they act
     share: float = 1.0  # of the step's loads, besides those of the step before: 1 but where it stopped
     taut: float = 1.0  # the part of that share up to which no face is slack, between increments by a line
 
@@ -96,6 +97,8 @@ def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tup
     """
     check_regular(path)
     suffix = suffix_of(path, (".dat", ".frd"), "a result of CalculiX")
+    if suffix == ".frd" and model.beams:
+        raise FileError(f"{path}: of a model with members read the file .dat beside it", what=str(path))
     try:
         tables = read(path.read_text(encoding="ascii"), suffix)
         _check(tables, model, steps)
@@ -123,6 +126,8 @@ def _results(
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values
     if "forces" in blocks:
         reactions[blocks["forces"].ids - 1] = blocks["forces"].values
+        if "ends" in blocks:  # of beams, at nodes of their own
+            reactions[model.beam_vertices[blocks["ends"].ids - 1 - surface.n]] += blocks["ends"].values
         reactions -= model.nodal_loads(step, np.nan_to_num(displacements))
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
@@ -135,12 +140,12 @@ def _results(
         values = stress.means(model.faces + 1)
     stresses[model.faces] = values[:, TENSOR]
     tensions = {}
-    for cable, area, numbers, along in model.cable_edges() if "cables" in blocks else ():
+    for cable, area, _, numbers, along in model.cable_edges() if "cables" in blocks else ():
         mine = blocks["cables"].means(numbers)[:, TENSOR]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
     done = 1.0 if share >= 1.0 - WHOLE else share
     taut = min(_taut(model, stress, k, tables[k - 1]["stresses"] if k else None), done)
-    return StepResults(step.name, model, displacements, reactions, stresses, tensions, done, taut)
+    return StepResults(step.name, model, displacements, reactions, stresses, tensions, step, done, taut)
 
 
 def _taut(model: StructuralModel, last: ResultBlock, k: int, start: ResultBlock | None) -> float:

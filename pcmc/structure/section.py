@@ -10,10 +10,14 @@ from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
+from ..plan import Plan
 from ..surface import Surface
 from .gas import Gas
-from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads
-from .model import Material, StructuralModel, checked_areas, checked_thickness
+from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
+from .material import Material
+from .member_keys import members_of
+from .members import lines_on
+from .model import StructuralModel, checked_areas, checked_thickness
 
 MATERIAL = ("young", "poisson", "density", "weft", "shear", "warp")  # keys of a material
 
@@ -45,7 +49,7 @@ class Zone:
     case : the name of the case.
     snow : load per plan area, besides the snow that the form was found under.
     wind : pressure, above 0 for suction on a roof.
-    patches : that carry it; by default all that are not walls.
+    patches : that carry it; by default all that are no walls and under no other sheet.
     slopes : it acts where the slope is between these two, degrees.
     area : corners [x, y] of a polygon in the plan that it acts within; by default everywhere.
     slides : two slopes, degrees: snow is whole up to the first, none from the second on, linear between.
@@ -95,6 +99,7 @@ class Structure:
     combinations : factors by case, by the name of each combination: {uls = {form = 1.0, snow = 1.5}}.
     gas : true for air that is shut in, whose pressure follows its volume; or a table as of ``Gas``.
     cable_area : of the cables' sections, length², or a table with one for each cable.
+    members : arches, beams and cables by name; dividers and holes of the plan name them.
     run : whether to run CalculiX: tables and a picture beside the model, and a chapter of the report.
     """
 
@@ -113,6 +118,7 @@ class Structure:
     combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gas: bool | Mapping[str, Any] = field(default=False, metadata={"kind": "a value"})
     cable_area: float | Mapping[str, float] | None = None
+    members: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     run: bool = False
 
     def __post_init__(self) -> None:  # refuses bad values before any work
@@ -122,6 +128,7 @@ class Structure:
                 text = f"a structural model needs {name}; give --{name} or the key {name} of [structure]"
                 raise OptionError(text, what=name)
         self.material, self.enclosed  # noqa: B018
+        members_of(self.members, None)
         check_combinations(self.combinations, self.loads(()))
 
     @property
@@ -165,7 +172,7 @@ class Structure:
 
     def loads(self, roof: Sequence[str]) -> tuple[Load | tuple[Load, ...], ...]:
         """Self-weight, snow and wind, each in a step of its own, and the cases of the zones; ``roof`` are the
-        names of the patches that are not walls."""
+        names of the patches that wind acts on by default."""
         heavy = self.density > 0.0 or any(given.get("density", 0.0) for given in self.patches.values())
         weight = [SelfWeight(self.gravity)] if heavy else []
         snow = [Snow(self.snow)] if self.snow != 0.0 else []
@@ -178,14 +185,17 @@ class Structure:
 
     def loads_on(self, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
         """The loads on a surface."""
-        return self.loads([p.name for p, on in zip(surface.patches, surface.roof, strict=True) if on])
+        on = in_the_open(surface)
+        return self.loads([patch.name for patch, out in zip(surface.patches, on, strict=True) if out])
 
-    def check(self, surface: Surface) -> None:
-        """Refuse values that name no patch or cable of the surface, before it is solved."""
+    def check(self, surface: Surface, plan: Plan | None = None) -> None:
+        """Refuse values that name no patch, wall or cable of the surface, before it is solved."""
         self.thicknesses(surface)
         self.materials(surface)
         check_loads(self.loads_on(surface), surface)
-        checked_areas(self.cable_area, surface)
+        members = members_of(self.members, plan)
+        lines_on(surface, members)
+        checked_areas(self.cable_area, surface, [str(member.on) for member in members])
 
     def model(
         self,
@@ -193,8 +203,10 @@ class Structure:
         anyway: bool = False,
         certificate: Certificate | None = None,
         units: Units = NO_UNITS,
+        plan: Plan | None = None,
     ) -> StructuralModel:
-        """The structural model of a surface at rest or of a result; errors as in ``pcmc.StructuralModel``."""
+        """The structural model of a surface at rest or of a result, with the members that its ``plan`` names;
+        errors as in ``pcmc.StructuralModel``."""
         plain: Surface = getattr(surface, "surface", surface)
         return StructuralModel(
             surface,
@@ -208,4 +220,5 @@ class Structure:
             units=units,
             combinations=self.combinations,
             gas=self.enclosed,
+            members=members_of(self.members, plan),
         )

@@ -29,7 +29,7 @@ KEY, NUMBER = 13, 12  # characters of a row of an .frd file: " -1" and the node;
 class ResultBlock:
     """One quantity of one step, by ascending numbers of nodes or elements."""
 
-    kind: str  # displacements, forces, stresses, or cables: the stresses of these
+    kind: str  # displacements, forces, stresses, or cables: the stresses of these; ends: forces of beams'
     time: float  # at the end of the step
     ids: Ints  # (k,) numbers of nodes or elements
     values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
@@ -75,7 +75,7 @@ def _of_dat(text: str) -> Iterator[ResultBlock]:
         rows = _numbers(body.split(), keys + values, kind, line)
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         time = float(_numbers([head[4]], 1, "time", line)[0, 0])
-        kind = "cables" if head[3] == "CABLES" else kind
+        kind = {"CABLES": "cables", "ENDS": "ends"}.get(head[3], kind)
         yield ResultBlock(kind, time, rows[:, 0].astype(int), rows[:, keys:], keys == 1)
 
 

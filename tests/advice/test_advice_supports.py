@@ -81,6 +81,16 @@ def test_supports_on_lines_are_no_point_masts():
     assert ringed.holes[-1].curve.length == pytest.approx(3.14159, rel=1e-3)
 
 
+@pytest.mark.parametrize(("x", "says"), [(1.2, "radius = 0.5"), (0.9, "too near to what is held beside it")])
+def test_a_ring_is_as_large_as_triangles_can_follow(tmp_path, x, says):
+    path = tmp_path / "tent.toml"
+    path.write_text(
+        TENT.replace("[10, 6, 6]", f"[{x}, 6, 6]").replace("edge_length = ", "edge_length = 2 # ")
+    )
+    with pytest.warns(FileWarning, match=says):
+        project.load(path)
+
+
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
 def test_for_a_drawing_the_ring_is_drawn(tmp_path, monkeypatch):
     file = drawing(tmp_path, ("line", "mast", (4, 3, 0), (4, 3, 2.5)))

@@ -23,7 +23,8 @@ from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import FORMATS, drawing_set
 from pcmc.drawings.panel_sheets import panel_sheets, triangles_at_true_size
-from pcmc.drawings.sheet import LAYERS, box, corner, drawing_area
+from pcmc.drawings.sheet import LAYERS, SMALL, SheetLine, box, corner, drawing_area
+from pcmc.drawings.views import ELEVATIONS, profile
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
 from pcmc.surface.geometry import cross_2d, edge_vectors
@@ -171,6 +172,8 @@ def test_the_dxf_passes_the_audit_and_has_the_roof_in_its_units(tmp_path, square
     assert not audit.fixes
     assert doc.header["$INSUNITS"] == ezdxf.units.M
     assert doc.header["$MEASUREMENT"] == 1
+    assert doc.dimstyles.get("PCMC").dxf.dimtxt == SMALL
+    assert {line.dxf.dimstyle for sheet in doc.layouts for line in sheet.query("DIMENSION")} == {"PCMC"}
     for name, layer in LAYERS.items():
         assert doc.layers.get(name).dxf.lineweight == layer.weight
     model = doc.modelspace()
@@ -230,6 +233,33 @@ def test_cables_are_whole_curves_with_names_and_masts_are_marked(tmp_path):
     assert {"S4", "point", "force_z, kN"} <= {t.dxf.text for t in doc.layouts.get("Supports").query("TEXT")}
 
 
+def test_a_name_longer_than_dxf_allows_is_cut(tmp_path, squares):
+    patches = [replace(patch, name=f"{patch.name} {'x' * 85}") for patch in squares.patches]
+    given = (squares.vertices, squares.faces, squares.patch_of_face, patches, squares.fixed)
+    roof = pcmc.Surface(*given, on_plane=squares.on_plane)
+    drawing_set(roof, "m", sheet="A3", anyway=True).write(tmp_path / "roof.dxf")
+    lines = ezdxf.readfile(tmp_path / "roof.dxf").modelspace().query("POLYLINE")
+    sizes = [len(line.get_xdata("PCMC")[0].value) for line in lines]
+    assert 200 < max(sizes) <= 255
+
+
+def test_an_elevation_shows_what_faces_the_viewer_with_right_on_the_right():
+    axes = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0])}
+    for title, (right, towards) in ELEVATIONS.items():
+        looks = axes[title[-1]] * (1.0 if "along" in title else -1.0)
+        assert np.array_equal([*towards, 0.0], -looks)
+        assert np.array_equal([*right, 0.0], np.cross(looks, UP))
+
+
+def test_a_section_is_dimensioned_between_its_ends_or_its_widest_points():
+    arch = np.array([[1.0, 2.0, 0.0], [2.0, 2.0, 1.5], [4.0, 2.0, 0.5]])
+    ring = np.array([[6.0, 2.0, 1.0], [7.0, 2.0, 2.0], [8.0, 2.0, 1.0], [7.0, 2.0, 0.0]])
+    lines = [SheetLine(arch, "PCMC-SECTION"), SheetLine(ring, "PCMC-SECTION", closed=True)]
+    view = profile("A", np.array([1.0, 0.0]), np.array([1.0, 0.0]), lines)
+    assert sorted(view.stations[0]) == [0.0, 3.0, 5.0, 7.0]
+    assert sorted(set(view.levels)) == [0.0, 0.5, 1.0, 2.0]
+
+
 def test_no_text_of_a_sheet_covers_another(drawings):
     sail = drawing_set(pcmc.solve(hypar_roof(8, weight=0.02)).surface, "m", sheet="A3", tolerance=0.1)
     for sheet in (*drawings.sheets, *sail.sheets):
@@ -247,6 +277,8 @@ def test_units_reach_the_header_and_the_scale(tmp_path, squares, units, code, me
     drawings.write(tmp_path / "roof.dxf")
     doc = ezdxf.readfile(tmp_path / "roof.dxf")
     assert (doc.header["$INSUNITS"], doc.header["$MEASUREMENT"]) == (code, metric)
+    digits = {one.decimals for sheet in drawings.sheets for one in sheet.dimensions}
+    assert digits == {{"mm": 0, "cm": 1, "ft": 4, "in": 2}[units]}
     plan = drawings.sheets[0]
     rims = np.concatenate([line.points for line in plan.lines if line.layer == "PCMC-RIM"])
     scale = int(plan.scale.removeprefix("1:"))

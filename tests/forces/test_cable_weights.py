@@ -6,7 +6,7 @@ from math import cosh
 
 import numpy as np
 import pytest
-from cable_cases import heavy_net
+from cable_cases import hanging, heavy_net
 from refusals import refused
 from scipy.optimize import brentq
 
@@ -19,23 +19,6 @@ from pcmc.diagnostics import check_gradient, check_hessian
 from pcmc.forces.motion_space import vertex_classes
 from pcmc.structure.loads import load_steps
 from pcmc.surface.topology import CURVE, POINT
-
-
-def hanging(columns, weight=1.0):
-    """A rope between (±1, 0, 1) in an upright sheet, which pulls as much from above as from below."""
-    x, z = np.meshgrid(np.linspace(-1.0, 1.0, columns + 1), np.arange(3.0), indexing="ij")
-    X = np.stack([x.ravel(), 0.0 * x.ravel(), z.ravel()], axis=1)
-    rim = (np.abs(X[:, 0]) == 1.0) | (X[:, 2] != 1.0)
-    rope = Cable.along("rope", 1.0, np.flatnonzero(X[:, 2] == 1.0))
-    faces = grid_faces(columns, 2)
-    return Surface(
-        X,
-        faces,
-        np.zeros(len(faces), dtype=int),
-        [Patch("sheet", 1.0, 0.0)],
-        fixed=rim,
-        cables=[dataclasses.replace(rope, weight=weight)],
-    )
 
 
 @pytest.fixture(scope="module")

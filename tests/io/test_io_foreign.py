@@ -252,6 +252,29 @@ def test_ply_in_every_form(tmp_path, order):
     assert set(contents.scalars["red"]) == {255.0}
 
 
+def test_a_face_of_a_binary_ply_without_corners_is_named_as_in_text(tmp_path):
+    head = (
+        PLY[: PLY.index("element face")]
+        .replace("ascii", "binary_little_endian")
+        .replace("comment", "comment")
+    )
+    head += "element face 2\nproperty list uchar int vertex_index\nend_header\n"
+    body = b"".join(np.array([*x], "<f4").tobytes() + b"\xff" for x in X) + np.array([0, 1], "<i4").tobytes()
+    (tmp_path / "a.ply").write_bytes(
+        head.encode() + body + b"\3" + np.array([0, 1, 4], "<i4").tobytes() + b"\0"
+    )
+    with pytest.raises(FileError, match="face 1 has 0 corners; a face needs three or more"):
+        pcmc.read(tmp_path / "a.ply")
+
+
+def test_a_gltf_whose_numbers_are_beside_it_may_be_small(tmp_path):
+    ball = trimesh.creation.icosphere(3)
+    for name, data in trimesh.Scene({"ball": ball}).export(file_type="gltf").items():
+        (tmp_path / name).write_bytes(data)
+    with pytest.warns(FreeSurfaceWarning):
+        assert pcmc.read(tmp_path / "model.gltf", tensions=0.5).m == len(ball.faces)
+
+
 def test_polygons_are_cut_well():
     dart = np.array([[0, 0, 0], [2, 2, 0], [0, 1, 0], [-2, 2, 0.0]])  # concave at 2
     faces, origin, notes = cut_polygons(dart, np.arange(4), np.array([4]))

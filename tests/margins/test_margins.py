@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from cable_cases import hanging
 from nightly import at_night
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
@@ -49,6 +50,22 @@ def test_the_heaviest_long_strip():
     assert found.ends_by is MarginEnd.FOLD
     assert abs(found.factor - exact) <= found.bar <= 0.05 * exact
     assert "symmetric in" in found.detail
+
+
+def test_the_heaviest_rope():
+    """z + τ/g = c cosh(x/c) from ±1 at z = 1 only where τ/g + 1 ≥ cosh(t)/t."""
+    rope = solve(hanging(8)).surface
+    found = margin(rope, "weight")
+    exact = 1.0 / (np.cosh(FOLD) / FOLD - 1.0)
+    assert found.ends_by is MarginEnd.FOLD
+    assert abs(found.factor - exact) <= found.bar <= 0.05 * exact
+    for what in ("cable_weight", "weight of cable rope"):
+        assert margin(rope, what, meshes=1).factor == pytest.approx(found.factor, rel=1e-6)
+    assert "times the weights of cables" in margin(rope, "cable_weight", meshes=1).text()
+    light = solve(rope.retensioned(cable_weights={"rope": 0.0})).surface
+    added = margin(light, "weight of cable rope", meshes=1)
+    assert np.isnan(added.factor)
+    assert added.value == pytest.approx(found.factor, rel=5e-3)  # vertices lie elsewhere along the rope
 
 
 def film_pressure(bulge, half=0.5):

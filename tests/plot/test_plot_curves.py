@@ -6,6 +6,7 @@ from pictures import near
 from PIL import Image
 
 from pcmc import plot
+from pcmc.plot.curves import add_legend, new_axes
 from pcmc.plot.figure import CURVES
 from pcmc.surface.colours import rgb
 
@@ -89,3 +90,16 @@ def test_a_curve_with_a_fit_is_points_and_the_fit_a_line_of_its_colour(monkeypat
     assert (points.get_linestyle(), fit.get_linestyle()) == ("None", "-")
     assert points.get_color() == fit.get_color()
     assert seen[0].get_legend_handles_labels()[1] == ["a"]
+
+
+def test_a_legend_that_would_cover_a_curve_is_beside_the_axes():
+    xs = np.linspace(0.0, 1.0, 200)
+    for curves, beside in (
+        ({"a": 0.0 * xs, "b": 0.1 * xs}, False),
+        ({"a": np.sin(300.0 * xs), "b": xs}, True),
+    ):
+        figure, axes = new_axes(400, 300, "", "x", "y")
+        for label, ys in curves.items():
+            axes.plot(xs, ys, label=label)
+        add_legend(axes, len(curves))
+        assert (axes.get_legend() is None) == beside == bool(figure.legends)

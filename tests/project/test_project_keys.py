@@ -247,3 +247,10 @@ def test_editors_read_the_same_keys_from_the_schema(capsys):
     for data in wrong:
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(data, schema)
+
+
+def test_meanings_speak_of_the_file_and_not_of_python():
+    for section in sections():
+        for key in section.keys:
+            found = re.search(r"\b(None|True|False|PatchSpec|mapping|sequence|tuple)\b", key.help)
+            assert found is None, f"{section.name}.{key.name}: {key.help}"

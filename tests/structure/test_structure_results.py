@@ -42,7 +42,9 @@ def test_principal_stresses_lie_in_the_faces():
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     across = normal[:, :, None] * normal[:, None, :]
     stresses = 7.0 * (np.eye(3) - across) - 100.0 * across
-    result = pcmc.structure.StepResults("form", model, np.zeros((5, 3)), np.zeros((5, 3)), stresses, {})
+    result = pcmc.structure.StepResults(
+        "form", model, np.zeros((5, 3)), np.zeros((5, 3)), stresses, {}, model.steps[0]
+    )
     np.testing.assert_allclose(result.principal_stresses, 7.0)
 
 

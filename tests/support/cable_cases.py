@@ -38,3 +38,20 @@ def heavy_net() -> Surface:
     """The same with weights on the cables, one of them upwards."""
     weights = (0.3, -0.2, 0.5)
     return replace(net(), cables=[replace(c, weight=g) for c, g in zip(net().cables, weights, strict=True)])
+
+
+def hanging(columns, weight=1.0):
+    """A rope between (±1, 0, 1) in an upright sheet, which pulls as much from above as from below."""
+    x, z = np.meshgrid(np.linspace(-1.0, 1.0, columns + 1), np.arange(3.0), indexing="ij")
+    X = np.stack([x.ravel(), 0.0 * x.ravel(), z.ravel()], axis=1)
+    rim = (np.abs(X[:, 0]) == 1.0) | (X[:, 2] != 1.0)
+    rope = Cable.along("rope", 1.0, np.flatnonzero(X[:, 2] == 1.0))
+    faces = grid_faces(columns, 2)
+    return Surface(
+        X,
+        faces,
+        np.zeros(len(faces), dtype=int),
+        [Patch("sheet", 1.0, 0.0)],
+        fixed=rim,
+        cables=[replace(rope, weight=weight)],
+    )

@@ -1,0 +1,225 @@
+"""What members carry: the forces along them, at rest and in each case, from the pull of the sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ..base.arrays import Floats, Ints, cached_array
+from ..base.units import Units
+from ..forces.cables import directions, pull_along
+from ..surface.geometry import area_vectors
+from .frames import Frame
+from .loads import Step
+from .members import MemberLine
+from .model import StructuralModel
+from .pulls import at_vertices, balancing_force, corner_forces
+from .results import StepResults
+
+COLUMNS = ("N", "V", "V_across", "T", "M", "M_across")  # as ``FrameForces.within`` has them
+ALIKE = 1e-6  # sine of the angle of two directions that are one
+LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
+
+
+@dataclass(frozen=True, eq=False)
+class MemberForces:
+    """What a beam carries along its line, and how far it moves."""
+
+    line: MemberLine
+    points: Floats  # (k,3) of the form
+    within: Floats  # (k,6) N, V, V across, T, M, M across; see ``FrameForces.within``
+    displacements: Floats  # (k,3)
+    pulls: Floats  # (k,3) forces of the sheets and loads on it
+
+    @cached_array
+    def along(self) -> Floats:
+        """(k,) the length along it from its first point."""
+        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1)))
+
+    @property
+    def span(self) -> float:
+        """The distance of its ends, or of the two points farthest apart if it is closed."""
+        P = self.points
+        if not self.line.closed:
+            return float(np.linalg.norm(P[-1] - P[0]))
+        return float(max(np.linalg.norm(P - one, axis=1).max() for one in P))
+
+    @property
+    def deflection(self) -> float:
+        """The largest displacement of its points."""
+        return float(np.linalg.norm(self.displacements, axis=1).max())
+
+    @property
+    def largest(self) -> dict[str, float]:
+        """The extremes along it: ``least_N`` and ``largest_N``, and the largest shear force ``V`` and moment
+        ``M``, in whichever direction."""
+        N, (V, M) = self.within[:, 0], (np.linalg.norm(self.within[:, k], axis=1) for k in ([1, 2], [4, 5]))
+        return {"least_N": N.min(), "largest_N": N.max(), "V": V.max(), "M": M.max()}
+
+    @property
+    def eccentricity(self) -> float:
+        """max |M| / max |N|, length: how far the line is from one that does not bend."""
+        return self.largest["M"] / float(np.abs(self.within[:, 0]).max())
+
+    @property
+    def balance(self) -> tuple[float, float]:
+        """The one force N along it that balances its pulls best, and the share of these that is left."""
+        return balancing_force(self.points, self.pulls, self.line.closed)
+
+    @property
+    def enough(self) -> float:
+        """The factor on E A and E I with which the deflection is a 300th of the span; linear, without the
+        help of the sheets."""
+        return self.deflection / (self.span / LIMIT)
+
+
+def members_at_rest(model: StructuralModel) -> tuple[MemberForces, ...]:
+    """The beams of a model under the pull of the sheets at rest, with the displacements of beams alone."""
+    if not model.beams:
+        return ()
+    X, forces = model.standing.vertices, forces_on_members(model, model.steps[0])
+    return _along_lines(model, X, forces, None)
+
+
+def members_in(results: StepResults) -> tuple[MemberForces, ...]:
+    """The beams at the end of a step of the analysis, in the shape that the roof has there."""
+    model = results.model
+    if not model.beams:
+        return ()
+    moved = np.nan_to_num(results.displacements)
+    forces = forces_on_members(model, results.step, results)
+    return _along_lines(model, model.standing.vertices + moved, forces, moved)
+
+
+def _along_lines(
+    model: StructuralModel, X: Floats, forces: Floats, moved: Floats | None
+) -> tuple[MemberForces, ...]:
+    frame, vertices = frame_of(model, X)
+    solved = frame.solved(forces[vertices])
+    if moved is None:
+        moved = np.zeros_like(X)
+        moved[vertices] = solved.displacements
+    found, first = list[MemberForces](), 0
+    for line in model.beams:
+        v, bars = line.vertices, first + np.arange(len(line.pairs))
+        within = solved.within(bars, line.closed)
+        found.append(MemberForces(line, model.standing.vertices[v], within, moved[v], forces[v]))
+        first += len(bars)
+    return tuple(found)
+
+
+def forces_on_members(model: StructuralModel, step: Step, found: StepResults | None = None) -> Floats:
+    """(n,3) the forces of sheets, cables and loads on the vertices under a step: on members what they carry,
+    nothing at other vertices that no support holds.
+
+    ``found`` has the stresses and displacements; without it the form is at rest.
+    """
+    s = model.standing
+    X = s.vertices if found is None else s.vertices + np.nan_to_num(found.displacements)
+    faces = s.faces[model.active]
+    thickness = model.thicknesses[s.patch_of_face[model.active], None, None]
+    if found is None:
+        normal = area_vectors(X[faces])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        tensors = model.prestress[:, None, None] * (np.eye(3) - normal[:, :, None] * normal[:, None])
+    else:
+        tensors = found.stresses[model.faces]
+    forces = model.nodal_loads(step, X - s.vertices)
+    forces += at_vertices(corner_forces(X[faces], thickness * tensors), faces, s.n)
+    for cable in s.cables:
+        pull = pull_along(s, cable, cable.edges) if found is None else found.cable_tensions[cable.name]
+        along = pull[:, None] * directions(X, cable.edges)[0]
+        for end, sign in ((0, 1.0), (1, -1.0)):
+            np.add.at(forces, cable.edges[:, end], sign * along)
+    return forces
+
+
+def frame_of(model: StructuralModel, X: Floats) -> tuple[Frame, Ints]:
+    """The beams of a model as a frame at X (n,3), and the vertices (k,) that its points are."""
+    pairs, vertices = np.concatenate([line.pairs for line in model.beams]), model.beam_vertices
+    place = np.full(len(X), -1)
+    place[vertices] = np.arange(len(vertices))
+    stiffness = list[Floats]()
+    for line in model.beams:
+        material, profile = line.member.material, line.member.profile
+        up, across = profile.moments
+        E, G = material.young, material.young / (2.0 + 2.0 * material.poisson)
+        one = np.array([E * profile.area, E * up, E * across, G * profile.torsion])
+        stiffness.append(np.tile(one, (len(line.pairs), 1)))
+    rows, turns = list[Floats](), held_turns(model, X)
+    for v in vertices[model.held[vertices]].tolist():
+        freedom, axes = int(model.freedom[v]), model.axes[v]
+        stops = (axes, axes[1:], axes[:1])[freedom]
+        for shift, stopped in ((0, stops), (3, turns.get(v, ()))):
+            for direction in stopped:
+                row = np.zeros(6 * len(vertices))
+                row[6 * place[v] + shift : 6 * place[v] + shift + 3] = direction
+                rows.append(row)
+    holds = np.array(rows).reshape(-1, 6 * len(vertices))
+    normal = np.array(model.surface.plane.normal)
+    return Frame(X[vertices], place[pairs], np.vstack(stiffness), holds, normal), vertices
+
+
+def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
+    """By the vertices at fixed ends of beams, the turns (k,3) that are held there, as unit vectors at right
+    angles: the twist of hinged ends on X (n,3), all of clamped ones."""
+    given = dict[int, list[Floats]]()
+    for line in model.beams:
+        for v, t in line.ends(X):
+            if model.held[v] and model.freedom[v] == 0:
+                given.setdefault(v, []).extend([t] if line.member.ends == "hinged" else np.eye(3))
+    found = {}
+    for v, held in given.items():
+        _, sizes, rows = np.linalg.svd(np.array(held))
+        found[v] = rows[: len(sizes)][sizes > ALIKE]
+    return found
+
+
+def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
+    and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
+    over it. And a row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``.
+    """
+    rows, along = list[dict[str, object]](), list[pd.DataFrame]()
+    for case, beams in cases:
+        for beam in beams:
+            moved = np.linalg.norm(beam.displacements, axis=1)
+            over = beam.span / moved.max() if moved.any() else np.inf
+            about = {"case": case, "member": beam.line.name}
+            rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
+            columns = about | {"s": beam.along} | dict(zip("xyz", beam.points.T, strict=True))
+            columns |= dict(zip(COLUMNS, beam.within.T, strict=True))
+            along.append(pd.DataFrame(columns | {"moved": moved}))
+    return pd.DataFrame(rows), pd.concat(along, ignore_index=True) if along else pd.DataFrame()
+
+
+def sentences(model: StructuralModel, units: Units) -> list[str]:
+    """For each beam in a line: what it carries at rest, how stiff it must be, and what would not bend."""
+    lines, force, length = list[str](), units.behind("force"), units.behind("length")
+    for beam in members_at_rest(model):
+        N, share = beam.balance
+        most = beam.largest
+        far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
+        about = (
+            f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)},"
+        )
+        about += f" M/N = {beam.eccentricity:.2g}{length}; {beam.enough:.2g} times its E A and E I keep the"
+        about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
+        if beam.line.wall:
+            about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
+            cable = f"; wall = false, cable = {N:.3g} finds the shape that does not bend"
+            about += cable if N > 0.0 else "; that is a thrust, which no cable has"
+        lines.append(about)
+    return lines
+
+
+def moment_unit(units: Units) -> str:
+    """The unit of moments, with the blank before it; empty without units.
+
+    >>> moment_unit(Units("m", "kN"))
+    ' kN m'
+    """
+    return f" {units.force} {units.length}" if units else ""

@@ -1,0 +1,191 @@
+"""Members: beams and cables in the place of walls, along edges, and as rings around holes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base import validate
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, unknown
+from ..forces.pinching import standing_part
+from ..surface import Surface
+from ..surface.curves import Curve
+from ..surface.geometry import segment_lengths
+from .material import Material
+from .profile import Profile
+
+KINDS = ("beam", "cable")
+ENDS = ("hinged", "clamped")
+BESIDE = 0.02  # of the length of edges: so near to a curve their ends are on it
+
+
+@dataclass(frozen=True)
+class Member:
+    """A beam or a cable of the structural model, along edges of the surface.
+
+    Parameters
+    ----------
+    on : where it is. The name of a wall: the member stands in the place of the wall, along its junction,
+        and carries what the wall did. The name of a cable: that cable has this profile and material. A
+        Curve: the edges of the boundary along it, seen along Π's normal; these are no support then, but the
+        member carries them from end to end, or as a ring.
+    profile, material : its cross-section, and an isotropic material.
+    kind : "beam", which an arch is, too, or "cable", without bending stiffness; a cable in the place of a
+        wall has the tension that balances the sheets best.
+    ends : of a beam, where a support holds it: "hinged", free to bend, but not to twist; or "clamped".
+    propped : whether columns or a wall below hold a member on a Curve along Π's normal, all along it.
+    name : of the member, for tables; by default the name that ``on`` is, or "member".
+
+    >>> Member("wall 1", Profile.tube(0.1, 0.005), Material(2.1e8)).label
+    'wall 1'
+    """
+
+    on: str | Curve
+    profile: Profile
+    material: Material
+    kind: str = "beam"
+    ends: str = "hinged"
+    propped: bool = False
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for name, kind in (("on", str | Curve), ("profile", Profile), ("material", Material)):
+            if not isinstance(getattr(self, name), kind):
+                expected = {"on": "the name of a wall or a cable, or a Curve"}.get(name, f"a {name.title()}")
+                validate.refuse(f"Member.{name}", getattr(self, name), expected)
+        validate.choice("Member.kind", self.kind, KINDS)
+        validate.choice("Member.ends", self.ends, ENDS)
+        validate.flag("Member.propped", self.propped)
+        if self.material.cloth:
+            text = f"member {self.label!r}: its material is a cloth; give it young alone"
+            raise OptionError(text, what="Member.material", where=self.label)
+        if self.propped and isinstance(self.on, str):
+            text = f"member {self.label!r}: propped is for edges of the boundary; leave it out"
+            raise OptionError(text, what="Member.propped", where=self.label)
+
+    @property
+    def label(self) -> str:
+        """Its name, or that of the wall or cable."""
+        return self.name or (self.on if isinstance(self.on, str) else "member")
+
+
+@dataclass(frozen=True, eq=False)
+class MemberLine:
+    """The edges of the surface that a member runs along."""
+
+    name: str  # of the member; with a number where it has several lines
+    member: Member
+    vertices: Ints  # (k,) in order; the first is not repeated where it is closed
+    closed: bool
+    wall: str = ""  # in whose place it is
+
+    @property
+    def pairs(self) -> Ints:
+        """(b,2) the ends of its edges, in order."""
+        order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
+        return np.stack([order[:-1], order[1:]], axis=1)
+
+    @property
+    def carried(self) -> Ints:
+        """The vertices that it carries in the place of a support: all but its ends."""
+        return self.vertices if self.closed else self.vertices[1:-1]
+
+    def ends(self, X: Floats) -> list[tuple[int, Floats]]:
+        """The vertex at each end, and the direction (3,) there on X (n,3); none if it is closed."""
+        if self.closed:
+            return []
+        first, last = self.vertices[:2], self.vertices[:-3:-1]
+        return [(int(a), (X[b] - X[a]) / np.linalg.norm(X[b] - X[a])) for a, b in (first, last)]
+
+
+def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, ...]:
+    """The lines of members on a surface, but for those of its own cables; OptionError for a member that is on
+    no edge, on a wall that rests on Π, or where another one is.
+
+    >>> from pcmc.plan import Plan
+    >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
+    >>> steel = Member("wall 1", Profile.tube(0.2, 0.01), Material(2.1e8))
+    >>> [line] = lines_on(hall.surface(), [steel])
+    >>> line.name, len(line.vertices), line.closed
+    ('wall 1', 5, False)
+    """
+    lines, taken = list[MemberLine](), np.zeros(len(surface.topology.edges), dtype=bool)
+    cut = np.zeros(surface.n, dtype=bool)
+    for plane, mask in surface.on_planes:
+        cut |= mask & plane.mirror
+    for member in members:
+        if member.on in [cable.name for cable in surface.cables]:
+            continue
+        for line in _lines_of(surface, member):
+            if cut[line.vertices].any():
+                text = f"member {line.name!r} meets a mirror plane; take the whole roof, whole = true"
+                raise OptionError(text, what="members", where=line.name)
+            edges = surface.topology.edge_numbers(line.pairs)
+            if taken[edges].any():
+                text = f"member {line.name!r} runs where another one does; leave one of them out"
+                raise OptionError(text, what="members", where=line.name)
+            taken[edges] = True
+            lines.append(line)
+    return tuple(lines)
+
+
+def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:
+    topo, names = surface.topology, [patch.name for patch in surface.patches]
+    if isinstance(member.on, Curve):
+        chosen = _along(surface, member.on)
+        found = [("", chosen)]
+        if not chosen.any():
+            text = f"member {member.label!r}: no edge of the boundary runs along its curve; draw it along one"
+            raise OptionError(text, what="members", where=member.label)
+    else:
+        parts = re.compile(re.escape(member.on) + r"(-\d+)?( \(\d+\))?")
+        walls = [k for k, name in enumerate(names) if parts.fullmatch(name) and surface.walls[k]]
+        if not walls:
+            known = [name for name, wall in zip(names, surface.walls, strict=True) if wall]
+            known += [cable.name for cable in surface.cables]
+            text = f"member {member.label!r}: {unknown('wall or cable', member.on, known)}"
+            if member.on in names:
+                text = f"member {member.label!r}: {member.on!r} is no wall; it stands in the place of one"
+            raise OptionError(
+                f"{text}; a divider needs a wall to have a member", what="members", found=member.on
+            )
+        found = [(names[k], _top(surface, k)) for k in walls]
+    curves = [(wall, curve) for wall, edges in found for curve in topo.curves_among(edges)]
+    for number, (wall, curve) in enumerate(curves, 1):
+        name = member.label if len(curves) == 1 else f"{member.label}-{number}"
+        yield MemberLine(name, member, curve.vertices, curve.closed, wall)
+
+
+def _top(surface: Surface, wall: int) -> Bools:
+    """(e,) the edges of a wall where sheets of the roof meet; OptionError where it rests on Π."""
+    topo = surface.topology
+    own = np.zeros(len(topo.edges), dtype=bool)
+    sheets = topo.edge_of_face[surface.roof[surface.patch_of_face]]
+    mine = surface.patch_of_face == wall
+    own[topo.edge_of_face[mine]] = True
+    top: Bools = own & (np.bincount(sheets.ravel(), minlength=len(topo.edges)) >= 2)
+    name, standing = surface.patches[wall].name, standing_part(surface)
+    if not top.any() or (standing.surface.patch_of_face == wall).sum() < mine.sum():
+        text = f"member on {name!r}: its junction rests on Π, all or in parts, where it has nothing to carry"
+        raise OptionError(f"{text}; leave the member out, or raise the junction", what="members", where=name)
+    return top
+
+
+def _along(surface: Surface, curve: Curve) -> Bools:
+    """(e,) the edges of the boundary along a curve, seen along Π's normal."""
+    edges = surface.topology.edges
+    rim = np.flatnonzero(surface.topology.boundary_edge & ~surface.mirror_edge)
+    if not len(rim):
+        return np.zeros(len(edges), dtype=bool)
+    length = segment_lengths(surface.vertices, edges[rim])
+    step = BESIDE * float(length.min())
+    line = curve.local(surface.plane).samples(step)[:, :2]
+    ends = surface.plane.to_local(surface.vertices[edges[rim]])[..., :2]
+    chosen = np.zeros(len(edges), dtype=bool)
+    chosen[rim] = (np.asarray(cKDTree(line).query(ends)[0]) <= step).all(axis=1)
+    return chosen

@@ -1,0 +1,142 @@
+"""Frames of bars against closed forms, with the order of convergence."""
+
+import numpy as np
+import pytest
+
+from pcmc.structure.frames import Frame, bar_axes
+from pcmc.structure.profile import Profile
+from pcmc.structure.pulls import balancing_force
+
+UP = np.array([0.0, 0.0, 1.0])
+PLANAR = [(0, 1), (0, 3), (0, 5)]  # displacements across and turns out of the plane xz, which it keeps
+
+
+def frame_along(X, holds=(), closed=False, stiffness=(1e6, 2000.0, 500.0, 300.0)):
+    """Bars along points (n,3); ``holds`` are pairs of a point and a coordinate."""
+    n = len(X)
+    bars = np.stack([np.arange(n), (np.arange(n) + 1) % n], axis=1)[: n if closed else -1]
+    rows = np.zeros((len(holds), 6 * n))
+    for row, (point, coordinate) in zip(rows, holds, strict=True):
+        row[6 * (point % n) + coordinate] = 1.0
+    return Frame(X, bars, np.tile(stiffness, (len(bars), 1)), rows, UP)
+
+
+def hinged(*coordinates):
+    """Both ends held against displacements and twist."""
+    return [(end, k) for end in (0, -1) for k in (0, 1, 2)] + [(0, k) for k in coordinates]
+
+
+def lumped(widths):
+    """Half of each bar's load at its ends."""
+    return np.append(widths, 0.0) / 2.0 + np.append(0.0, widths) / 2.0
+
+
+def straight(n, length=10.0):
+    return np.stack([np.linspace(0.0, length, n + 1), np.zeros(n + 1), np.zeros(n + 1)], axis=1)
+
+
+@pytest.mark.parametrize(("axis", "column", "inertia"), [(2, 4, 2000.0), (1, 5, 500.0)])
+def test_a_straight_beam_has_the_moment_and_the_deflection_of_the_tables(axis, column, inertia):
+    """M = w L²/8 at the points exactly, 5 w L⁴ / 384 E I with the second order of the lumped load."""
+    off = []
+    for n in (4, 8, 16):
+        X, forces = straight(n), np.zeros((n + 1, 3))
+        forces[:, axis] = -3.0 * lumped(np.full(n, 10.0 / n))
+        solved = frame_along(X, hinged(3)).solved(forces)
+        within = solved.within(np.arange(n))
+        assert within[n // 2, column] == pytest.approx(3.0 * 100.0 / 8.0)
+        shear = within[:, 1 if axis == 2 else 2]
+        np.testing.assert_allclose(shear, 3.0 * (5.0 - X[:, 0]), atol=1e-9)  # dM/ds, also at the ends
+        np.testing.assert_allclose(solved.reactions.sum(axis=0), -forces.sum(axis=0), atol=1e-9)
+        off.append(1.0 + solved.displacements[n // 2, axis] / (5 * 3.0 * 1e4 / 384.0 / inertia))
+    assert np.polyfit(np.log([4, 8, 16]), np.log(off), 1)[0] == pytest.approx(-2.0, abs=0.01)
+
+
+def test_clamped_ends_take_a_twelfth():
+    n = 32
+    forces = np.zeros((n + 1, 3))
+    forces[:, 2] = -3.0 * lumped(np.full(n, 10.0 / n))
+    ends = [(end, k) for end in (0, -1) for k in range(6)]
+    solved = frame_along(straight(n), ends).solved(forces)
+    assert solved.within(np.arange(n))[[0, n // 2, -1], 4] == pytest.approx(
+        [-3.0 * 100 / 12, 3.0 * 100 / 24, -3.0 * 100 / 12], rel=3e-3
+    )
+    assert solved.moments[0, 1] == pytest.approx(-3.0 * 100 / 12, rel=3e-3)
+
+
+def arch(n, shape):
+    """An arch of the half span 5, and half of each bar's span at its ends."""
+    X = straight(n)
+    X[:, 0] -= 5.0
+    X[:, 2] = shape(X[:, 0])
+    return X
+
+
+def test_a_parabolic_arch_under_an_even_load_does_not_bend():
+    """H = w L²/(8 f); the moments vanish, but for the shortening of the arch."""
+    X = arch(20, lambda x: 4.0 * (1.0 - (x / 5.0) ** 2))
+    forces = np.zeros_like(X)
+    forces[:, 2] = -2.0 * lumped(np.diff(X[:, 0]))
+    solved = frame_along(X, hinged(3), stiffness=(1e10, 100.0, 100.0, 100.0)).solved(forces)
+    assert solved.reactions[0] == pytest.approx([2.0 * 100 / (8 * 4.0), 0.0, 10.0])
+    assert np.abs(solved.within(np.arange(20))[:, 4]).max() < 1e-5 * 2.0 * 100.0 / 8.0
+    N, share = balancing_force(X, forces, closed=False)
+    middle = np.array([0, 0, 1.0]) @ (X[1] - X[0]) / np.linalg.norm(X[1] - X[0])
+    assert share > 0.05
+    assert N < 0.0
+    assert middle > 0.0
+
+
+def test_a_two_hinged_half_circle_has_the_thrust_of_its_closed_form():
+    """An even load per span: H = 4 w R / 3 π, M = w R²/2 sin²θ - H R sin θ, to the fourth order; a crown
+    load: H = P/π."""
+    off = []
+    for n in (16, 32, 64):
+        angle = np.linspace(np.pi, 0.0, n + 1)
+        X = 5.0 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+        frame = frame_along(X, hinged(3), stiffness=(1e9, 100.0, 100.0, 100.0))
+        forces = np.zeros_like(X)
+        forces[:, 2] = -2.0 * lumped(np.diff(X[:, 0]))
+        solved, H = frame.solved(forces), 4.0 * 2.0 * 5.0 / (3.0 * np.pi)
+        exact = 25.0 * np.sin(angle) ** 2 - 5.0 * H * np.sin(angle)
+        off.append(np.abs(solved.within(np.arange(n))[:, 4] - exact).max() / 25.0)
+        point = np.zeros_like(X)
+        point[n // 2, 2] = -7.0
+    assert solved.reactions[0] == pytest.approx([H, 0.0, 10.0], rel=2e-3, abs=1e-9)
+    assert frame.solved(point).reactions[0, 0] == pytest.approx(7.0 / np.pi, rel=2e-3)
+    assert np.polyfit(np.log([16, 32, 64]), np.log(off), 1)[0] == pytest.approx(-4.0, abs=0.1)
+
+
+def test_a_ring_that_nothing_holds_carries_its_pull_without_bending():
+    """N = q R with the second order of its sides; what is out of balance is left out."""
+    off = []
+    for n in (16, 32, 64):
+        angle = 2.0 * np.pi * np.arange(n) / n
+        X = 2.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        pull = 3.0 * X / 2.0 * (2.0 * np.pi * 2.0 / n)
+        within = frame_along(X, closed=True).solved(pull + 0.1 * UP).within(np.arange(n), closed=True)
+        np.testing.assert_allclose(within[:, 4:], 0.0, atol=1e-6)
+        N, share = balancing_force(X, pull, closed=True)
+        assert share < 1e-12
+        assert pytest.approx(N) == within[0, 0]
+        off.append(within[0, 0] / 6.0 - 1.0)
+    assert np.polyfit(np.log([16, 32, 64]), np.log(off), 1)[0] == pytest.approx(-2.0, abs=0.02)
+
+
+def test_a_bar_that_stands_has_axes_too():
+    axes, _ = bar_axes(np.array([[0.0, 0, 0], [0, 0, 2]]), np.array([[0, 1]]), UP)
+    np.testing.assert_allclose(axes[0] @ axes[0].T, np.eye(3), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "profile", [Profile.tube(0.2, 0.01), Profile.rectangle(0.1, 0.3), Profile(2.0, 5.0, 3.0)]
+)
+def test_the_equal_rectangle_is_as_stiff(profile):
+    b, h, f = profile.equal_rectangle
+    found = f * b * h, f * b * h**3 / 12.0, f * h * b**3 / 12.0
+    assert found == pytest.approx((profile.area, *profile.moments), rel=1e-10)
+    twice = profile.scaled(2.0)
+    assert (twice.area, *twice.moments) == pytest.approx(
+        (2 * profile.area, *(2 * i for i in profile.moments))
+    )
+    assert twice.torsion == pytest.approx(2.0 * profile.torsion)

@@ -1,0 +1,176 @@
+"""Beams, cables and rings of a structural model: what the sheets pull them with, and what CalculiX finds."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from refusals import refused
+from starts import spherical_cap
+from structures import FABRIC, model_of, square
+
+import pcmc
+from generators import joined_caps
+from pcmc import Material, SelfWeight, Snow, StructuralModel
+from pcmc.base.errors import OptionError
+from pcmc.plan import Plan, circle, polyline
+from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure.member_forces import forces_on_members, members_at_rest
+
+needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+STEEL = Material(2.1e8, density=7.85)
+TUBE = Profile.tube(0.1, 0.005)
+
+
+@cache
+def hall():
+    """Two bays with a wall between them, at rest."""
+    bays = {name: {"tension": 1.5, "pressure": 0.3} for name in ("west", "east")}
+    line = {"curve": [[6, 0], [6, 8]], "wall": 0.6}
+    return pcmc.solve(
+        Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [line], edge_length=1.2, patches=bays).surface()
+    )
+
+
+def hall_with(member=None, **more):
+    member = member or Member("wall 1", TUBE, STEEL)
+    return StructuralModel(hall(), Material(5e5, 0.2, 1.2), 0.001, members=[member], **more)
+
+
+def test_the_edge_of_a_flat_sheet_pulls_a_straight_beam_sideways():
+    """M = α L²/8, V = α L/2 at its ends."""
+    edge = Member(polyline([[0, 1], [1, 1]]), TUBE, STEEL)
+    [beam] = members_at_rest(model_of(square(8, tension=2.0), members=[edge], anyway=True))
+    assert (len(beam.points), beam.line.closed, beam.span) == (9, False, 1.0)
+    assert beam.within[4, 5] == pytest.approx(2.0 / 8.0)
+    assert abs(beam.within[[0, -1], 2]) == pytest.approx(2.0 / 2.0)
+    off = beam.deflection / (5 * 2.0 / 384.0 / (2.1e8 * TUBE.upright)) - 1.0
+    assert off == pytest.approx(-0.8 / 8**2)  # of a load lumped at eight points
+    assert beam.enough == pytest.approx(300.0 * beam.deflection)
+
+
+@needs_ccx
+def test_the_deflection_of_a_stiff_beam_goes_like_one_over_its_stiffness():
+    """In CalculiX, too, 5 α L⁴ / 384 E I within 2 %: with a stiff member the shape is that of the form."""
+    moved = []
+    for young in (2.1e10, 2.1e11):
+        edge = Member(polyline([[0, 1], [1, 1]]), TUBE, Material(young))
+        analysis = analyse(model_of(square(8, tension=2.0), members=[edge], anyway=True))
+        moved.append(analysis.members["moved"][0] * young)
+        assert analysis.members["M"][0] == pytest.approx(2.0 / 8.0, rel=1e-3)
+    assert moved == pytest.approx([5 * 2.0 / 384.0 / TUBE.upright] * 2, rel=0.02)
+
+
+def test_a_rim_carries_the_pull_of_its_sheet_as_a_ring():
+    """A cap at its rim has the slope angle θ: N = -α cos θ R where columns carry it upright, order 2."""
+    off = []
+    for edge in (0.2, 0.1, 0.05):
+        rim = Member(circle([0, 0], 1.0), TUBE, STEEL, propped=True)
+        cap = pcmc.solve(
+            spherical_cap(edge, alpha=0.6)
+        ).surface  # of a sphere of radius 1.2 over the unit circle
+        [ring] = members_at_rest(model_of(cap, members=[rim], anyway=True))
+        exact = -0.6 * np.sqrt(1.0 - 1.0 / 1.2**2)
+        assert ring.line.closed
+        assert ring.span == pytest.approx(2.0, rel=0.01)
+        off.append(abs(ring.within[:, 0].mean() / exact - 1.0))
+    assert np.polyfit(np.log([0.2, 0.1, 0.05]), np.log(off), 1)[0] > 0.9
+    assert off[-1] < 0.05
+
+
+def sail_with_hole():
+    """A flat film with a round hole, held at both edges."""
+    return Plan(
+        [[-3, -3], [3, -3], [3, 3], [-3, 3]],
+        holes=[circle([0, 0], 1.0)],
+        edge_length=0.5,
+        tension=2.0,
+        pressure=0.0,
+    ).surface()
+
+
+@needs_ccx
+def test_a_ring_around_a_hole_is_in_tension():
+    """N = α R, at rest and in CalculiX, where it is stiff."""
+    model = model_of(sail_with_hole(), members=[Member(circle([0, 0], 1.0), TUBE, STEEL)], anyway=True)
+    [ring] = members_at_rest(model)
+    N, share = ring.balance
+    assert pytest.approx(2.0 * np.cos(np.pi / len(ring.points))) == N
+    assert share < 1e-9
+    analysis = analyse(model)
+    assert analysis.members.loc[0, ["least_N", "largest_N"]].tolist() == pytest.approx([2.0, 2.0], rel=0.05)
+    assert analysis.members["moved"][0] < 1e-4
+
+
+def test_the_junction_of_two_spheres_needs_no_bending():
+    """It is an arc of a circle in the plane of its wall: N = α_w r, exactly in the limit."""
+    edges, shares, forces = (1.0, 0.5, 0.25), [], []
+    for edge in edges:
+        caps = joined_caps(edge, exact=True)
+        arch = Member("wall", TUBE, STEEL)
+        [beam] = members_at_rest(model_of(caps, members=[arch], anyway=True))
+        N, share = beam.balance
+        x, _, z = beam.points.T
+        radius = np.hypot(beam.points[:, 1], z + 4.5)
+        assert abs(x).max() < 1e-12
+        assert np.ptp(radius) < 1e-12
+        forces.append(N / (3.0 * radius[0]) - 1.0)
+        shares.append(share)
+    assert np.polyfit(np.log(edges), np.log(forces), 1)[0] > 1.6
+    assert forces[-1] < 3e-3
+    assert shares[-1] < 0.015 < shares[0] / 3.0
+
+
+@needs_ccx
+def test_a_member_in_the_place_of_a_wall_carries_what_the_wall_did():
+    """The reactions balance the loads; at rest the member carries the wall's pull; beam theory agrees."""
+    model = hall_with(loads=[SelfWeight(), Snow(0.1)])
+    free = model.nodes & ~model.held & ~model.on_members
+    analysis = analyse(model, remedy=False)
+    assert analysis.carried
+    for case in analysis.cases:
+        left = forces_on_members(model, case.results.step, case.results)
+        scale = np.abs(left[model.on_members]).max()
+        assert np.abs(left[free]).max() < 0.01 * scale
+        total = model.nodal_loads(case.results.step, np.nan_to_num(case.results.displacements)).sum(axis=0)
+        np.testing.assert_allclose(case.results.reactions.sum(axis=0), -total, atol=5e-3)
+    [rest], [run] = members_at_rest(model), analysis.cases[0].members
+    np.testing.assert_allclose(run.pulls, rest.pulls, atol=0.03)
+    assert run.deflection == pytest.approx(rest.deflection, rel=0.1)
+    assert run.within[:, 0] == pytest.approx(rest.within[:, 0], rel=0.03)
+    assert set(analysis.tables) == {"cases", "patches", "supports", "members", "member-forces"}
+
+
+def test_a_cable_in_the_place_of_a_wall_has_the_tension_that_balances_best():
+    model = hall_with(Member("wall 1", Profile(1e-4, 1e-9), STEEL, kind="cable"))
+    [cable], [beam] = model.standing.cables, members_at_rest(hall_with())
+    assert cable.name == "wall 1"
+    assert cable.tension == pytest.approx(beam.balance[0], rel=0.05)
+    assert model.cable_sections[0] == (1e-4, STEEL)
+    assert not model.beams
+
+
+def test_a_member_that_cannot_be_is_refused_in_a_line():
+    def lines(surface, member):
+        return model_of(surface, members=[member], anyway=True).lines
+
+    cap = spherical_cap(0.2, alpha=0.6)
+    with refused(OptionError, what="members", found="wall 2"):
+        hall_with(Member("wall 2", TUBE, STEEL))
+    with refused(OptionError, what="members", found="west"):
+        hall_with(Member("west", TUBE, STEEL))
+    with refused(OptionError, what="members", where="member"):
+        lines(cap, Member(polyline([[5, 5], [6, 6]]), TUBE, STEEL))
+    with refused(OptionError, what="Member.propped"):
+        Member("wall 1", TUBE, STEEL, propped=True)
+    with refused(OptionError, what="Member.material"):
+        Member("wall 1", TUBE, Material(1e5, weft=1e5, shear=1e4))
+    with refused(OptionError, what="Member.profile"):
+        Member("wall 1", 0.3, STEEL)
+    with refused(OptionError, what="Profile.area"):
+        Profile(0.0, 1.0)
+    with refused(OptionError, what="Profile.thickness"):
+        Profile.tube(0.1, 0.06)
+    with refused(OptionError, what="members", where="wall 1"):
+        StructuralModel(hall(), FABRIC, 1e-3, members=[Member("wall 1", TUBE, STEEL)] * 2)
+    with refused(OptionError, what="members"):
+        StructuralModel(hall(), FABRIC, 1e-3, members=["wall 1"])
