@@ -142,7 +142,7 @@ def _refuse_half_walls(surface: Surface, replaced: Set[str]) -> None:
     beside = np.zeros((2, len(surface.topology.edges)), dtype=bool)
     beside[0, of_edge[gone[patch]]] = True
     beside[1, of_edge[(surface.walls & ~gone)[patch]]] = True
-    shared = beside.all(axis=0)
+    shared = beside[0] & beside[1]
     if shared.any():
         names = [surface.patches[k].name for k in np.unique(patch[shared[of_edge].any(axis=1)])]
         one, other = ([name for name in names if (name in replaced) == side] for side in (True, False))
