@@ -15,6 +15,7 @@ from .gallery import surfaces
 from .questions import (
     accuracy,
     cloth,
+    equilibria_atlas,
     existence,
     margins,
     mesh_check,
@@ -46,6 +47,7 @@ MODULES = (
     mesh_check,
     bars,
     margins,
+    equilibria_atlas,
     accuracy,
     panel_families,
     cloth,

@@ -1,0 +1,181 @@
+"""Every equilibrium of surfaces in closed form, with their indices, energies and barriers, on several meshes.
+
+- Over a circle stand two caps of one sphere; the barrier out of the small one is E(large) - E(small).
+- Between two rings hang two catenoids; the wide one breaks into two discs over the deep one. The deep one
+  keeps the triangles of the wide one, long ones at its neck: a finer mesh does not bring its energy nearer.
+- In Enneper's wire of radius 1.2 hang three surfaces; Enneper's is the pass between the two others.
+- Two unduloids leave the cylinder at L = 2πR and lean back over the shorter cylinder of length 6 R.
+
+Surface Evolver counts the negative eigenvalues of each on the same mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from generators import (
+    catenoid,
+    catenoid_exact,
+    cylinder,
+    cylinder_exact,
+    enneper,
+    enneper_exact,
+    spherical_cap,
+    spherical_cap_exact,
+)
+from pcmc import BoundaryMotion, Equilibria, Surface, find_equilibria, solve
+
+from ..folder import Folder
+from ..reference import evolver
+from ..study import Study
+
+LENGTH, WIRE = 6.0, 1.2  # of the cylinder; radius of Enneper's wire
+EDGES = {  # of the meshes of each case; the last is drawn
+    "caps": (0.25, 0.125, 0.0833),
+    "catenoids": (0.35, 0.175),
+    "Enneper": (0.3, 0.15),
+    "cylinder": (2.0 * np.pi / 14, 2.0 * np.pi / 28),
+}
+EXACT: dict[str, dict[int, float]] = {  # energies by index
+    "caps": {0: spherical_cap_exact().energy, 1: spherical_cap_exact(upper=True).energy},
+    "catenoids": {0: catenoid_exact().energy, 1: catenoid_exact(deep=True).energy},
+    "Enneper": {1: enneper_exact(radius=WIRE).area},
+    "cylinder": {1: cylinder_exact(length=LENGTH).energy},
+}
+
+
+def _rings(film: Surface, start: float) -> BoundaryMotion:
+    """Two rings about the origin, λ the height of the upper one."""
+    x, y, z = film.vertices[film.fixed].T
+    return BoundaryMotion(lambda h: np.stack([x, y, np.sign(z) * h], axis=1), start)
+
+
+def _caps(edge: float) -> Equilibria:
+    return find_equilibria(spherical_cap(edge), starts=2)
+
+
+def _catenoids(edge: float) -> Equilibria:
+    film = catenoid(edge)
+    return find_equilibria(film, _rings(film, 0.5), starts=0)
+
+
+def _enneper(edge: float) -> Equilibria:
+    return find_equilibria(solve(enneper(edge, radius=WIRE), target="stationary"), (), starts=0)
+
+
+def _cylinder(edge: float) -> Equilibria:
+    tube = cylinder(edge, length=LENGTH, exact=True)
+    tube = solve(tube.moved(tube.vertices - [0.0, 0.0, 0.5 * LENGTH]), target="stationary").surface
+    return find_equilibria(tube, _rings(tube, 0.5 * LENGTH), starts=0, span=(2.9, 3.3))
+
+
+SEARCHES: dict[str, Callable[[float], Equilibria]] = {
+    "caps": _caps,
+    "catenoids": _catenoids,
+    "Enneper": _enneper,
+    "cylinder": _cylinder,
+}
+
+
+def data(folder: Folder, short: bool) -> None:
+    """Search on each mesh; the surfaces of the first mesh are kept for the figure."""
+    rows: list[dict[str, Any]] = []
+    turns: list[dict[str, Any]] = []
+    for case, search in SEARCHES.items():
+        for edge in EDGES[case][:1] if short else EDGES[case]:
+            found = search(edge)
+            for k, one in enumerate(found.found, 1):
+                barrier = min((b.energy for b in found.barriers if b.start == k), default=np.nan)
+                ends = ", ".join(b.end or f"to {b.to}" for b in found.barriers if b.start == k)
+                inertia = evolver.inertia(one.surface).negative if evolver.available() else -1
+                rows.append(
+                    {
+                        "case": case,
+                        "edge_length": edge,
+                        "number": k,
+                        "index": one.index,
+                        "evolver": inertia,
+                        "energy": one.energy,
+                        "exact": EXACT[case].get(one.index, np.nan),
+                        "barrier": barrier,
+                        "beyond": ends,
+                    }
+                )
+            for branches in found.branches.values():
+                first = branches[0]
+                places = first.folds if first.bifurcations.empty else first.bifurcations
+                place = float(places.parameter.iloc[0]) if len(places) else np.nan
+                turns.append({"case": case, "edge_length": edge, "place": place})
+            if edge == EDGES[case][0]:
+                folder.write_mesh(case, {f"{k}": one.surface for k, one in enumerate(found.found, 1)})
+    folder.write_table("records", pd.DataFrame(rows))
+    folder.write_table("places", pd.DataFrame(turns))
+
+
+def table(folder: Folder) -> dict[str, float]:
+    """Numbers of equilibria, agreement with Evolver, barriers with order, and where branches turn."""
+    records, places = folder.read_table("records"), folder.read_table("places")
+    measured = {
+        "equilibria": float(len(records)),
+        "indices_as_evolver": float((records["index"] == records.evolver).sum()),
+    }
+    rows = []
+    for case, exact in EXACT.items():
+        mine = records[(records.case == case) & (records["index"] == 0) & (records.number == 1)]
+        measured[f"{case}_count".lower()] = float(records[records.case == case].number.max())
+        if {0, 1} <= exact.keys() and len(mine) > 2:
+            error = mine.barrier.to_numpy() - (exact[1] - exact[0])
+            h = mine.edge_length.to_numpy()
+            ratio = (h[-2] / h[-1]) ** 2
+            row = {
+                "case": case,
+                "barrier": exact[1] - exact[0],
+                "finest": mine.barrier.iloc[-1],
+                "limit": mine.barrier.iloc[-1] + (error[-1] - error[-2]) / (ratio - 1.0),
+                "order": 2.0 * np.log(error[-2] / error[-1]) / np.log(ratio),
+            }
+            rows.append(row)
+            for key in ("barrier", "finest", "limit", "order"):
+                measured[f"{case}_{key}".lower()] = float(row[key])
+    folder.write_table("barriers", pd.DataFrame(rows))
+    for case in EDGES:
+        mine = places[places.case == case]
+        if mine.empty:
+            continue
+        place, h = mine.place.to_numpy(), mine.edge_length.to_numpy()
+        measured[f"{case}_place".lower()] = float(place[-1])
+        if len(place) > 1:
+            limit = place[-1] + (place[-1] - place[-2]) / ((h[-2] / h[-1]) ** 2 - 1.0)
+            measured[f"{case}_place_limit".lower()] = float(limit)
+    return measured
+
+
+def figure(folder: Folder) -> None:
+    """The atlas: every equilibrium of the coarsest mesh, with its index and energy."""
+    from pcmc.plot import panel
+
+    records = folder.read_table("records")
+    shapes, titles = [], []
+    for case in EDGES:
+        mine = records[records.case == case]
+        mine = mine[mine.edge_length == mine.edge_length.max()]
+        for row, surface in zip(mine.to_dict("records"), folder.read_mesh(case).values(), strict=True):
+            shapes.append(surface)
+            titles.append(f"{case} {row['number']}: index {row['index']}, E = {row['energy']:.4g}")
+    panel(shapes, folder.figure("atlas"), columns=5, titles=titles, supports=False, one_scale=False)
+
+
+STUDY = Study(
+    "equilibria_atlas",
+    "every equilibrium of surfaces in closed form, and the barriers between them",
+    data,
+    table,
+    figure,
+    parameters={"edges": EDGES, "length": LENGTH, "wire": WIRE},
+    seconds=60,
+    paper=False,
+)
