@@ -12,6 +12,7 @@ from ..base import validate
 from ..cloth import CuttingOptions
 from ..cloth.sheets import pattern_files
 from ..plot import strains
+from ..project.settings import of_material
 from ..project.writing import write_all
 from . import arguments, reports
 from .arguments import MANY_FILES, Build, FileUnits, Input, SheetFormat, ViewName, amount, count, option
@@ -93,7 +94,7 @@ def pattern(
         wanted, own = given.of(project.pattern), project.output
         own = replace(own, pattern=files, sheet=sheet or own.sheet)
         own.check(project.units, project.structure, wanted)
-        wanted.check(projects.surface_of(project))
+        of_material(wanted, project.structure, projects.surface_of(project))
         roof = build.roof(project, progress)
         progress("cutting strips")
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)

@@ -52,6 +52,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         leaning = lean_texts(certificate.leaning, FAR)
         if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
+    if outcome.under_load is not None:
+        print(outcome.under_load)
     if outcome.advice:
         print("\n  ".join(outcome.advice))
     ended(outcome.good, outcome.files)

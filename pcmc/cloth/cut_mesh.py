@@ -126,8 +126,10 @@ class CutMesh:
         X = np.concatenate([self.X, (at @ self.X[corners])[None]])
         return replace(self, X=X, F=F, source=source), len(self.X)
 
-    def with_seam(self, start: int, end: int, number: int, name: str) -> CutMesh:
-        """The mesh cut along a geodesic between two vertices of one piece; OptionError if there is none."""
+    def with_seam(self, start: int, end: int, number: int, name: str, faces: Bools | None = None) -> CutMesh:
+        """The mesh cut along a geodesic between two vertices of one piece; OptionError if there is none.
+
+        Where several pieces have both vertices it is one of those with ``faces`` (m,), if there is any."""
         if start == end:
             return self
         first, last = (np.flatnonzero(np.any(v == self.F, axis=1)) for v in (start, end))
@@ -136,6 +138,8 @@ class CutMesh:
             places = " to ".join(point_text(self.X[vertex]) for vertex in (start, end))
             text = f"{name}: from {places} it crosses another seam, a ridge or a cable; end it there"
             raise OptionError(text, what="seams", where=number)
+        if faces is not None and (wanted := np.isin(both, self.pieces.piece[faces])).any():
+            both = both[wanted]
         path, piece = self._geodesic(start, end, both)
         place, share = self._on_edges(path, piece)
         return self._along(place, share, path, number, name)

@@ -13,7 +13,7 @@ from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.guides import Plane
 from ..surface.pieces import point_text
 from ..surface.topology import joined
-from .cut_mesh import CutMesh, nearest_places
+from .cut_mesh import ON, CutMesh, nearest_places
 
 MEET = 0.25  # of a strip's width: ends of seams of two sheets so near to each other meet
 ANGLES = np.radians([0.0, 90.0, *range(1, 90), *range(91, 180)])  # in which the longer side is sought
@@ -106,7 +106,8 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: In
                 else:
                     mesh, vertex = mesh.with_vertex(point, mine)
                     vertices.append(vertex)
-            mesh = mesh.with_seam(vertices[0], vertices[1], number, f"a seam of {sheet.patch!r}")
+            mine = sheet_of_source[mesh.source] == sheet.number
+            mesh = mesh.with_seam(vertices[0], vertices[1], number, f"a seam of {sheet.patch!r}", mine)
             ends += [(sheet.number, vertex) for vertex in vertices]
             number += 1
     return mesh
@@ -115,7 +116,8 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: In
 def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
     """The mesh cut along lines, each of points (k,2) in the plan or (k,3), joined by geodesics.
 
-    An end within an edge's length of a cut or a rim is put there. OptionError for a point off the roof.
+    An end within an edge's length of a cut or a rim is put there. Of two sheets, one over the other, points
+    of the plan are on the upper one. OptionError for a point off the roof.
     """
     first = int(mesh.seam.max(initial=-1)) + 1
     for number, line in enumerate(lines):
@@ -123,21 +125,31 @@ def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
         for k, point in enumerate(line):
             mesh, vertex = _with_drawn(mesh, point, plane, k in (0, len(line) - 1), name)
             if k:
-                mesh = mesh.with_seam(previous, vertex, first + number, name)
+                middle = _seen(mesh, 0.5 * (point + line[k - 1]), plane)[1]
+                faces = mesh.pieces.piece == mesh.pieces.piece[middle]
+                mesh = mesh.with_seam(previous, vertex, first + number, name, faces)
             previous = vertex
     return mesh
 
 
-def _with_drawn(mesh: CutMesh, point: Floats, plane: Plane, end: bool, name: str) -> tuple[CutMesh, int]:
-    """The mesh with a vertex at a drawn point, and its number."""
+def _seen(mesh: CutMesh, point: Floats, plane: Plane) -> tuple[Floats, int, float]:
+    """(3,) the barycentric coordinates of the place nearest to a point of the plan or of space, its triangle,
+    the highest of several, and how far it is."""
     seen = mesh.X if len(point) == 3 else plane.to_local(mesh.X)[:, :2]
     weights, away = nearest_places(seen[mesh.F], point)
-    f = int(away.argmin())
+    height = np.einsum("mi,mi->m", weights, plane.height(mesh.X)[mesh.F])
+    f = int(np.where(away <= away.min() + ON * mesh.size, height, -np.inf).argmax())
+    return weights[f], f, float(away[f])
+
+
+def _with_drawn(mesh: CutMesh, point: Floats, plane: Plane, end: bool, name: str) -> tuple[CutMesh, int]:
+    """The mesh with a vertex at a drawn point, and its number."""
+    weights, f, away = _seen(mesh, point, plane)
     reach = float(segment_lengths(mesh.X, mesh.topology.edges[mesh.topology.edge_of_face[f]]).max())
-    if away[f] > reach:
-        text = f"{name}: its point {point_text(point)} is off the roof, {away[f]:.3g} from it; move it"
+    if away > reach:
+        text = f"{name}: its point {point_text(point)} is off the roof, {away:.3g} from it; move it"
         raise OptionError(text, what="seams", found=point.tolist())
-    place = weights[f] @ mesh.X[mesh.F[f]]
+    place = weights @ mesh.X[mesh.F[f]]
     if end:
         rim = mesh.topology.edges[mesh.cut_edge]
         gap = nearest_places(mesh.X[np.column_stack([rim, rim[:, 1]])], place)

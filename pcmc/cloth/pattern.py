@@ -16,6 +16,7 @@ from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.lagrange import expect_flat
+from ..surface.pieces import point_text
 from .cut_mesh import CutMesh, cut_mesh
 from .flattening import FOLDED, Flat
 from .layout import ClothSheet, sheet_axes, with_levels, with_lines
@@ -25,6 +26,8 @@ from .strips import CuttingPattern, Strip
 
 ACROSS = 4  # edges across the narrowest strip, about
 ROUNDS = 12  # in which levels are moved until every strip fits the cloth
+STUCK, SMALLER = 3, 0.95  # rounds after which the widest strip must be smaller by this part,
+TOO_WIDE = 1.1  # unless it is less than so much wider than the cloth
 FILL = 0.995  # of the cloth's width that strips are laid out for
 ROUNDING = 1e-9  # of a width
 MOST_STRAIN = 0.25  # of cloth: strips that need more are refused
@@ -84,17 +87,19 @@ def cutting_pattern_of(
         text = "surface: it has no roof to be cut: every patch is a wall"
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
     sheets, sheet_of_source = _sheets(surface, base, options)
-    for number in range(ROUNDS):
+    widest: list[float] = []
+    for _ in range(ROUNDS):
         mesh = with_levels(base, sheets, sheet_of_source)
         _refuse_closed(surface, mesh)
-        cloth = Cloth.of(surface, mesh, sheets, sheet_of_source)
+        cloth = Cloth.of(surface, mesh, sheets, sheet_of_source, options)
         flat = cloth.laid_flat()
-        moved = _moved_levels(cloth, flat, sheets, options, number)
+        moved = _moved_levels(cloth, flat, sheets, options, widest)
         if moved is None:
             break
         sheets = moved
-    flat = cloth.sewn(flat, [options.stretch(tension) for tension in cloth.tensions.tolist()])
-    return _pattern(surface, certificate, options, cloth, flat)
+    pairs = zip(cloth.tensions.tolist(), cloth.patches, strict=True)
+    stretches = [options.stretch(tension, surface.patches[patch].name) for tension, patch in pairs]
+    return _pattern(surface, certificate, options, cloth, cloth.sewn(flat, stretches), stretches)
 
 
 def _narrowest(surface: Surface, options: CuttingOptions) -> float:
@@ -148,25 +153,32 @@ def _refuse_closed(surface: Surface, mesh: CutMesh) -> None:
 
 
 def _moved_levels(
-    cloth: Cloth, flat: Flat, sheets: Sequence[ClothSheet], options: CuttingOptions, number: int
+    cloth: Cloth, flat: Flat, sheets: Sequence[ClothSheet], options: CuttingOptions, widest: list[float]
 ) -> list[ClothSheet] | None:
     """Sheets with levels between which strips are equally wide, more of them where they were too wide.
 
     None where all fit: then the levels may stay as they are. OptionError for a strip that will not fit.
+    ``widest`` are the widths of the widest strips of the rounds before; that of this one is added.
     """
+    number = len(widest)
     net, strips = options.net_width, cloth.strip_of_vertex
     widths = np.array([np.ptp(flat.points[strips == k, 1]) for k in range(len(cloth.sheet))])
     if net is not None:
         most = np.where(cloth.sheet < 0, net * (1.0 + ROUNDING), FILL * net)
         wide = np.flatnonzero(widths > most)
-        if (cloth.sheet[wide] < 0).any() or (len(wide) and number == ROUNDS - 1):
+        widest.append(float(widths[wide].max(initial=0.0)))
+        stuck = number > STUCK and widest[-1] > max(TOO_WIDE * net, SMALLER * widest[-1 - STUCK])
+        if (cloth.sheet[wide] < 0).any() or (len(wide) and number == ROUNDS - 1) or stuck:
             k = int(wide[np.lexsort((-widths[wide], cloth.sheet[wide]))[0]])
-            patch = cloth.surface.patch_of_face[cloth.mesh.source[cloth.strip_of_face == k][0]]
-            text = f"width: a strip of {cloth.surface.patches[patch].name!r} is {widths[k]:.4g} wide"
-            text += f", and {net:.4g} is there between allowances; draw seams in it"
+            name = cloth.surface.patches[cloth.patches[k]].name
+            around = point_text(cloth.mesh.X[cloth.mesh.F[cloth.strip_of_face == k]].mean(axis=(0, 1)))
+            text = f"width: a strip of {name!r} around {around} is {widths[k]:.4g} wide,"
+            text += f" and {net:.4g} is there between allowances; draw seams in it"
             raise OptionError(text, what="width", found=options.width)
-    elif number == 2:
-        return None
+    else:
+        widest.append(0.0)
+        if number == 2:
+            return None
     rim = cloth.seam_of_edge[cloth.sides.edge] < 0  # its middle tells a strip's levels: seams bulge over them
     place, strip = cloth.mesh.X[cloth.mesh.topology.edges[cloth.sides.edge[rim]]], cloth.sides.strip[rim]
     count_of = np.maximum(np.bincount(strip, minlength=len(widths)), 1)
@@ -192,7 +204,12 @@ def _moved_levels(
 
 
 def _pattern(
-    surface: Surface, certificate: Certificate, options: CuttingOptions, cloth: Cloth, flat: Flat
+    surface: Surface,
+    certificate: Certificate,
+    options: CuttingOptions,
+    cloth: Cloth,
+    flat: Flat,
+    stretches: Sequence[tuple[float, float]],
 ) -> CuttingPattern:
     """The strips and seams of a cloth laid flat."""
     mesh, sides = cloth.mesh, cloth.sides
@@ -202,15 +219,14 @@ def _pattern(
         mine = np.flatnonzero(cloth.strip_of_face == k)
         used = np.flatnonzero(cloth.strip_of_vertex == k)
         local[used] = np.arange(len(used))
-        source = mesh.source[mine]
         strip = Strip(
             number=k + 1,
-            patch=surface.patches[surface.patch_of_face[source[0]]].name,
+            patch=surface.patches[cloth.patches[k]].name,
             faces=local[mesh.pieces.faces[mine]],
-            source=source,
+            source=mesh.source[mine],
             roof=cloth.X[used],
             flat=flat.points[used],
-            stretch=options.stretch(float(cloth.tensions[k])),
+            stretch=stretches[k],
             strain=flat.strain[mine],
             outlines=loops(local, sides, sides.strip == k),
         )

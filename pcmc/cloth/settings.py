@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..base.errors import OptionError
 from ..surface import Surface
 
 LARGEST_COMPENSATION = 20.0  # percent
+BY_PATCH = ("strips", "direction", "stiffness", "poisson")  # keys that may be tables
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,11 @@ class CuttingOptions:
     direction : of the warp in the plan, degrees from x, or a table by patch; by default along the longer side
         of each sheet.
     compensation : [warp, weft], percent by which the cloth is cut shorter than it is on the roof.
-    stiffness : [warp, weft] of the cloth, force per length (E t), from which the compensation follows: the
-        tension of the patch stretches the cloth back.
-    poisson : contraction of the weft where only the warp is pulled, 0 ≤ ν < 1; with ``stiffness``.
+    stiffness : [warp, weft] of the cloth, force per length (E t), or a table by patch, from which the
+        compensation follows: the tension of the patch stretches the cloth back. In a project it is by
+        default that of [structure].
+    poisson : contraction of the weft where only the warp is pulled, 0 ≤ ν < 1, or a table by patch; with
+        ``stiffness``; by default 0.3.
     allowance : cloth added outside of seams, length.
     hem : cloth added at rims, where no other strip follows, length; by default ``allowance``.
     notches : distance of the marks along seams, length; 0 for none; by default the mean width.
@@ -44,8 +47,10 @@ class CuttingOptions:
         default=None, metadata={"kind": "a number or a table"}
     )
     compensation: Sequence[float] | None = field(default=None, metadata={"kind": "two numbers"})
-    stiffness: Sequence[float] | None = field(default=None, metadata={"kind": "two numbers"})
-    poisson: float = 0.3
+    stiffness: Sequence[float] | Mapping[str, Sequence[float]] | None = field(
+        default=None, metadata={"kind": "two numbers or a table"}
+    )
+    poisson: float | Mapping[str, float] = field(default=0.3, metadata={"kind": "a number or a table"})
     allowance: float = 0.0
     hem: float | None = None
     notches: float | None = None
@@ -60,24 +65,24 @@ class CuttingOptions:
                 "a cutting pattern needs the width of the cloth, a number of strips, or seams; give --width"
             )
             raise OptionError(f"{text} or the key width of [pattern]", what="width")
-        counts = self.strips.values() if isinstance(self.strips, Mapping) else [self.strips]
-        for count in counts if self.strips is not None else ():
+        for count in _each(self.strips):
             validate.integer("strips", count, least=1)
-        angles = self.direction.values() if isinstance(self.direction, Mapping) else [self.direction]
-        for angle in angles if self.direction is not None else ():
+        for angle in _each(self.direction):
             validate.number("direction", angle)
         for name in ("allowance", "hem", "notches"):
             if getattr(self, name) is not None:
                 validate.number(name, getattr(self, name), least=0.0)
-        validate.number("poisson", self.poisson, least=0.0, below=1.0)
+        for ratio in _each(self.poisson):
+            validate.number("poisson", ratio, least=0.0, below=1.0)
         self.lines  # noqa: B018 — refuses lines that are none
         if self.compensation is not None and self.stiffness is not None:
             text = "stiffness: the compensation is given; leave out one of both"
             raise OptionError(text, what="stiffness")
         for percent in _pair("compensation", self.compensation):
             validate.number("compensation", percent, least=-LARGEST_COMPENSATION, most=LARGEST_COMPENSATION)
-        for stiffness in _pair("stiffness", self.stiffness):
-            validate.positive("stiffness", stiffness)
+        for given in _each(self.stiffness):
+            for stiffness in _pair("stiffness", given):
+                validate.positive("stiffness", stiffness)
         if self.width is not None and self.net_width is not None and self.net_width <= 0.0:
             text = f"width: {self.width:g} leaves no cloth between two allowances of {self.allowance:g}"
             raise OptionError(text, what="width", found=self.width)
@@ -115,18 +120,18 @@ class CuttingOptions:
     def check(self, surface: Surface) -> None:
         """Refuse names of patches that the roof does not have, before it is solved."""
         names = [patch.name for patch in surface.patches]
-        for key in ("strips", "direction"):
+        for key in BY_PATCH:
             given = getattr(self, key)
             for name in given if isinstance(given, Mapping) else ():
                 validate.choice(f"patch in {key}", name, names)
 
     def of_patch(self, key: str, name: str) -> Any:
-        """The number of strips or the direction for a patch; None where there is none."""
+        """The value of a key of ``BY_PATCH`` for a patch; None where there is none."""
         given = getattr(self, key)
         return given.get(name) if isinstance(given, Mapping) else given
 
-    def stretch(self, tension: float) -> tuple[float, float]:
-        """Cut length over length on the roof, along warp and weft, under a tension, force/length.
+    def stretch(self, tension: float, patch: str = "") -> tuple[float, float]:
+        """Cut length over length on the roof of a patch, along warp and weft, under a tension, force/length.
 
         With the stiffnesses S and T of warp and weft, the strains of the cloth are α (1 - ν) / S and
         α (1 / T - ν / S), as the contraction of the one is that of the other times T / S.
@@ -137,12 +142,17 @@ class CuttingOptions:
         >>> CuttingOptions(width=2.0, compensation=(0.5, 2.0)).stretch(4.0)
         (0.995, 0.98)
         """
-        if self.stiffness is not None:
-            warp, weft = self.stiffness
-            strains = tension * (1.0 - self.poisson) / warp, tension * (1.0 / weft - self.poisson / warp)
+        if (stiffness := self.of_patch("stiffness", patch)) is not None:
+            (warp, weft), poisson = stiffness, self.of_patch("poisson", patch)
+            strains = tension * (1.0 - poisson) / warp, tension * (1.0 / weft - poisson / warp)
             return 1.0 / (1.0 + strains[0]), 1.0 / (1.0 + strains[1])
         warp, weft = self.compensation or (0.0, 0.0)
         return 1.0 - warp / 100.0, 1.0 - weft / 100.0
+
+
+def _each(given: Any) -> Collection[Any]:
+    """The values of a key that may be a table by patch."""
+    return () if given is None else given.values() if isinstance(given, Mapping) else [given]
 
 
 def _pair(name: str, given: object) -> Sequence[Any]:

@@ -15,7 +15,8 @@ from ..surface import Surface
 from ..surface.geometry import face_areas
 from .cut_mesh import CutMesh
 from .flattening import Flat, SewnEdges, flattened
-from .layout import ClothSheet
+from .layout import ClothSheet, sheet_axes
+from .settings import CuttingOptions
 from .strips import Seam, Side
 
 KINDS = ("seam", "junction", "rim")  # in the order of their numbers
@@ -42,7 +43,12 @@ class Cloth:
 
     @classmethod
     def of(
-        cls, surface: Surface, mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: Ints
+        cls,
+        surface: Surface,
+        mesh: CutMesh,
+        sheets: Sequence[ClothSheet],
+        sheet_of_source: Ints,
+        options: CuttingOptions,
     ) -> Cloth:
         """Strips in the order of their patches, then of their places across the sheet."""
         piece = mesh.pieces.piece
@@ -58,7 +64,11 @@ class Cloth:
         order = np.lexsort((place.round(9), sheet, surface.patch_of_face[mesh.source[first]]))
         rank = np.empty(count, dtype=np.int64)
         rank[order] = np.arange(count)
-        along = [sheets[s].along if s >= 0 else None for s in sheet[order].tolist()]
+        along: list[Floats | None] = [sheets[s].along if s >= 0 else None for s in sheet[order].tolist()]
+        for k in np.flatnonzero(sheet[order] < 0).tolist():  # beside drawn seams
+            name = surface.patches[surface.patch_of_face[mesh.source[first[order[k]]]]].name
+            if (degrees := options.of_patch("direction", name)) is not None:
+                along[k] = sheet_axes(mesh.X[mesh.F[piece == order[k]]], surface.plane, degrees)[0]
         return cls(surface, mesh, rank[piece], sheet[order], along)
 
     @cached_array
@@ -72,6 +82,13 @@ class Cloth:
     def X(self) -> Floats:
         """(u,3) places of the vertices of pieces on the roof."""
         return self.mesh.X[self.mesh.pieces.vertex]
+
+    @cached_array
+    def patches(self) -> Ints:
+        """(k,) the patch of each strip."""
+        patch = np.empty(len(self.sheet), dtype=np.int64)
+        patch[self.strip_of_face] = self.surface.patch_of_face[self.mesh.source]
+        return patch
 
     @cached_array
     def tensions(self) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,12 +21,14 @@ from ..drawings.drawing_set import DECIMALS
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import SheetLine, Text, add_frames, table_sheets
 from ..drawings.views import DrawnView, placed
+from ..surface.geometry import cross_2d
 from .strips import CuttingPattern, Seam, Side, Strip
 
 SUFFIXES = (*DRAWINGS, ".csv")
 LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "rim": "PCMC-RIM"}
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
+MITRE = 3.0  # of an allowance: farther from its corner cloth is cut across
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
 
@@ -58,10 +60,9 @@ def pattern_drawings(
     """
     length = expect_length(as_units(units).length, "a cutting pattern")
     millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
-    curves = [SheetLine(seam.points, LAYER_OF[seam.kind], name=f"S{seam.number}") for seam in pattern.seams]
-    middles = [strip.areas @ strip.roof[strip.faces].mean(axis=1) / strip.area for strip in pattern.strips]
+    curves, middles = _curves(pattern), _middles(pattern)
     size = sheet, millimetres, None, decimals
-    sheets = [placed([_roof_view(pattern, curves, middles)], "Seams on the roof", *size)]
+    sheets = [seam_sheet(pattern, *size)]
     for first in range(0, len(pattern.strips), PER_SHEET):
         group = pattern.strips[first : first + PER_SHEET]
         title = f"Strips {group[0].number} to {group[-1].number}, outside up"
@@ -116,14 +117,28 @@ def _texts(table: pd.DataFrame, decimals: int, *lengths: str) -> pd.DataFrame:
     return table.assign(**{key: [f"{x:.{decimals}f}" for x in table[key]] for key in lengths})
 
 
-def _roof_view(pattern: CuttingPattern, curves: list[SheetLine], middles: list[Floats]) -> DrawnView:
+def _curves(pattern: CuttingPattern) -> list[SheetLine]:
+    """The seams on the roof."""
+    return [SheetLine(seam.points, LAYER_OF[seam.kind], name=f"S{seam.number}") for seam in pattern.seams]
+
+
+def _middles(pattern: CuttingPattern) -> list[Floats]:
+    """(3,) the middle of each strip on the roof."""
+    return [strip.areas @ strip.roof[strip.faces].mean(axis=1) / strip.area for strip in pattern.strips]
+
+
+def seam_sheet(
+    pattern: CuttingPattern, sheet: str, millimetres: float, scale: int | None = None, decimals: int = 3
+) -> Sheet:
     """The seams from above, with the numbers of strips, and the places of corners along both axes."""
     axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
-    lines = [curve._replace(points=curve.points @ axes.T) for curve in curves]
-    texts = [(at @ axes.T, str(s.number), nowhere) for s, at in zip(pattern.strips, middles, strict=True)]
+    lines = [curve._replace(points=curve.points @ axes.T) for curve in _curves(pattern)]
+    middles = zip(pattern.strips, _middles(pattern), strict=True)
+    texts = [(at @ axes.T, str(strip.number), nowhere) for strip, at in middles]
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
-    return DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
+    view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
+    return placed([view], "Seams on the roof", sheet, millimetres, scale, decimals)
 
 
 def _strip_view(pattern: CuttingPattern, strip: Strip) -> DrawnView:
@@ -145,9 +160,7 @@ def _inside(strip: Strip) -> Floats:
 def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine], list[StripLabel]]:
     """What is drawn of a strip in its own coordinates, in the unit of the surface: the line to cut along, the
     seam lines, notches and the arrow of the warp; and the labels of its sides: seam and neighbour."""
-    shapely = load_library("shapely", "cloth")
-    options = pattern.options
-    cloth = shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])
+    options, added = pattern.options, dict[tuple[int, int], float]()
     net = [SheetLine(strip.cut[loop], "PCMC-SEAM", True) for loop in strip.outlines]
     marks: list[SheetLine] = []
     labels = []
@@ -155,24 +168,47 @@ def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine],
     if step is None:
         step = float(np.mean([s.width for s in pattern.strips]))
     for seam in pattern.seams:
-        added = options.rim_allowance if seam.kind == "rim" else options.allowance
+        beyond = options.rim_allowance if seam.kind == "rim" else options.allowance
         for side in seam.sides:
             if side.strip != strip.number:
                 continue
-            path = np.concatenate([strip.cut[side.edges[:, 0]], strip.cut[side.edges[-1:, 1]]])
-            if added > 0.0:
-                around = shapely.LineString(path).buffer(added, cap_style="square", join_style="mitre")
-                cloth = cloth.union(around)
+            edges = side.edges if side.forward else side.edges[:, ::-1]
+            added |= dict.fromkeys(map(tuple, edges.tolist()), beyond)
             places = _notches(seam, step) if seam.kind != "rim" and step > 0.0 else np.empty(0)
-            length = added or 0.02 * strip.width
+            length = beyond or 0.02 * strip.width
             for at, inward in (_along(seam, side, strip, place) for place in places):
                 marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
             at, inward = _along(seam, side, strip, 0.5 * seam.length)
             others = "+".join(str(s.strip) for s in seam.sides if s is not side)
             labels.append(StripLabel(at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
+    cloth = _with_allowances(strip, added)
     shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []
     cut = [SheetLine(np.array(ring.coords[:-1]), "PCMC-CUT", True) for ring in shapes]
     return [*cut, *net, *marks, *_arrow(strip)], labels
+
+
+def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
+    """The polygon of a strip with the cloth added outside each edge of its outline; in corners up to where
+    the lines outside meet, or across where that is farther than ``MITRE`` of the larger allowance."""
+    shapely = load_library("shapely", "cloth")
+    parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
+    for loop in strip.outlines:
+        X, onward = strip.cut[loop], np.roll(strip.cut[loop], -1, axis=0)
+        along = onward - X
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        out = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        wide = np.array([added[ends] for ends in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)])
+        out *= wide[:, None]
+        turns = cross_2d(np.roll(along, 1, axis=0), along)
+        parts += [shapely.Polygon([a, a + n, b + n, b]) for a, b, n in zip(X, onward, out, strict=True)]
+        for k in np.flatnonzero((turns > 1e-9) & (wide + np.roll(wide, 1) > 0.0)).tolist():
+            before, v = along[k - 1], X[k]
+            reach = (wide[k] - wide[k - 1] * float(before @ along[k])) / turns[k]
+            tip = out[k - 1] + reach * before
+            good = reach >= 0.0 >= tip @ along[k] and np.linalg.norm(tip) <= MITRE * max(wide[k - 1], wide[k])
+            tips = [v + tip] if good else []
+            parts.append(shapely.Polygon([v, v + out[k - 1], *tips, v + out[k]]))
+    return shapely.union_all(parts)
 
 
 def _notches(seam: Seam, step: float) -> Floats:

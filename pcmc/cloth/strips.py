@@ -201,6 +201,9 @@ class CuttingPattern:
                 f"{self.largest_difference:.1g} of the length",
             ),
         ]
+        if table[["warp", "weft"]].to_numpy().any():
+            shorter = [f"{table[way].min():.3g} to {table[way].max():.3g} %" for way in ("warp", "weft")]
+            rows.append(("cut shorter", f"by {shorter[0]} along the warp, {shorter[1]} along the weft"))
         if units:
             rows.insert(0, ("units", units.sentence))
         if not self.certificate.certified:

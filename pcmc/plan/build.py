@@ -40,6 +40,8 @@ GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in
 
 def build_surface(plan: Plan) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
+    if plan.cushion is not None:
+        _check_cushion(plan)
     draft = drafted(plan)
     mesh, drawn = draft.mesh, draft.drawn
     fixed, sliding = _supports(draft)
@@ -88,7 +90,62 @@ def build_surface(plan: Plan) -> Surface:
             raise
         problem += "; give the dividers around it walls, or make its patches one room with those beside them"
         raise PlanError(problem, what="rooms", where=error.where, found=error.found) from None
-    return surface
+    return surface if plan.cushion is None else _with_sheet_below(surface, plan.cushion)
+
+
+def _check_cushion(plan: Plan) -> None:
+    """Refuse what two sheets on one rim cannot have."""
+    edges = {"the outline": plan.edge} | {hole.name: hole.edge for hole in plan.holes}
+    bad = [f"{name} is {edge!r}, expected 'fixed'" for name, edge in edges.items() if edge != "fixed"]
+    bad += [f"{d.name} has a wall; give it wall = false" for d in plan.dividers if d.wall is not None]
+    bad += [f"{d.name} has a cable; leave it out" for d in plan.dividers if d.cable is not None]
+    bad += [f"leave out {key}" for key in ("cables", "rooms", "supports") if getattr(plan, key)]
+    bad += [f"patch {p.name!r} needs a pressure above 0, not a volume" for p in plan.patches if p.volume]
+    bad += [f"patch {p.name!r} needs a pressure above 0" for p in plan.patches if p.pressure <= 0.0]
+    if bad or (not plan.patches and plan.pressure <= 0.0):
+        text = f"cushion: its sheets meet at a fixed rim, {bad[0] if bad else 'and need a pressure above 0'}"
+        raise PlanError(text, what="cushion", found=plan.cushion)
+
+
+def _with_sheet_below(surface: Surface, factor: float) -> Surface:
+    """The surface and its mirror image in Π, turned over and held at the same fixed vertices; there patches
+    have ``factor`` times the tension, and no snow."""
+    n, normal, faces = surface.n, np.array(surface.plane.normal), _without_ears(surface)
+    number = np.where(surface.fixed, np.arange(n), n + np.cumsum(~surface.fixed) - 1)
+    inner = ~surface.fixed
+    free = surface.vertices[inner]
+    image = free - 2.0 * surface.plane.height(free)[:, None] * normal
+    below = [
+        replace(patch, name=f"{patch.name} below", tension=factor * patch.tension, snow=0.0)
+        for patch in surface.patches
+    ]
+    return Surface(
+        np.concatenate([surface.vertices, image]),
+        np.concatenate([faces, number[faces][:, ::-1]]),
+        np.concatenate([surface.patch_of_face, surface.patch_of_face + len(surface.patches)]),
+        (*surface.patches, *below),
+        np.concatenate([surface.fixed, np.zeros(len(free), dtype=bool)]),
+        plane=surface.plane,
+        on_planes=tuple((plane, np.concatenate([on, on[inner]])) for plane, on in surface.on_planes),
+        curves=surface.curves,
+    )
+
+
+def _without_ears(surface: Surface) -> Ints:
+    """(m,3) the faces, none with three fixed corners: the edge opposite a corner of the rim is flipped, as
+    both sheets of a cushion would have that triangle."""
+    F, topo = surface.faces.astype(np.int64), surface.topology
+    for f in np.flatnonzero(surface.fixed[F].all(axis=1)).tolist():
+        inner = np.flatnonzero(topo.valence[topo.edge_of_face[f]] == 2)
+        beside = np.flatnonzero((topo.edge_of_face == topo.edge_of_face[f, inner[0]]).any(axis=1))
+        g = int(beside[beside != f][0])
+        b, a, c = np.roll(F[f], -int(inner[0]))
+        d = int(F[g].sum() - a - c)
+        if len(inner) > 1 or surface.fixed[d] or surface.patch_of_face[f] != surface.patch_of_face[g]:
+            text = "cushion: a triangle has all corners on the rim; use a smaller edge_length"
+            raise PlanError(text, what="edge_length", where=surface.vertices[b].round(3).tolist())
+        F[f], F[g] = (b, a, d), (b, d, c)
+    return F
 
 
 def _supports(draft: Draft) -> tuple[Bools, Bools]:

@@ -66,6 +66,9 @@ class Plan:
         symmetric roof, or a quarter, and goes on behind these edges as its mirror image.
     rooms : rooms under several patches whose volume is given, instead of their pressure: by name, their
         ``patches`` and ``volume``. For a room under one patch give that patch a ``volume``.
+    cushion : a factor: there is a second sheet below, held at the same rim, which has the pressure of the
+        first one and its tension times this factor; 1 for its mirror image in Π, more for a flatter sheet.
+        Each patch NAME has one there called "NAME below".
 
     Raises
     ------
@@ -116,6 +119,7 @@ class Plan:
     mirrors: Sequence[Any] = field(default=(), metadata=CURVES)
     rooms: Any = field(default=(), metadata={"kind": "a table"})
     points: Any = field(default_factory=dict, metadata={"kind": "a table"})
+    cushion: float | None = None
 
     def __post_init__(self) -> None:
         for key in parts.MOST:
@@ -133,8 +137,9 @@ class Plan:
         for key in ("pressure", "weight", "snow"):
             validate.number(key, getattr(self, key))
         validate.positive("edge_length", self.edge_length)
-        if self.rise is not None:
-            validate.positive("rise", self.rise)
+        for key in ("rise", "cushion"):
+            if getattr(self, key) is not None:
+                validate.positive(key, getattr(self, key))
         if bool(self.patches) == (self.tension is not None):
             problem = "a plan needs either patches, each with its tension, or one tension= for all"
             raise OptionError(problem, what="tension")

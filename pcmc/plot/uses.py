@@ -84,7 +84,8 @@ def under_load(
         known = [values[np.isfinite(values)] for values in scalars]
         most = max((float(values.max()) for values in known if len(values)), default=1.0)
         look = {"label": f"least membrane force, {units.tension}; grey: slack", "limits": (0.0, most)}
-    titles = [c.name if c.carried else f"{c.name}, at {100.0 * c.share:.0f} % of it" for c in chosen]
+    parts = [(c.name, f"{100.0 * c.share:.0f} %", f"{100.0 * c.taut:.0f} %", c) for c in chosen]
+    titles = [n if c.carried else f"{n}, at {share} of it, slack from {taut}" for n, share, taut, c in parts]
     look |= {"edges": False, "supports": False, "titles": titles}
     look |= {"columns": 1} if len(chosen) == 1 else {}
     return panel([surface] * len(chosen), path, scalars=scalars, **(look | options))

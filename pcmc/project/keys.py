@@ -65,6 +65,7 @@ KINDS: dict[str, Schema] = {
     "a list of points": _list_of(_LIST),
     "a list of lines": _list_of(_LIST),
     "a number or a table": _any_of(_NUMBER, TABLE),
+    "two numbers or a table": _any_of(_list_of(_NUMBER) | {"minItems": 2, "maxItems": 2}, TABLE),
     "two numbers": _list_of(_NUMBER) | {"minItems": 2, "maxItems": 2},
     "a curve": _any_of(_LIST, TABLE),
     "a point [x, y, z]": _list_of(_NUMBER) | {"minItems": 3, "maxItems": 3},

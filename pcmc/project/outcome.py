@@ -17,7 +17,7 @@ from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
 from ..solvers.result import Progress, Result
 from ..surface import Surface, mirrored, unfolded
-from .settings import Output
+from .settings import Output, of_material
 
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
@@ -249,6 +249,7 @@ class Outcome:
             mesh_failure=self.mesh_failure,
             margins=self.margins,
             analysis=self.analysis(anyway),
+            pattern=None if (wanted := self.pattern_wanted) is None else self.cutting_pattern(wanted, anyway),
             theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
@@ -272,12 +273,21 @@ class Outcome:
         plan = None if self.project is None else self.project.plan
         return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
 
+    @property
+    def pattern_wanted(self) -> CuttingOptions | None:
+        """The cutting pattern that the project asks for."""
+        return None if self.project is None else self.project.pattern
+
     def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
-        """The cutting pattern of what is shown."""
+        """The cutting pattern of what is shown, of the cloth in [structure]; made once for [pattern]."""
         from ..cloth import cutting_pattern_of
 
         surface, certificate = self.shown
-        return cutting_pattern_of(surface, wanted, anyway, certificate)
+        project = self.project
+        cloth = of_material(wanted, None if project is None else project.structure, surface)
+        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
+        own = project is not None and wanted is project.pattern
+        return self._once("cutting pattern", cut) if own else cut()
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:
         """What is shown under load, found once by CalculiX; None where the project does not run it."""
@@ -287,6 +297,11 @@ class Outcome:
         from ..structure import analyse
 
         return self._once("analysis", lambda: analyse(self.model(structure, anyway), progress=progress))
+
+    @property
+    def under_load(self) -> Analysis | None:
+        """The analysis, if it was made."""
+        return cast("Analysis | None", self._known.get((self.unfold, "analysis")))
 
     @property
     def mesh_check(self) -> MeshCheck | None:

@@ -35,6 +35,7 @@ WHEN = ("before", "after")
 COLOURS = ("patches", "curvature", "error", "reactions")
 CSV, INP = ".csv", ".inp"
 SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
+SAME_WARP = 1.0  # degree: directions of [pattern] and [structure] that differ by less are one
 LISTS = ("files", "drawings", "pattern")  # keys of several files
 SECTION = TypeVar("SECTION")
 
@@ -238,8 +239,6 @@ class Output:
         if self.pattern and pattern is None:
             text = "a cutting pattern needs the width of the cloth; add [pattern] with width, strips or seams"
             raise OptionError(text, what="pattern", expected="a table")
-        if self.pattern and pattern is not None and structure is not None:
-            _refuse_another_cloth(pattern, structure)
         if self.report is not None:
             expect_length(units.length, "a report")
         if self.structure is not None and structure is None:
@@ -247,18 +246,39 @@ class Output:
             raise OptionError(text, what="structure", expected="a table")
 
 
-def _refuse_another_cloth(pattern: CuttingOptions, structure: Structure) -> None:
-    """Refuse a stiffness of the strips that is not that of the structural model: one roof has one cloth."""
-    young, thickness = structure.young, structure.thickness
-    if pattern.stiffness is None or young is None or not isinstance(thickness, int | float):
-        return
-    model = young * thickness, (structure.weft or young) * thickness, structure.poisson
-    strips = *pattern.stiffness, pattern.poisson
-    if not np.allclose(model, strips, rtol=1e-6, atol=0.0):
-        of_strips, of_model = (" and ".join(f"{x:g}" for x in one[:2]) for one in (strips, model))
-        text = f"stiffness: [pattern] has {of_strips} with poisson {strips[2]:g}, and young times thickness"
-        text += f" in [structure] gives {of_model} with poisson {model[2]:g}; make both the same cloth"
-        raise OptionError(text, what="stiffness", found=list(strips[:2]), expected=list(model[:2]))
+def of_material(pattern: CuttingOptions, structure: Structure | None, surface: Surface) -> CuttingOptions:
+    """The pattern with the stiffness of [structure], and its warp if that is a cloth, unless it has its own
+    compensation. Refuses another stiffness or another warp: one roof has one cloth."""
+    pattern.check(surface)
+    if structure is None or pattern.compensation is not None:
+        return pattern
+    values: dict[str, dict[str, Any]] = {key: {} for key in ("stiffness", "poisson", "direction")}
+    given, thicknesses = structure.materials(surface), structure.thicknesses(surface)
+    for patch in np.array(surface.patches, dtype=object)[surface.roof]:
+        name = patch.name
+        material = given[name] if isinstance(given, dict) else given
+        t = thicknesses[name] if isinstance(thicknesses, dict) else thicknesses
+        model = [material.young * t, (material.weft or material.young) * t]
+        values["stiffness"][name], values["poisson"][name] = model, material.poisson
+        own, poisson = pattern.of_patch("stiffness", name), pattern.of_patch("poisson", name)
+        both = [*model, material.poisson], [*(own or model), poisson]
+        if own is not None and not np.allclose(*both, rtol=1e-6, atol=0.0):
+            of_strips, of_model = (" and ".join(f"{x:g}" for x in one) for one in (own, model))
+            text = f"stiffness: [pattern] has {of_strips} with poisson {poisson:g}, and young times thickness"
+            text += f" in [structure] gives {of_model} with poisson {material.poisson:g}; make both the same"
+            raise OptionError(f"{text} cloth", what="stiffness", found=own, expected=model)
+        degrees, (x, y) = pattern.of_patch("direction", name), surface.plane.axes[:2] @ material.warp
+        if material.cloth and np.hypot(x, y) > 0.0:
+            warp = float(np.degrees(np.arctan2(y, x)))
+            if degrees is not None and abs((degrees - warp + 90.0) % 180.0 - 90.0) > SAME_WARP:
+                text = f"direction: the warp of {name!r} lies at {degrees:g} degrees in [pattern], and at"
+                text += f" {warp:g} in [structure]; leave out direction, or change warp"
+                raise OptionError(text, what="direction", found=degrees, expected=warp)
+            degrees = warp if degrees is None else degrees
+        if degrees is not None:
+            values["direction"][name] = degrees
+    found: dict[str, Any] = {key: value for key, value in values.items() if value}
+    return replace(pattern, **found)
 
 
 def schedule_paths(path: Path) -> list[Path]:

@@ -26,7 +26,7 @@ from . import cache
 from .checking import in_file
 from .file import Project, load
 from .outcome import EXTENSIVE, OnStep, Outcome, ignore
-from .settings import AccuracyWanted
+from .settings import AccuracyWanted, of_material
 from .start import start_of
 from .writing import check_outputs, project_files, write_all
 
@@ -220,8 +220,8 @@ def _check_wishes(project: Project, surface: Surface) -> None:
             structure.check(surface, project.plan)
         if structure is not None and structure.run and (output.structure or output.report):
             expect_program()
-        if project.pattern is not None and output.pattern:
-            project.pattern.check(surface)
+        if project.pattern is not None and (output.pattern or output.report):
+            of_material(project.pattern, structure, surface)
         if project.margin:
             from ..margins.varied import Varied  # takes long to import
 

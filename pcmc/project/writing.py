@@ -60,7 +60,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         analysis = outcome.analysis(anyway, progress) if output.structure or output.report else None
         if output.structure is not None and analysis is not None:
             add("under load", analysis_jobs(Path(output.structure), analysis))
-        if output.pattern and project.pattern is not None:
+        if project.pattern is not None and (output.pattern or output.report):
             progress("cutting strips")
             pattern = outcome.cutting_pattern(project.pattern, anyway)
             jobs = pattern_files(pattern, output.pattern, outcome.units, output.sheet, outcome.name)

@@ -22,6 +22,7 @@ from ..plot import draw, families, reactions
 from ..plot.figure import png
 from ..surface import Surface, expect_surface
 from . import tables
+from .cutting import cutting
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
 from .under_load import chapter
@@ -31,6 +32,7 @@ SUFFIXES = (".pdf",)
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..cloth import CuttingPattern
     from ..structure import Analysis
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
@@ -55,6 +57,7 @@ class RoofReport:
     targets: pd.DataFrame | None = None
     margins: Sequence[Statement] = ()
     analysis: Analysis | None = None
+    pattern: CuttingPattern | None = None
     files: Mapping[str, str] = field(default_factory=dict)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -113,6 +116,8 @@ class RoofReport:
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
             yield from chapter(self.analysis, units)
+        if self.pattern is not None:
+            yield from cutting(self.pattern, units)
         if self.schedule is not None:
             yield Heading("Panels", new_page=True)
             yield panel_text(self.schedule, units)
@@ -147,7 +152,7 @@ def roof_report(
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
         of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``;
-        ``files``, the name of each file and what it is.
+        ``pattern``, of ``pcmc.cutting_pattern``; ``files``, the name of each file and what it is.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,11 +49,16 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
         labels = [(f"J{k}", at, "PCMC-RIDGE") for k, at in enumerate(middles, start=1)] + labels
     names = [Text(factor * at + shift, name, layer=layer, align="C") for name, at, layer in labels]
     texts += place_labels(names, texts)
+    return on_paper(sheet.scale, lines, texts)
+
+
+def on_paper(scale: str, lines: Sequence[SheetLine], texts: Sequence[Text]) -> PaperPlan:
+    """Lines and texts of a sheet with no paper around them."""
     boxes = np.array([*(box(text) for text in texts), *([p.min(axis=0), p.max(axis=0)] for p, *_ in lines)])
     corner, top = boxes[:, 0].min(axis=0) - AROUND, boxes[:, 1].max(axis=0) + AROUND
     width, height = map(float, top - corner)
     return PaperPlan(
-        sheet.scale,
+        scale,
         [line._replace(points=line.points - corner) for line in lines],
         [text._replace(at=text.at - corner) for text in texts],
         (width, height),

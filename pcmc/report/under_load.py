@@ -19,7 +19,7 @@ ABOUT = (
     "project. Deflections are along the normal of the plane. Forces of the membrane are principal stresses "
     "times the thickness; where the least of them is not above 0 the membrane is slack and wrinkles. A share "
     "below 100 % is the part of the loads up to which CalculiX finds an equilibrium, taut that up to which "
-    "nothing is slack."
+    "nothing is slack. Beyond it the share depends on the mesh; taut hardly does."
 )
 
 

@@ -29,6 +29,7 @@ NOWHERE = 1e-9  # of the size: a smaller coordinate is 0
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
+MESH = "beyond the first slack part a share depends on the mesh; the share before that hardly does"
 OnCase = Callable[[str], object]  # called with a few words before each case
 
 
@@ -220,6 +221,8 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
+        if any(case.taut < case.share < 1.0 for case in self.cases):
+            lines.append(MESH)
         if self.remedy:
             factor = f"{self.remedy:.3g} times as large"
             lines.append(

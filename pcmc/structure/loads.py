@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Bools, Floats
@@ -64,7 +65,7 @@ class Snow:
     """
 
     load: float  # s, force per area of the plan; negative for a lift
-    patches: Sequence[str] = ()  # names of those that carry it; by default all that are not walls
+    patches: Sequence[str] = ()  # names of those that carry it; by default all ``in_the_open``
     name: str = "snow"  # of its step
     slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies where the slope is between these
     area: Sequence[Sequence[float]] = ()  # points [x, y]: it lies within their polygon; empty: everywhere
@@ -84,7 +85,7 @@ class Snow:
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
         """A third of each triangle's load at each of its corners; triangles below others carry none."""
         named = [surface.patch_index(name) for name in self.patches]
-        carrying = named or np.flatnonzero(surface.roof).tolist()
+        carrying = named or np.flatnonzero(in_the_open(surface)).tolist()
         if not carrying:
             hint = "all patches are walls; name those that carry snow"
             validate.refuse("Snow.patches", self.patches, "names of patches", hint=hint)
@@ -243,6 +244,33 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
         limits: dict[str, Any] = {"least": -1e3, "most": 1e3}
         checked[name] = {c: validate.number("factor", f, where=c, **limits) for c, f in factors.items()}
     return checked
+
+
+def in_the_open(surface: Surface) -> Bools:
+    """(k,) the patches that are no walls and lie under no other sheet, as the lower one of a cushion does.
+
+    One lies under another if most of its triangles have, within their own size in the plan, the middle of a
+    triangle of that other one higher up.
+
+    >>> from pcmc import Patch
+    >>> X = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.6, 0.6, 1], [0.6, 0.6, -1]]
+    >>> faces = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]]
+    >>> sheets = [Patch("top", 1.0), Patch("bottom", 1.0)]
+    >>> in_the_open(Surface(X, faces, [0] * 3 + [1] * 3, sheets, fixed=range(3))).tolist()
+    [True, False]
+    """
+    P, patch_of = surface.plane.to_local(surface.vertices)[surface.faces], surface.patch_of_face
+    middle, reach = P.mean(axis=1), np.ptp(P, axis=1)[:, :2].max(axis=1)
+    found: Bools = surface.roof.copy()
+    trees = {k: cKDTree(middle[patch_of == k, :2]) for k in np.flatnonzero(surface.roof)}
+    for k in trees:
+        mine = patch_of == k
+        for other in trees.keys() - {k}:
+            away, nearest = trees[other].query(middle[mine, :2])
+            higher = middle[patch_of == other, 2][nearest] > middle[mine, 2]
+            if (higher & (away < 0.5 * reach[mine])).mean() > 0.5:
+                found[k] = False
+    return found
 
 
 def roof_slopes(surface: Surface) -> Floats:

@@ -13,7 +13,7 @@ from ..certificate import Certificate
 from ..plan import Plan
 from ..surface import Surface
 from .gas import Gas
-from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads
+from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
 from .material import Material
 from .member_keys import members_of
 from .members import lines_on
@@ -49,7 +49,7 @@ class Zone:
     case : the name of the case.
     snow : load per plan area, besides the snow that the form was found under.
     wind : pressure, above 0 for suction on a roof.
-    patches : that carry it; by default all that are not walls.
+    patches : that carry it; by default all that are no walls and under no other sheet.
     slopes : it acts where the slope is between these two, degrees.
     area : corners [x, y] of a polygon in the plan that it acts within; by default everywhere.
     slides : two slopes, degrees: snow is whole up to the first, none from the second on, linear between.
@@ -172,7 +172,7 @@ class Structure:
 
     def loads(self, roof: Sequence[str]) -> tuple[Load | tuple[Load, ...], ...]:
         """Self-weight, snow and wind, each in a step of its own, and the cases of the zones; ``roof`` are the
-        names of the patches that are not walls."""
+        names of the patches that wind acts on by default."""
         heavy = self.density > 0.0 or any(given.get("density", 0.0) for given in self.patches.values())
         weight = [SelfWeight(self.gravity)] if heavy else []
         snow = [Snow(self.snow)] if self.snow != 0.0 else []
@@ -185,7 +185,8 @@ class Structure:
 
     def loads_on(self, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
         """The loads on a surface."""
-        return self.loads([p.name for p, on in zip(surface.patches, surface.roof, strict=True) if on])
+        on = in_the_open(surface)
+        return self.loads([patch.name for patch, out in zip(surface.patches, on, strict=True) if out])
 
     def check(self, surface: Surface, plan: Plan | None = None) -> None:
         """Refuse values that name no patch, wall or cable of the surface, before it is solved."""

@@ -221,6 +221,22 @@ def test_cables_and_holes_are_cut_around():
     assert seams["strips"].tolist() == ["1 | 2", "2 | 3", "2 | 3", "3 | 4"]  # the middle one ends at the hole
 
 
+def test_both_sheets_of_a_cushion_are_cut():
+    """Each sheet has its own seams, though both end at the rim that they share; drawn in the plan, a seam is
+    on the upper one."""
+    cushion = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], edge_length=0.5, tension=1.5, cushion=1.5).surface()
+    cushion = solve(cushion).surface
+    pattern = cutting_pattern(cushion, strips=2)
+    assert pattern.table["patch"].tolist() == ["patch 1"] * 2 + ["patch 1 below"] * 2
+    assert pattern.table["area"].sum() == pytest.approx(sum(pattern.certificate.patches["area"]), rel=0.01)
+    middles = [seam.points[len(seam.points) // 2, 2] for seam in pattern.seams if seam.kind == "seam"]
+    assert np.sign(middles).tolist() == [1.0, -1.0]
+    drawn = cutting_pattern(cushion, seams=[[[0.0, 1.0], [4.0, 1.0]]], anyway=True)
+    (seam,) = [seam for seam in drawn.seams if seam.kind == "seam"]
+    assert seam.points[:, 2].max() > 0.2
+    assert drawn.table["patch"].tolist() == ["patch 1", "patch 1", "patch 1 below"]
+
+
 def test_a_cable_is_a_seam():
     corners = np.array([[0, 0, 0], [4, 0, 0], [8, 0, 0], [8, 4, 0], [4, 4, 0], [0, 4, 0.0]])
     faces = [[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4]]
@@ -252,7 +268,7 @@ def test_a_cable_is_a_seam():
         ),
         (
             {"seams": [[[-1.0, 0.0], [1.0, 0.0]]], "width": 0.5},
-            "a strip of 'cap' is 1.* wide",
+            "a strip of 'cap' around .* is 1.* wide",
         ),
         ({"strips": 2, "compensation": (1.0,)}, "compensation: expected two numbers"),
         ({"strips": 2, "compensation": (1.0, 50.0)}, "compensation: expected"),
@@ -276,6 +292,14 @@ def test_uncertified_and_closed_surfaces_are_refused():
     closed = Surface(corners, faces, [0] * 4, [Patch("bubble", 1.0)], fixed=range(4))
     with pytest.raises(SurfaceError, match="patch 'bubble' is closed, without a rim"):
         cutting_pattern(closed, width=1.0, anyway=True)
+
+
+def test_strips_beside_drawn_seams_take_the_direction_of_the_warp():
+    seams = [[[-1.0, 0.0], [1.0, 0.0]]]
+    along, across = (cutting_pattern(cap(), seams=seams, direction=angle) for angle in (0.0, 90.0))
+    for one, other in zip(along.strips, across.strips, strict=True):
+        assert one.length == pytest.approx(other.width, rel=0.01)
+        assert one.length > 1.5 * one.width
 
 
 def test_the_stretch_is_what_a_tension_undoes():

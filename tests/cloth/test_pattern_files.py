@@ -4,6 +4,7 @@ import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
+from printed import words_of
 from shapely import Point, Polygon
 
 from generators import joined_caps
@@ -12,6 +13,7 @@ from pcmc.base.errors import MissingExtra, OptionError, PcmcError
 from pcmc.cli import main
 from pcmc.cloth import pattern_drawings
 from pcmc.cloth.sheets import strip_lines
+from pcmc.plan import Plan
 from pcmc.plot import strains
 
 PROJECT = """
@@ -41,6 +43,7 @@ def test_allowances_surround_the_net_strip(pattern):
             by_layer["PCMC-SEAM"],
         )
         inner = Polygon(net.points)
+        assert outer.within(inner.buffer(3.0 * 0.15 + 1e-9))
         assert inner.area == pytest.approx(strip.cut_area)
         assert outer.contains(inner)
         ends = [line.points[1] for line in lines if line.layer == "PCMC-NOTCH"]
@@ -53,8 +56,20 @@ def test_allowances_surround_the_net_strip(pattern):
             for side in seam.sides
             if side.strip == strip.number
         )
-        assert outer.area - inner.area == pytest.approx(added, rel=0.15)  # and corners
+        assert outer.area - inner.area == pytest.approx(added, rel=0.05)  # and corners
         assert len(labels) == sum(side.strip == strip.number for s in pattern.seams for side in s.sides)
+
+
+def test_corners_of_allowances_are_where_the_lines_outside_meet():
+    """A rectangle with two seams and two rims: the cut line is the rectangle with its own allowance on each
+    side, without the ears of a wider hem beside a narrow seam."""
+    flat = Plan([[0, 0], [6, 0], [6, 2], [0, 2]], edge_length=1.0, tension=2.0, pressure=0.0).surface()
+    seams = [[[2, 0], [2, 2]], [[4, 0], [4, 2]]]
+    pattern = cutting_pattern(flat, seams=seams, allowance=0.05, hem=0.2, anyway=True)
+    middle = min(pattern.strips, key=lambda strip: abs(strip.roof[:, 0].mean() - 3.0))
+    (cut,) = (line.points for line in strip_lines(pattern, middle)[0] if line.layer == "PCMC-CUT")
+    assert np.sort(np.ptp(cut, axis=0)) == pytest.approx([2.1, 2.4])
+    assert Polygon(cut).area == pytest.approx(2.1 * 2.4)
 
 
 def test_notches_of_both_sides_lie_on_each_other(pattern):
@@ -126,6 +141,30 @@ def test_a_project_writes_its_pattern(tmp_path):
     assert table["area"].sum() == pytest.approx(sum(outcome.certificate.patches["area"][:2]), rel=0.01)
     seams = pd.read_csv(tmp_path / "cloth-seams.csv")
     assert seams["difference"].max() < 1e-6
+
+
+def test_the_cloth_of_the_structural_model_is_the_one_that_is_cut(tmp_path):
+    """Compensation and warp come from [structure], by patch; the report has a chapter."""
+    path = tmp_path / "hall.toml"
+    cloth = "weft = 3e5\nshear = 1e4\nwarp = [0, 1, 0]\n[structure.patches.east]\nthickness = 0.002\n"
+    text = PROJECT + "[structure]\nyoung = 6e5\nthickness = 0.001\n" + cloth + "[pattern]\nwidth = 1.5\n"
+    path.write_text(text + '[output]\npattern = ["cloth.csv"]\nreport = "hall.pdf"\n')
+    outcome = project.run(path)
+    table = pd.read_csv(tmp_path / "cloth.csv").groupby("patch")[["length", "warp", "weft"]].mean()
+    strain = 6.0 * 0.7 / 600.0, 6.0 * (1.0 / 300.0 - 0.3 / 600.0)
+    for name, part in (("west", 1.0), ("east", 0.5)):
+        expected = [100.0 * (1.0 - 1.0 / (1.0 + part * one)) for one in strain]
+        assert table.loc[name, ["warp", "weft"]].to_numpy() == pytest.approx(expected, rel=1e-6)
+    assert table["length"].min() > 2.0  # along y, as the warp
+    pattern = outcome.cutting_pattern(outcome.project.pattern)
+    assert pattern is outcome.cutting_pattern(outcome.project.pattern)
+    assert "cut shorter  by 0.3" in str(pattern)
+    words = " ".join(words_of(tmp_path / "hall.pdf"))
+    assert "Cutting pattern, scale 1:" in words
+    assert f"{len(pattern.strips)} strips of" in words
+    path.write_text(text + 'direction = 0.0\n[output]\npattern = ["cloth.csv"]\n')
+    with pytest.raises(OptionError, match=r"warp of 'west' lies at 0 degrees in \[pattern\], and at 90"):
+        project.run(path)
 
 
 def test_the_command_cuts_a_project(tmp_path, capsys):

@@ -5,8 +5,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from pcmc import Plane, Surface, Verdict, solve
-from pcmc.base.errors import PlanWarning
+from pcmc import Plane, Surface, Verdict, certify, solve
+from pcmc.base.errors import PlanError, PlanWarning
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
@@ -300,3 +300,43 @@ def test_twenty_thousand_triangles():
     surface = plan_from({**tomllib.loads(L_WITH_COURTYARD), "edge_length": 0.2}).surface()
     assert surface.m > 20_000
     assert minimum_angle(surface) > 20.0
+
+
+def test_a_cushion_is_two_caps():
+    """Over a circle, of the radii 2α/p, to the second order in the edge."""
+    circle, off = {"circle": {"centre": [0, 0], "radius": 3.0}}, []
+    for edge in (0.8, 0.4):
+        roof = solve(Plan(circle, edge_length=edge, tension=2.0, cushion=1.5).surface()).surface
+        x, y, z = roof.vertices[~roof.fixed].T
+        radius = np.where(z > 0.0, 4.0, 6.0)
+        cap = np.sqrt(radius**2 - x**2 - y**2) - np.sqrt(radius**2 - 9.0)
+        off.append(np.sqrt(np.mean((np.abs(z) - cap) ** 2)))
+    assert [patch.name for patch in roof.patches] == ["patch 1", "patch 1 below"]
+    assert certify(roof).certified
+    assert off[1] < 0.01
+    assert np.log2(off[0] / off[1]) > 1.7
+    mirrors = [[[0, 0], [4, 0]], [[0, 0], [0, 3]]]
+    box = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], edge_length=0.5, tension=6.0, cushion=1.0, mirrors=mirrors)
+    quarter = box.surface()
+    for plane, on in quarter.on_planes:
+        assert np.abs(plane.height(quarter.vertices[on])).max() < 1e-12
+        assert (quarter.vertices[on, 2] < -1e-6).any()
+    assert solve(quarter).converged
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"edge": "sliding"},
+        {"dividers": [[[4, 0], [4, 3]]]},
+        {"pressure": 0.0},
+        {"supports": [[2, 1]]},
+    ],
+)
+def test_a_cushion_needs_a_fixed_rim_and_air(more):
+    plan = Plan(
+        [[0, 0], [8, 0], [8, 3], [0, 3]], **{"edge_length": 0.5, "tension": 2.0, "cushion": 1.0, **more}
+    )
+    with pytest.raises(PlanError, match="cushion: ") as refused:
+        plan.surface()
+    assert "\n" not in str(refused.value)

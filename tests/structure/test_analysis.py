@@ -10,6 +10,7 @@ import pytest
 from printed import words_of
 from refusals import refused
 from scipy.integrate import solve_bvp
+from scipy.optimize import brentq
 from starts import spherical_cap
 from structures import FABRIC, model_of, pyramid, square
 
@@ -17,7 +18,9 @@ import pcmc
 from pcmc import Material, Patch, Plane, SelfWeight, Snow, Surface, Wind, cli
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
+from pcmc.plan import Plan
 from pcmc.structure import Gas, analyse, analysis, calculix
+from pcmc.structure.loads import in_the_open
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 ALPHA, THICK = 0.6, 1e-3  # of the cap with the radius 1.2 under the pressure 1
@@ -97,6 +100,54 @@ def sphere_area():
     return 4.0 * np.pi * ALPHA * (2.0 * ALPHA - np.sqrt(4.0 * ALPHA**2 - 1.0))
 
 
+def bay_of_a_cushion(n):
+    """The barrel of ``strip`` and its mirror image below, held at the same edges."""
+    bay = strip(n)
+    below = np.where(bay.fixed, np.arange(bay.n), bay.n + np.cumsum(~bay.fixed) - 1)
+    X = np.concatenate([bay.vertices, (bay.vertices * [1.0, 1.0, -1.0])[~bay.fixed]])
+    planes = {plane: np.union1d(np.flatnonzero(on), below[np.flatnonzero(on)]) for plane, on in bay.on_planes}
+    faces = np.concatenate([bay.faces, below[bay.faces][:, ::-1]])
+    sheets = [Patch("top", 1.0), Patch("bottom", 1.0)]
+    return Surface(X, faces, np.repeat([0, 1], bay.m), sheets, fixed=bay.fixed.nonzero()[0], on_planes=planes)
+
+
+def cushion_under(q, D, outside):
+    """The pressure of the gas, and the heights of both sheets of that cushion, under q on its upper sheet.
+
+    A sheet is an arc of radius R and half angle θ over its chord, R sin θ = 1/√2, λ times its first length
+    π/2; its tension (α + D (λ² - 1) / 2) λ is R times the pressure across it. R² (2θ - sin 2θ) / 2 is
+    the area under it, and (p_a + p) V stays what it was."""
+    chord = np.sin(np.pi / 4)
+
+    def sheet(pressure):
+        def excess(angle):
+            stretch = 2.0 * angle * chord / np.sin(angle) / (np.pi / 2)
+            return (1.0 + D * (stretch**2 - 1.0) / 2.0) * stretch - pressure * chord / np.sin(angle)
+
+        angle = brentq(excess, 0.05, 1.5)
+        radius = chord / np.sin(angle)
+        return radius**2 * (2.0 * angle - np.sin(2.0 * angle)) / 2.0, radius * (1.0 - np.cos(angle))
+
+    first = (outside + 1.0) * 2.0 * sheet(1.0)[0]
+    p = brentq(lambda p: (outside + p) * (sheet(p - q)[0] + sheet(p)[0]) - first, q + 1e-3, 3.0)
+    return p, sheet(p - q)[1], sheet(p)[1]
+
+
+@needs_ccx
+def test_a_cushion_with_gas_is_two_arcs():
+    """Wind presses the upper sheet of a long cushion: pressure and both heights, to the second order."""
+    young, q, outside, off = 2e4, 0.4, 20.0, []
+    expected = cushion_under(q, young * THICK / (1.0 - 0.3**2), outside)
+    for n in (10, 20):
+        about = {"material": Material(young), "thickness": THICK, "gas": Gas(ambient=outside)}
+        case = analyse(model_of(bay_of_a_cushion(n), loads=[Wind({"top": -q})], anyway=True, **about))["wind"]
+        z = (case.results.model.surface.vertices + case.results.displacements)[:, 2]
+        off.append([case.pressure - expected[0], z.max() - expected[1], -z.min() - expected[2]])
+    assert expected[0] > 1.15
+    np.testing.assert_allclose(off[-1], 0.0, atol=6e-4)
+    assert np.log2(off[0][1] / off[1][1]) == pytest.approx(2.0, abs=0.1)
+
+
 def strip(n=40):
     """A bay of a barrel between two mirror planes: an arc of 90° and radius 1 over y = 0 and 1/n."""
     angle = np.linspace(-np.pi / 4, np.pi / 4, n + 1)
@@ -166,7 +217,8 @@ def test_what_is_too_much_is_answered():
     assert 0.0 < taut < found["snow"].share
     at_taut = analyse(replace(heavy, loads=[Snow(taut * 1.4)]))["snow"].results.principal_forces
     assert abs(np.nanmin(at_taut)) < 0.03 * ALPHA
-    first, last = found.answers()
+    first, mesh, last = found.answers()
+    assert mesh == analysis.MESH
     assert first.startswith(f"snow: {100 * found['snow'].share:.0f} % of its loads carried")
     assert "'cap'" in first
     assert last.startswith("tried: ")
@@ -217,6 +269,17 @@ def test_zones_carry_snow_and_wind():
     wind = Wind({"film": 0.2}, area=half)
     found = analyse(model_of(flat, loads=[wind], anyway=True))["wind"]
     assert found.results.reactions.sum(axis=0)[2] == pytest.approx(-0.1, rel=1e-3)
+
+
+def test_snow_lies_on_the_upper_sheet_of_a_cushion():
+    """And wind without named patches acts there: the lower sheet is under it."""
+    cushion = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], edge_length=0.5, tension=1.5, cushion=2.0).surface()
+    assert in_the_open(cushion).tolist() == [True, False]
+    step = model_of(cushion, loads=[Snow(0.5)], anyway=True).steps[1]
+    assert step.forces.sum(axis=0) == pytest.approx([0.0, 0.0, -6.0])
+    section = pcmc.project.Structure(young=1.0, thickness=1.0, zones=[{"case": "gust", "wind": 0.2}])
+    assert section.loads_on(cushion)[0].pressures == {"patch 1": 0.2}
+    assert in_the_open(parts()).all()
 
 
 def parts():
