@@ -1,7 +1,7 @@
 """Principal directions of a sheet, and its umbilics.
 
 On a sheet of constant mean curvature the traceless part of the shape operator is a holomorphic quadratic
-differential (H. Hopf 1951). Its square root is the gradient of coordinates whose level lines are lines of
+differential. Its square root is the gradient of coordinates whose level lines are lines of
 curvature; its zeros are the umbilics, each of index -1/2 or a multiple of it.
 """
 
