@@ -108,7 +108,11 @@ def _stale(asked: argparse.Namespace) -> int:
         print(f"{name:{width}}  {age or 'no result'}")
     stale = [name for name, age in found.items() if age is None or age.changed != ()]
     if stale:
-        print(f"\nto compute them anew: python -m studies run {' '.join(stale)}")
+        print(
+            "\nStale: code that its numbers may depend on reads otherwise today. The numbers may be the same:"
+        )
+        print(f"python -m studies check {stale[0]} computes one again, beside the stored one, and compares.")
+        print(f"to compute them anew: python -m studies run {' '.join(stale)}")
     return 0
 
 

@@ -2,20 +2,55 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
+import platformdirs
 
 from . import validate
 
 BLOCK = 32_768  # below this many triangles a second thread costs more than it gains
+CONFIG: Any = numba.config
 
-compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
-inlined = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+def sources() -> list[Path]:
+    """The files whose text is in compiled code: those of loops, and of the constants that they read."""
+    files = sorted(Path(__file__).parents[1].rglob("*.py"))
+    return [path for path in files if b"compiled" in path.read_bytes() or path.stem == "tolerances"]
+
+
+def kept_in() -> str:
+    """The folder of this code, below NUMBA_CACHE_DIR or the user's cache.
+
+    numba keeps a function for as long as its own file is the same. What it calls is part of it, and an index
+    that names a class of former code cannot be read: other code needs another folder.
+    """
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources())).hexdigest()
+    return str(Path(CONFIG.CACHE_DIR or platformdirs.user_cache_path("pcmc") / "compiled") / digest[:12])
+
+
+KEPT_IN = kept_in()
+
+
+def compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a function of numbers and arrays at its first call, without Python's lock, and keep it."""
+    given, CONFIG.CACHE_DIR = CONFIG.CACHE_DIR, KEPT_IN
+    try:
+        return numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    finally:
+        CONFIG.CACHE_DIR = given
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a short function into those that call it."""
+    return compiled(function, forceinline=True)
 
 
 def threads() -> int:

@@ -64,6 +64,8 @@ PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed 
 ROOMS = "volumes of rooms (it has the pressures reached)"
 LINES = "lines or circles that vertices slide along (they are fixed in it)"
 
+ORDER = "its curved elements (it has the flat triangles that join their nodes)"
+
 
 class FormatPart(NamedTuple):
     """A part that not every surface has, and not every format holds."""
@@ -82,24 +84,25 @@ PARTS = {
     "rooms": FormatPart(ROOMS, 6, lambda surface, _: surface.rooms),
     "planes": FormatPart(PLANES, 6, lambda surface, _: surface.on_planes),
     "curves": FormatPart("", 7, lambda surface, _: surface.held_curves),
+    "order": FormatPart(ORDER, 9, lambda surface, _: surface.order > 1),
     "unit": FormatPart("its unit {unit}", 1, lambda _, units: units),
 }
 TOLD = tuple(name for name, part in PARTS.items() if part.words)
 OURS = ("support", "patch")
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
-    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
-    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "unit")),
-    ".obj": Format("obj"),
-    ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices")),
+    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "unit")),
+    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "unit")),
+    ".obj": Format("obj", loses=("order",)),
+    ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices"), loses=("order",)),
     ".stl": Format("stl", separate=True, bare=True, loses=TOLD),
     ".vtp": Format("vtk", scalars="both", reserved=OURS),
     ".vtu": Format("vtk", scalars="both", reserved=OURS),
-    ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),
-    ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),
-    ".usda": Format("usd", scalars="vertices", colours=True, separate=True, reads=False),
-    ".3dm": Format("rhino", separate=True, own=("cables",)),
-    ".ifc": Format("ifc", certificate=True, separate=True),
+    ".glb": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
+    ".gltf": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
+    ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False, loses=("order",)),
+    ".3dm": Format("rhino", separate=True, own=("cables",), loses=("order",)),
+    ".ifc": Format("ifc", certificate=True, separate=True, loses=("order",)),
 }
 """The formats by suffix."""
 METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")

@@ -54,6 +54,7 @@ class MeshData:
     parts: Mapping[str, Any] = field(default_factory=dict)  # as in ``metadata``, until the mesh is whole
     bare: tuple[str, ...] = ()  # the patches without tension and pressure: their 1 is the same in any unit
     curves: tuple[HeldCurve, ...] = ()
+    order: int = 1  # of the elements, as in Surface
 
 
 def checked_data(data: MeshData) -> MeshData:
@@ -199,7 +200,7 @@ def to_surface(
     lines, planes = (data.lines, data.planes) if fixed is None else ((), ())
     drawn = held | (support == FIXED) if data.curves else held  # where the file's curves are
     supports = drawn, sliding, plane, lines, planes
-    parts = data.cables, data.rooms, data.curves
+    parts = data.cables, data.rooms, data.curves, data.order
     surface = Surface(X, data.faces, data.patch_of_face, patches, *supports, *parts)
     return surface if drawn is held or np.array_equal(drawn, held) else surface.rebuilt(fixed=held)
 

@@ -96,7 +96,8 @@ def write(
         elif shown.m < surface.m:
             walls = encode_walls(surface, shown)
     bare = getattr(solved, "bare", ())
-    metadata = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
+    without, counts = (*form.own, *{"order"} & {*form.loses}), (shown.n, shown.m)
+    metadata = metadata_text(surface, units, not form.separate, without, counts, bare)
     findings: Any = certificate or {}
     if not isinstance(findings, Mapping):
         if not hasattr(findings, "FILED"):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import numpy as np
 
 from ..base.arrays import Ints
-from ..base.errors import PcmcError
+from ..base.errors import OptionError, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
@@ -271,7 +271,11 @@ class Outcome:
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         plan = None if self.project is None else self.project.plan
-        return structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
+        model = structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
+        if self.unfold and any(not line.wall for line in model.lines):
+            text = "a member along an edge is known for the part of the plan alone, not for its images"
+            raise OptionError(f"{text}; leave out whole, or the member", what="whole")
+        return model
 
     @property
     def pattern_wanted(self) -> CuttingOptions | None:

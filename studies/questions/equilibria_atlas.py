@@ -155,7 +155,7 @@ def table(folder: Folder) -> dict[str, float]:
 
 
 def figure(folder: Folder) -> None:
-    """The atlas: every equilibrium of the coarsest mesh, with its index and energy."""
+    """The atlas: every equilibrium of the coarsest mesh, with its index."""
     from pcmc.plot import panel
 
     records = folder.read_table("records")
@@ -165,7 +165,7 @@ def figure(folder: Folder) -> None:
         mine = mine[mine.edge_length == mine.edge_length.max()]
         for row, surface in zip(mine.to_dict("records"), folder.read_mesh(case).values(), strict=True):
             shapes.append(surface)
-            titles.append(f"{case} {row['number']}: index {row['index']}, E = {row['energy']:.4g}")
+            titles.append(f"{case} {row['number']}: index {row['index']}")
     panel(shapes, folder.figure("atlas"), columns=5, titles=titles, supports=False, one_scale=False)
 
 

@@ -275,6 +275,8 @@ def test_units_reach_the_header_and_the_scale(tmp_path, squares, units, code, me
     drawings.write(tmp_path / "roof.dxf")
     doc = ezdxf.readfile(tmp_path / "roof.dxf")
     assert (doc.header["$INSUNITS"], doc.header["$MEASUREMENT"]) == (code, metric)
+    digits = {one.decimals for sheet in drawings.sheets for one in sheet.dimensions}
+    assert digits == {{"mm": 0, "cm": 1, "ft": 4, "in": 2}[units]}
     plan = drawings.sheets[0]
     rims = np.concatenate([line.points for line in plan.lines if line.layer == "PCMC-RIM"])
     scale = int(plan.scale.removeprefix("1:"))

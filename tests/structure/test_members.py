@@ -15,6 +15,7 @@ from pcmc.base.errors import OptionError
 from pcmc.plan import Plan, circle, polyline
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, members_at_rest
+from pcmc.structure.member_keys import members_of
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 STEEL = Material(2.1e8, density=7.85)
@@ -174,3 +175,51 @@ def test_a_member_that_cannot_be_is_refused_in_a_line():
         StructuralModel(hall(), FABRIC, 1e-3, members=[Member("wall 1", TUBE, STEEL)] * 2)
     with refused(OptionError, what="members"):
         StructuralModel(hall(), FABRIC, 1e-3, members=["wall 1"])
+    crossing = [[[4, 0], [4, 4]], [[0, 2], [8, 2]]]
+    bays = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], crossing, edge_length=0.8, tension=2.0).surface()
+    with refused(OptionError, what="members", where="wall 1"):
+        lines(bays, Member("wall 1", TUBE, STEEL))
+    assert (
+        len(model_of(bays, members=[Member(w, TUBE, STEEL) for w in ("wall 1", "wall 2")], anyway=True).lines)
+        == 2
+    )
+
+
+def test_members_of_a_project_are_refused_in_a_line():
+    """Without a section, on a divider without a wall, on a free hole, of a name that is not there."""
+    area = [[0, 0], [4, 0], [4, 2], [0, 2]]
+
+    def members(table, **divider):
+        line = {"curve": [[2, 0], [2, 2]], "member": "arch", **divider}
+        return members_of({"arch": table}, Plan(area, [line], tension=2.0))
+
+    good = {"young": 2.1e8, "diameter": 0.1, "thickness": 0.005}
+    assert [m.on for m in members(good)] == ["wall 1"]
+    with refused(OptionError, what="structure.members", where="arch"):
+        members({"young": 2.1e8})
+    with refused(OptionError, what="structure.members", where="arch"):
+        members({"diameter": 0.1})
+    with refused(OptionError, what="area"):
+        members({"young": 2.1e8, "area": 0.0, "upright": 1.0})
+    with refused(OptionError, found="depth"):
+        members({"young": 2.1e8, "depth": 1.0})
+    with refused(OptionError, what="member", found="truss"):
+        members(good, member="truss")
+    with refused(OptionError, what="member"):
+        members(good, wall=False)
+    hole = {"curve": circle([2, 1], 0.4), "edge": "free", "member": "arch"}
+    with refused(OptionError, what="member"):
+        members_of({"arch": good}, Plan(area, holes=[hole], tension=2.0))
+
+
+def test_a_cable_in_the_place_of_a_wall_finds_a_shape_that_does_not_bend():
+    """What the best force along the junction leaves is then nothing."""
+    bays = {name: {"tension": 1.5, "pressure": 0.3} for name in ("west", "east")}
+    line = {"curve": [[6, 0], [6, 8]], "wall": False, "cable": 6.56}
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [line], edge_length=1.2, patches=bays)
+    found = pcmc.solve(plan.surface())
+    assert found.certificate.certified
+    model = StructuralModel(found, Material(5e5), 1e-3, cable_area=1e-4)
+    [cable] = model.standing.cables
+    left = forces_on_members(model, model.steps[0])[np.unique(cable.edges)[2:-2]]
+    assert np.abs(left).max() < 0.05 * 6.56
