@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..base.units import Units
 from ..plot import under_load
 from ..plot.figure import png
+from ..structure.member_forces import sentences
 from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
 
 if TYPE_CHECKING:
@@ -52,3 +53,10 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     if len(table):
         columns = columns_in(table, ["least", "largest"], force)
         yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)
+    table = analysis.members
+    if len(table):
+        columns = columns_in(table, ["least_N", "largest_N", "V"], force)
+        columns |= columns_in(table, ["M"], f"{force} {units.length}")
+        columns |= columns_in(table, ["moved"], units.length)
+        yield text_table("Forces of members", {"case": table["case"], "member": table["member"]}, columns)
+        yield from (f"{line}." for line in sentences(analysis.model, units))
