@@ -13,8 +13,8 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
-from ..drawings import net_files, net_paths
 from ..drawings.net_drawings import SUFFIXES as NETS
+from ..drawings.net_drawings import net_files, net_paths
 from ..io import FORMATS, write
 from ..panelling import panel_net
 from ..plot import families, panel_planarity

@@ -5,7 +5,7 @@ and the rooms below.
 """
 
 from .drawing_set import DrawingSet, drawing_set
-from .net_drawings import net_drawings, net_files, net_paths
+from .net_drawings import net_drawings
 from .sheet import FORMATS, Sheet
 
-__all__ = ["FORMATS", "DrawingSet", "Sheet", "drawing_set", "net_drawings", "net_files", "net_paths"]
+__all__ = ["FORMATS", "DrawingSet", "Sheet", "drawing_set", "net_drawings"]

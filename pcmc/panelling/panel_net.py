@@ -54,6 +54,11 @@ class PanelNet:
     beams : a row per edge: ``beam``, ``node``, ``other``, ``length``, ``panel``, ``neighbour`` (0 for none);
         ``torsion`` with the ``axes``, ``torsion_normal`` with the normals.
     umbilics : (k,3) the places inside patches where the directions of a planar net have no sense.
+
+    >>> from generators import delaunay
+    >>> net = panel_net(delaunay(exact=True), 0.5, anyway=True)
+    >>> bool(net.panels["planarity"].max() < 1e-6), len(net.umbilics)
+    (True, 0)
     """
 
     surface: Surface
