@@ -23,8 +23,8 @@ ABOUT = (
     "nothing is slack. Beyond it the share depends on the mesh; taut hardly does."
 )
 SIGNS = (
-    "N is above 0 in tension. V and M are the largest shear force and moment, in whichever direction. The pull "
-    "of the sheets is the load, in the deformed shape. Buckling is not checked."
+    "N is above 0 in tension. V and M are the largest shear force and moment, in whichever direction. The "
+    "pull of the sheets is the load, in the deformed shape. Buckling is not checked."
 )
 
 

@@ -145,8 +145,8 @@ class Analysis:
     @cached_property
     def supports(self) -> pd.DataFrame:
         """A row per case and support, numbered as in ``Certificate.supports``: ``support``, ``name``,
-        ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts. M1, M2, …
-        hold the ends of members; see ``supports_with_members``."""
+        ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts. M1, M2,
+        … hold the ends of members; see ``supports_with_members``."""
         tables = []
         for case in self.cases:
             table = supports_with_members(self.model, case.results.reactions)
