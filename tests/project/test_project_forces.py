@@ -97,6 +97,38 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     capsys.readouterr()
 
 
+HALL_WITH_ARCH = """
+units = "m"
+force = "kN"
+[plan]
+edge_length = 1.6
+outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
+patches = {west = {tension = 1.5, pressure = 0.3}, east = {tension = 1.5, pressure = 0.3}}
+dividers = [{curve = [[6, 0], [6, 8]], wall = 0.6, member = "arch"}]
+[structure]
+young = 5e5
+thickness = 0.001
+[structure.members.arch]
+diameter = 0.1
+thickness = 0.005
+young = 2.1e8
+[output]
+files = ["hall.ifc", "hall.obj"]
+drawings = ["hall.dxf"]
+"""
+
+
+def test_files_and_drawings_say_that_they_leave_out_members(folder):
+    (folder / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
+    text = "members are left out (wall 1); a wall in whose place one stands is drawn"
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        outcome = run("hall.toml")
+    losses = [str(w.message) for w in caught if issubclass(w.category, LostWarning)]
+    assert losses == [f"hall.ifc, hall.obj: {text}", f"drawings: {text}"]
+    assert outcome.members_left_out == text
+
+
 def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_for(folder):
     (folder / "lost.toml").write_text(
         SAIL_TOML.replace('"sail.3dm"', '"sail.stl", "sail.obj"'), encoding="utf-8"
