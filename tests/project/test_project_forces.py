@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from force_cases import BUBBLE_TOML, cables
 from refusals import refused
+from small_project import HALL_WITH_ARCH
 
 import pcmc
 from pcmc import Verdict, cli, io
@@ -95,27 +96,6 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     )
     assert "30.0" in (folder / "t.csv").read_text()
     capsys.readouterr()
-
-
-HALL_WITH_ARCH = """
-units = "m"
-force = "kN"
-[plan]
-edge_length = 1.6
-outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
-patches = {west = {tension = 1.5, pressure = 0.3}, east = {tension = 1.5, pressure = 0.3}}
-dividers = [{curve = [[6, 0], [6, 8]], wall = 0.6, member = "arch"}]
-[structure]
-young = 5e5
-thickness = 0.001
-[structure.members.arch]
-diameter = 0.1
-thickness = 0.005
-young = 2.1e8
-[output]
-files = ["hall.ifc", "hall.obj"]
-drawings = ["hall.dxf"]
-"""
 
 
 def test_files_and_drawings_say_that_they_leave_out_members(folder):
