@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from .. import project as projects
 from ..base.errors import OptionError
 from ..project.drawn import files_of
+from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
 from . import OK, arguments
 from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load, option, switch
@@ -68,6 +69,7 @@ def equilibria(
             elif path.suffix.lower() == TABLE:
                 jobs.append((path, partial(found.table.to_csv, index=False)))
             else:
+                warn_of_members(roof, path.name)
                 for k, one in enumerate(found.found, 1):
                     place = path.with_name(f"{path.stem}-{k}{path.suffix}")
                     jobs += certified_files(one.surface, one.certificate, [place], roof.units)

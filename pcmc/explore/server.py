@@ -17,6 +17,7 @@ from typing import Any
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
 from ..project import load
+from ..project.members import members_left_out
 from ..project.writing import certified_files
 from ..surface import Surface
 from . import page_data
@@ -144,7 +145,7 @@ class Explorer:
             "title": roof.title,
             "name": roof.name,
             "units": page_data.unit_texts(roof.outcome.units),
-            "note": "; ".join(filter(None, (roof.note, roof.outcome.members_left_out))),
+            "note": "; ".join(filter(None, (roof.note, members_left_out(roof.outcome)))),
             "note_met": roof.outcome.result is not None and roof.outcome.good,
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",

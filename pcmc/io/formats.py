@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -30,6 +30,7 @@ class Format:
     bare: bool = False  # whether it holds nothing but triangles and names
     loses: tuple[str, ...] = ()  # the ``PARTS`` that it does not hold
     reads: bool = True  # whether pcmc reads it, too
+    members: bool = False  # whether it holds the members of a structural model
     unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
 
     @property
@@ -58,6 +59,7 @@ class Content:
     walls: str | None  # the text of ``encode_walls``
     units: Units
     bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
+    members: Sequence[Any]  # the lines of members, as ``StructuralModel.lines`` has them
 
 
 PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"
@@ -102,7 +104,7 @@ FORMATS = {
     ".gltf": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
     ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False, loses=("order",)),
     ".3dm": Format("rhino", separate=True, own=("cables",), loses=("order",)),
-    ".ifc": Format("ifc", certificate=True, separate=True, loses=("order",)),
+    ".ifc": Format("ifc", certificate=True, separate=True, members=True, loses=("order",)),
 }
 """The formats by suffix."""
 METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")

@@ -1,8 +1,10 @@
 """IFC4 (.ifc), for building information models: a roof of one element per patch, with its properties.
 
 The parts of an IfcRoof are an IfcSlab of type ROOF for each patch and an IfcWall for each wall, as
-IfcTriangulatedFaceSet, and an IfcTendon for each cable. pcmc reads ``Pcmc_Surface`` back. The same surface
-gives the same bytes: the content makes the identifiers, and the time stamp is always the same.
+IfcTriangulatedFaceSet, and an IfcTendon for each cable. Members of a structural model are an IfcMember in the
+place of a wall, which is an IfcVirtualElement then, and an IfcBeam along an edge, with profile and material.
+pcmc reads ``Pcmc_Surface`` back. The same surface gives the same bytes: the content makes the identifiers,
+and the time stamp is always the same.
 """
 
 from __future__ import annotations
@@ -48,7 +50,7 @@ TYPES: dict[str, Callable[[Any], Any]] = {"IfcText": str, "IfcInteger": int, "If
 def write(path: Path, surface: Surface, content: Content) -> None:
     """The whole file; without a unit of length, its lengths are metres."""
     load_library("ifcopenshell", "ifc")
-    model = _Model(surface, content.units or Units("m"), content.metadata)
+    model = _Model(surface, content.units or Units("m"), content)
     roof = model.add_roof()
     if content.certificate:
         model.add_properties("Pcmc_Certificate", roof, _findings(content.certificate))
@@ -60,6 +62,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         for k, color, used, faces in patch_meshes(surface)
     ]
     parts += [model.add_cable(cable, roof.ObjectPlacement) for cable in surface.cables]
+    parts += [model.add_member(line, roof.ObjectPlacement) for line in content.members]
     model.aggregate("roof's parts", roof, parts)
     header = model.file.header  # without the time at which it was written
     header.file_name.time_stamp, header.file_name.originating_system = TIME, "pcmc"
@@ -70,13 +73,14 @@ def write(path: Path, surface: Surface, content: Content) -> None:
 class _Model:
     """An IFC4 file that grows: each method adds entities."""
 
-    def __init__(self, surface: Surface, units: Units, metadata: str) -> None:
+    def __init__(self, surface: Surface, units: Units, content: Content) -> None:
         import ifcopenshell
 
         self.surface, self.units = surface, units
+        self.replaced = {line.wall for line in content.members}
         self.file: Any = ifcopenshell.file(schema="IFC4")
         self.add = self.file.create_entity
-        digest = hashlib.sha256(metadata.encode())
+        digest = hashlib.sha256(content.metadata.encode())
         for array in (surface.vertices, surface.faces, surface.patch_of_face, support_of(surface)):
             digest.update(np.ascontiguousarray(array).tobytes())
         self.digest = digest.hexdigest()
@@ -140,8 +144,10 @@ class _Model:
         style = self.add("IfcSurfaceStyle", Name=patch.name, Side="BOTH", Styles=[shading])
         self.add("IfcStyledItem", Item=mesh, Styles=[style])
         kind, use = ("IfcWall", "NOTDEFINED") if surface.walls[k] else ("IfcSlab", "ROOF")
-        shape = self.body, "Tessellation", [mesh]
-        element = self.element(kind, f"patch {k}", patch.name, place, shape, PredefinedType=use)
+        about, shape = {"PredefinedType": use}, (self.body, "Tessellation", [mesh])
+        if patch.name in self.replaced:
+            kind, about = "IfcVirtualElement", {}
+        element = self.element(kind, f"patch {k}", patch.name, place, shape, **about)
         per_length, per_area = "IfcLinearForceMeasure", "IfcPlanarForceMeasure"
         if not self.units.force:
             per_length = per_area = "IfcReal"
@@ -160,11 +166,8 @@ class _Model:
 
     def add_cable(self, cable: Cable, place: Any) -> Any:
         """The tendon of a cable: its axis as polylines, and its force."""
-        lines = []
-        for chain in self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool)):
-            points = (self.surface.vertices[chain.vertices] - self.middle).tolist()
-            entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
-            lines.append(self.add("IfcPolyline", Points=entities + entities[:1] * chain.closed))
+        chains = self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool))
+        lines = [self.polyline(chain.vertices, chain.closed) for chain in chains]
         pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
         about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
         shape = self.axis, "Curve3D", lines
@@ -172,6 +175,63 @@ class _Model:
         force = ("IfcForceMeasure" if self.units.force else "IfcReal", pull)
         self.add_properties("Pcmc_Cable", tendon, {"Force": force}, cable.name)
         return tendon
+
+    def add_member(self, line: Any, place: Any) -> Any:
+        """A member: a disk swept along its line, or a rectangle along each edge; its profile and material."""
+        member, profile, sizes = line.member, line.member.profile, line.member.profile.sizes
+        axis = self.polyline(line.vertices, line.closed)
+        about = {"ProfileType": "AREA", "ProfileName": profile.label}
+        if profile.shape == "rectangle":
+            section = self.add("IfcRectangleProfileDef", XDim=sizes[0], YDim=sizes[1], **about)
+            shape = self.body, "SweptSolid", self.extruded(line, section)
+        elif profile.shape:
+            hollow = {"WallThickness": sizes[1]} if profile.shape == "tube" else {}
+            kind = "IfcCircleHollowProfileDef" if hollow else "IfcCircleProfileDef"
+            section = self.add(kind, Radius=0.5 * sizes[0], **hollow, **about)
+            inner = 0.5 * sizes[0] - sizes[1] if hollow else 0.0
+            radii = {"Radius": 0.5 * sizes[0], "InnerRadius": inner if inner > 0.0 else None}
+            swept = self.add("IfcSweptDiskSolidPolygonal", Directrix=axis, **radii)
+            shape = self.body, "AdvancedSweptSolid", [swept]
+        else:  # an area and second moments alone have no shape
+            section, shape = self.add("IfcProfileDef", **about), (self.axis, "Curve3D", [axis])
+        kind, use = ("IfcMember", "MEMBER") if line.wall else ("IfcBeam", "BEAM")
+        element = self.element(kind, f"member {line.name}", line.name, place, shape, PredefinedType=use)
+        material = self.add("IfcMaterial", Name=f"material of {line.name}")
+        of_profile = self.add("IfcMaterialProfile", Name=line.name, Material=material, Profile=section)
+        profiles = self.add("IfcMaterialProfileSet", Name=line.name, MaterialProfiles=[of_profile])
+        used = self.add("IfcMaterialProfileSetUsage", ForProfileSet=profiles)
+        ends = {"RelatedObjects": [element], "RelatingMaterial": used}
+        self.rooted("IfcRelAssociatesMaterial", f"member {line.name} material", **ends)
+        stress = "IfcPlanarForceMeasure" if self.units.force else "IfcReal"
+        values = {
+            "Kind": ("IfcLabel", member.kind),
+            "Area": ("IfcAreaMeasure", profile.area * length_factor(self.units.length, "m") ** 2),
+            "SecondMomentUpright": ("IfcReal", profile.moments[0]),
+            "SecondMomentAcross": ("IfcReal", profile.moments[1]),
+            "YoungsModulus": (stress, member.material.young),
+            "PoissonsRatio": ("IfcReal", member.material.poisson),
+            "MassDensity": ("IfcReal", member.material.density),
+        }
+        self.add_properties("Pcmc_Member", element, values, line.name)
+        return element
+
+    def extruded(self, line: Any, section: Any) -> list[Any]:
+        """A section along each edge of a line, its width across, its height in the upright plane."""
+        solids = []
+        for start, (along, across, _), length in zip(line.pairs[:, 0], *line.bars(self.surface), strict=True):
+            position = self.axes(self.surface.vertices[start] - self.middle)
+            for name, direction in (("Axis", along), ("RefDirection", across)):
+                setattr(position, name, self.add("IfcDirection", DirectionRatios=direction.tolist()))
+            up = self.add("IfcDirection", DirectionRatios=(0.0, 0.0, 1.0))
+            about = {"Position": position, "ExtrudedDirection": up, "Depth": float(length)}
+            solids.append(self.add("IfcExtrudedAreaSolid", SweptArea=section, **about))
+        return solids
+
+    def polyline(self, vertices: Ints, closed: bool) -> Any:
+        """A line through vertices of the surface."""
+        points = (self.surface.vertices[vertices] - self.middle).tolist()
+        entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
+        return self.add("IfcPolyline", Points=entities + entities[:1] * closed)
 
     def element(
         self, kind: str, role: str, name: str, place: Any, shape: tuple[Any, str, list[Any]], **values: Any

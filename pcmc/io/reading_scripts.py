@@ -109,7 +109,7 @@ def ifc_arrays(path: str) -> dict[str, Any]:
             continue
         found["text"], found["walls"] = texts["Description"], texts.get("Walls")
         for part in (part for whole in roof.IsDecomposedBy for part in whole.RelatedObjects):
-            if part.is_a("IfcTendon"):
+            if not get_pset(part, "Pcmc_Patch"):  # a cable or a member
                 continue
             item = part.Representation.Representations[0].Items[0]
             points = np.array(item.Coordinates.CoordList, dtype=np.float64).reshape(-1, 3)

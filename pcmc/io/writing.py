@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ def write(
     certificate: object | None = None,
     colour: str = "",
     units: Units | str | None = None,
+    members: Sequence[Any] = (),
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -48,6 +49,7 @@ def write(
     units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units``; the file names them.
         To .glb and .gltf, which are in metres, the surface is converted (scalars are not). Without a unit the
         numbers stay, and .3dm, .ifc and .usda files are in metres.
+    members : the lines of members of its structural model, ``StructuralModel.lines``, for .ifc.
 
     Warns
     -----
@@ -85,6 +87,8 @@ def write(
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     lost += form.lost(surface, units)
+    if members and not form.members:
+        lost.append("members")
     if units and form.unit:
         surface = scaled_surface(surface, length_factor(units.length, form.unit))
         units = Units(form.unit, units.force)
@@ -105,7 +109,7 @@ def write(
             text = f"certificate: expected a Certificate, found {found}"
             raise FileError(text, what="certificate", found=found)
         findings = {name: getattr(certificate, name) for name in findings.FILED}
-    content = Content(metadata, carried, colour, findings, walls, units, bare)
+    content = Content(metadata, carried, colour, findings, walls, units, bare, members)
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
             text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"

@@ -22,9 +22,11 @@ from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
 from ..structure import Analysis, StructuralModel, write_structure
+from ..structure.members import MemberLine
 from ..surface import Surface, unfolded
 from .checking import in_file
 from .file import Project
+from .members import member_lines, warn_of_members
 from .outcome import OnStep, Outcome, ignore
 from .settings import check_picture, schedule_paths
 
@@ -76,14 +78,15 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
     """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
 
-    Scalars of a surface that was not solved are those of its file. LostWarning where the project has members,
-    which no file of a surface holds.
+    Scalars of a surface that was not solved are those of its file. LostWarning where files do not hold the
+    members of the project.
     """
-    paths = [*map(Path, files)]
-    if paths:
-        outcome.warn_of_members(", ".join(path.name for path in paths))
+    paths, lines = [*map(Path, files)], member_lines(outcome)
+    for holds, held in ((True, lines), (False, ())):
+        if some := [path.name for path in paths if _holds_members(path) == holds]:
+            warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
-        return certified_files(*outcome.shown, paths, outcome.units, colour)
+        return certified_files(*outcome.shown, paths, outcome.units, colour, lines)
     data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
@@ -91,14 +94,27 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         place = {half.m: unfold.face, half.n: unfold.vertex}
         carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
         about |= {"scalars": carried, "certificate": None}
-    return [(path, partial(io.write, surface=outcome.shown.surface, **about)) for path in paths]
+    writes = {path: partial(io.write, surface=outcome.shown.surface, **about) for path in paths}
+    return [
+        (path, partial(write, members=lines) if _holds_members(path) else write)
+        for path, write in writes.items()
+    ]
+
+
+def _holds_members(path: Path) -> bool:
+    return io.FORMATS[path.suffix.lower()].members
 
 
 def certified_files(
-    surface: Surface, certificate: Certificate, files: Iterable[PathLike], units: Units, colour: str = ""
+    surface: Surface,
+    certificate: Certificate,
+    files: Iterable[PathLike],
+    units: Units,
+    colour: str = "",
+    members: Sequence[MemberLine] = (),
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, and size of the reactions at supports (force)."""
+    relative curvature error, size of the reactions at supports (force), and lines of members."""
     scalars: dict[str, Floats] = {
         "mean curvature": mean_curvature(surface),
         "error": curvature_error(surface),
@@ -111,6 +127,7 @@ def certified_files(
         about: dict[str, Any] = {"units": units, "colour": colour}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
+        about["members"] = members if form.members else ()
         jobs.append((file, partial(io.write, surface=surface, **about)))
     return jobs
 

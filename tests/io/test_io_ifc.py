@@ -8,7 +8,7 @@ import sys
 import ifcopenshell
 import numpy as np
 import pytest
-from ifcopenshell.util.element import get_container, get_pset, get_psets
+from ifcopenshell.util.element import get_container, get_material, get_pset, get_psets
 from ifcopenshell.util.placement import get_local_placement
 from ifcopenshell.util.unit import calculate_unit_scale, get_project_unit
 from refusals import refused
@@ -18,6 +18,8 @@ import pcmc
 from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
 from pcmc.base.units import FORCES, LENGTHS, Units
 from pcmc.forces.functional import patch_areas
+from pcmc.plan import Plan, polyline
+from pcmc.structure.members import lines_on
 
 
 def roof_of(path):
@@ -51,6 +53,38 @@ def test_the_validator_of_ifcopenshell_accepts_it(tmp_path):
     lines = run.stdout.splitlines()
     assert lines[:2] == ["No validation issues found."] * 2
     assert "CorrectPredefinedType" in lines[2]
+
+
+def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
+    """A tube in the place of a wall, which is a virtual element then; a rectangle and an area along edges."""
+    from ifcopenshell import geom
+    from ifcopenshell.util.shape import get_volume
+
+    plan = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
+    surface, steel, sides = plan.surface(), pcmc.Material(2.1e8, density=7.85), (0.0, 2.0)
+    profiles = pcmc.Profile.rectangle(0.1, 0.2), pcmc.Profile(1e-3, 1e-6)
+    members = [pcmc.Member("wall 1", pcmc.Profile.tube(0.1, 0.005), steel)]
+    for y, profile in zip(sides, profiles, strict=True):
+        members.append(pcmc.Member(polyline([[0, y], [4, y]]), profile, steel, name=f"edge {y:.0f}"))
+    path, lines = tmp_path / "a.ifc", lines_on(surface, members)
+    pcmc.write(path, surface, units=Units("m", "kN"), members=lines)
+    model, _, parts = roof_of(path)
+    [arch], [wall] = model.by_type("IfcMember"), model.by_type("IfcVirtualElement")
+    assert (arch.Name, wall.Name, model.by_type("IfcWall")) == ("wall 1", "wall 1", ())
+    assert {part.Name for part in model.by_type("IfcBeam")} == {"edge 0", "edge 2"}
+    assert get_pset(arch, "Pcmc_Member", "YoungsModulus") == 2.1e8
+    assert get_material(arch).ForProfileSet.MaterialProfiles[0].Profile.WallThickness == 0.005
+    lengths = {line.name: line.bars(surface)[1].sum() for line in lines}
+    for part, profile in ((parts["edge 0"], profiles[0]), (arch, members[0].profile)):
+        volume = get_volume(geom.create_shape(geom.settings(), part).geometry)
+        assert volume == pytest.approx(profile.area * lengths[part.Name], rel=0.05)
+    points = np.array(geom.create_shape(geom.settings(), parts["edge 0"]).geometry.verts).reshape(-1, 3)
+    assert np.ptp(points, axis=0) == pytest.approx([4.0, 0.1, 0.2])
+    again = pcmc.read(path)
+    assert [patch.name for patch in again.patches] == [patch.name for patch in surface.patches]
+    assert again.m == surface.m
+    with pytest.warns(LostWarning, match="members"):
+        pcmc.write(tmp_path / "a.obj", surface, members=lines)
 
 
 def test_the_hierarchy_is_whole(tmp_path):
