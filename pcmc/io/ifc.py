@@ -185,11 +185,11 @@ class _Model:
             section = self.add("IfcRectangleProfileDef", XDim=sizes[0], YDim=sizes[1], **about)
             shape = self.body, "SweptSolid", self.extruded(line, section)
         elif profile.shape:
-            hollow = {"WallThickness": sizes[1]} if profile.shape == "tube" else {}
+            radius, wall = 0.5 * sizes[0], sizes[1] if profile.shape == "tube" else 0.5 * sizes[0]
+            hollow = {"WallThickness": wall} if wall < radius else {}
             kind = "IfcCircleHollowProfileDef" if hollow else "IfcCircleProfileDef"
-            section = self.add(kind, Radius=0.5 * sizes[0], **hollow, **about)
-            inner = 0.5 * sizes[0] - sizes[1] if hollow else 0.0
-            radii = {"Radius": 0.5 * sizes[0], "InnerRadius": inner if inner > 0.0 else None}
+            section = self.add(kind, Radius=radius, **hollow, **about)
+            radii = {"Radius": radius, "InnerRadius": radius - wall if hollow else None}
             swept = self.add("IfcSweptDiskSolidPolygonal", Directrix=axis, **radii)
             shape = self.body, "AdvancedSweptSolid", [swept]
         else:  # an area and second moments alone have no shape
