@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from .io import read, write
     from .io.repairing import Repaired, repair
     from .margins import Margin, margin
-    from .panelling import FewerFamilies, Panels, fewer_families, panels
+    from .panelling import FewerFamilies, PanelNet, Panels, fewer_families, panel_net, panels
     from .structure import (
         Gas,
         Material,
@@ -80,6 +80,7 @@ __all__ = [
     "Member",
     "MeshCheck",
     "MeshVerdict",
+    "PanelNet",
     "Panels",
     "Parameter",
     "Patch",
@@ -112,8 +113,9 @@ __all__ = [
     "margin",
     "mean_curvature",
     "meet",
-    "panels",
     "mirrored",
+    "panel_net",
+    "panels",
     "read",
     "repair",
     "read_results",
@@ -158,7 +160,7 @@ _NAMES = {
         "write_structure",
     ),
     "margins": ("Margin", "margin"),
-    "panelling": ("FewerFamilies", "Panels", "fewer_families", "panels"),
+    "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
     "certificate.theorem": ("Theorem", "verify"),
 }

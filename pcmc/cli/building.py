@@ -10,10 +10,14 @@ from typing import Annotated, Any
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError
+from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
+from ..drawings.net_drawings import SUFFIXES as NETS
+from ..drawings.net_drawings import net_files, net_paths
 from ..io import FORMATS, write
-from ..plot import families
+from ..panelling import panel_net
+from ..plot import families, panel_planarity
 from ..project.drawn import files_of
 from ..project.settings import Output, Structure, schedule_paths
 from ..project.writing import analysis_jobs, check_outputs, model_job, schedule_jobs, write_all
@@ -38,6 +42,8 @@ from .arguments import (
 from .reports import working
 
 CSV = ".csv"
+FAMILY = "Largest difference of edges within a family of triangles."
+PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 PICTURE = "Picture to draw, coloured by family."
 MIRRORED = "alike: of one family; or apart."
@@ -60,26 +66,47 @@ Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
 def panels_(
     *,
     file: Input,
-    tolerance: Annotated[float, amount("LENGTH", "Largest difference of edges within a family.")],
+    tolerance: Annotated[float | None, amount("LENGTH", FAMILY)] = None,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
     picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
     view: ViewName = "diagonal",
+    pattern: Annotated[str | None, option("NAME", PATTERN)] = None,
+    size: Annotated[float | None, amount("LENGTH", "Edge of the panels of a pattern.")] = None,
+    direction: Annotated[float, amount("DEGREES", "Direction of a grid in plan, from x.")] = 0.0,
+    units: FileUnits = "",
+    sheet: SheetFormat = None,
     change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
     mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
     walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
-    """Sort the panels of a roof into families of congruent triangles; write a schedule.
+    """Sort the panels of a roof into families of congruent triangles, or lay out quads or hexagons.
 
     A .csv has a row per panel; beside it come NAME-families.csv and NAME-edges.csv. Other suffixes are
     formats of surfaces, for the surface that --change gives.
+
+    With --pattern and --size the panels are quads or hexagons; beside the .csv come NAME-nodes.csv and
+    NAME-beams.csv, an .obj has the polygons, and .dxf, .pdf and .svg have each panel at true size.
 
     \b
     Examples:
       pcmc panels roof.toml --tolerance 0.005 -o schedule.csv
       pcmc panels roof.pcmc --tolerance 0.005 --change 0.02 -o schedule.csv -o fewer.pcmc
+      pcmc panels roof.toml --pattern planar-quads --size 1.2 -o panels.csv -o panels.obj
     """
     seen, files = arguments.parsed_view(view), output or []
+    if pattern is not None or size is not None:
+        triangles = {"tolerance": tolerance, "change": change, "walls": walls or None}
+        for name in (name for name, value in triangles.items() if value is not None):
+            text = f"--{name}: belongs to panels of triangles; leave it out, or --pattern and --size"
+            raise OptionError(text, what=f"--{name}")
+        if pattern is None or size is None:
+            text = "--pattern: needs a --size, and --size a --pattern: planar-quads, quads or hexagons"
+            raise OptionError(text, what="--size", expected="a length")
+        return _net(file, units, files, picture, seen, sheet, build, (size, pattern, direction))
+    if tolerance is None:
+        text = "--tolerance: panels of triangles need it; quads and hexagons need --pattern and --size"
+        raise OptionError(text, what="--tolerance", expected="a length")
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
@@ -116,6 +143,36 @@ def panels_(
     if change is not None:
         print(f"\n{fewer}")
     return reports.ended(schedule.certificate.certified and roof.good, written)
+
+
+def _net(
+    file: Path,
+    units: str,
+    files: list[Path],
+    picture: Path | None,
+    seen: Any,
+    sheet: str | None,
+    build: Build,
+    wanted: tuple[float, str, float],
+) -> int:
+    """Lay out quads or hexagons and write them."""
+    for path in files:
+        suffix_of(path, NETS, "a net of panels")
+    outputs = Output(picture=picture, view=seen).paths + [one for path in files for one in net_paths(path)]
+    check_outputs(outputs, inputs=files_of(file))
+    size, pattern, direction = wanted
+    with working() as progress:
+        roof = build.roof(arguments.load(file, units), progress)
+        progress("laying out panels")
+        surface, certificate = roof.shown
+        about: dict[str, Any] = {"anyway": build.allow_uncertified, "certificate": certificate}
+        net = panel_net(surface, size, pattern, direction=direction, **about)
+        works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name)
+        if picture is not None:
+            works.append((picture, partial(panel_planarity, net, view=seen)))
+        written = write_all(works, progress)
+    print(net.text(roof.units))
+    return reports.ended(certificate.certified and roof.good, written)
 
 
 def draw_(

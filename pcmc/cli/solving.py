@@ -168,7 +168,7 @@ def certify_(
         sys.stdout.flush()
         with working() as progress:
             progress("checking the mesh")
-            check = check_mesh(surface, meshes)
+            check = check_mesh(surface, meshes, corners=roof.corners)
         print(f"\n{check.text(roof.units)}")
     return OK if roof.good else NOT_CERTIFIED
 

@@ -27,7 +27,7 @@ from .strips import CuttingPattern, Strip
 ACROSS = 4  # edges across the narrowest strip, about
 ROUNDS = 12  # in which levels are moved until every strip fits the cloth
 STUCK, SMALLER = 3, 0.95  # rounds after which the widest strip must be smaller by this part,
-TOO_WIDE = 1.1  # unless it is less than so much wider than the cloth
+TOO_WIDE = 1.25  # unless it is less than so much wider than the cloth
 FILL = 0.995  # of the cloth's width that strips are laid out for
 ROUNDING = 1e-9  # of a width
 MOST_STRAIN = 0.25  # of cloth: strips that need more are refused

@@ -5,7 +5,7 @@ With a path every function writes a picture; each returns it as an (h,w,3) array
 
 from .branches import equilibria
 from .curves import convergence, diagram, heatmap, histories, lines
-from .pictures import draw, families, panel, reactions, vectors
+from .pictures import draw, families, panel, panel_planarity, reactions, vectors
 from .uses import strains, under_load
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "histories",
     "lines",
     "panel",
+    "panel_planarity",
     "reactions",
     "strains",
     "under_load",

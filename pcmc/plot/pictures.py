@@ -37,7 +37,7 @@ from .figure import (
 from .scene import Camera, Rendering, mean_edge, paint, scene, view_of
 
 if TYPE_CHECKING:
-    from .. import Panels
+    from .. import PanelNet, Panels
 
 ViewName = str | tuple[float, float]
 
@@ -47,6 +47,7 @@ DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
 CELL_WIDTH = 700  # pixels of a picture in a notebook
 ABOVE = 7.0  # pixels above a title and below a picture
 TALLEST = 1.1  # height of a picture at most, as a part of its width
+FLAT_PERCENT = 1.0  # the least end of the scale of planarity: a glass pane bears a few tenths
 ARROW, AT_POINTS = "#B2182B", "#2166AC"
 
 
@@ -200,6 +201,22 @@ def families(schedule: Panels, path: Path | None = None, **options: Any) -> Imag
         look.setdefault("limits", (1.0, float(schedule.count)))
     names = sorted(set(schedule.panels["patch"]))
     return draw(schedule.surface, path, scalars=schedule.family_of_face, patches=names, **look)
+
+
+def panel_planarity(net: PanelNet, path: Path | None = None, **options: Any) -> Image:
+    """The panels of a net that ``pcmc.panel_net`` returns, coloured by how far they are from planar.
+
+    ``options`` are as in ``draw``, such as ``view`` and ``width``.
+
+    >>> from generators import delaunay
+    >>> from pcmc import panel_net
+    >>> panel_planarity(panel_net(delaunay(exact=True), 0.5, anyway=True), width=200).shape[1]
+    200
+    """
+    mesh, percent = net.mesh, 100.0 * net.panels["planarity"].to_numpy()
+    look: dict[str, Any] = {"label": "distance of the diagonals over their length, %", "supports": False}
+    look |= {"edges": False, "limits": (0.0, max(FLAT_PERCENT, float(percent.max())))} | options
+    return draw(mesh, path, scalars=percent[mesh.patch_of_face], **look)
 
 
 def vectors(

@@ -76,10 +76,14 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
     """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
 
-    Scalars of a surface that was not solved are those of its file.
+    Scalars of a surface that was not solved are those of its file. LostWarning where the project has members,
+    which no file of a surface holds.
     """
+    paths = [*map(Path, files)]
+    if paths:
+        outcome.warn_of_members(", ".join(path.name for path in paths))
     if outcome.result is not None:
-        return certified_files(*outcome.shown, files, outcome.units, colour)
+        return certified_files(*outcome.shown, paths, outcome.units, colour)
     data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
@@ -87,7 +91,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         place = {half.m: unfold.face, half.n: unfold.vertex}
         carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
         about |= {"scalars": carried, "certificate": None}
-    return [(Path(file), partial(io.write, surface=outcome.shown.surface, **about)) for file in files]
+    return [(path, partial(io.write, surface=outcome.shown.surface, **about)) for path in paths]
 
 
 def certified_files(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -131,7 +131,23 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
                 raise OptionError(text, what="members", where=line.name)
             taken[edges] = True
             lines.append(line)
+    _refuse_half_walls(surface, {line.wall for line in lines})
     return tuple(lines)
+
+
+def _refuse_half_walls(surface: Surface, replaced: Set[str]) -> None:
+    """Refuse a wall that ends at one with a member: nothing would hold its edge there."""
+    gone = np.array([patch.name in replaced for patch in surface.patches])
+    of_edge, patch = surface.topology.edge_of_face, surface.patch_of_face
+    beside = np.zeros((2, len(surface.topology.edges)), dtype=bool)
+    beside[0, of_edge[gone[patch]]] = True
+    beside[1, of_edge[(surface.walls & ~gone)[patch]]] = True
+    shared = beside[0] & beside[1]
+    if shared.any():
+        names = [surface.patches[k].name for k in np.unique(patch[shared[of_edge].any(axis=1)])]
+        one, other = ([name for name in names if (name in replaced) == side] for side in (True, False))
+        text = f"wall {other[0]!r} ends at {one[0]!r}, which has a member; give both one, or none"
+        raise OptionError(text, what="members", where=one[0])
 
 
 def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:

@@ -22,7 +22,7 @@ from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import FORMATS, drawing_set
-from pcmc.drawings.drawing_set import panels_at_true_size
+from pcmc.drawings.panel_sheets import panel_sheets, triangles_at_true_size
 from pcmc.drawings.sheet import LAYERS, SMALL, SheetLine, box, corner, drawing_area
 from pcmc.drawings.views import ELEVATIONS, profile
 from pcmc.plan import Plan
@@ -95,7 +95,7 @@ def test_a_plane_through_vertices_gives_one_line_per_patch_and_one_at_the_rim_no
 @pytest.mark.parametrize(("name", "millimetres"), [("A4", 60.0), ("A3", 100.0), ("A1", 250.0)])
 def test_panels_on_sheets_are_congruent_apart_and_within_the_frame(squares, name, millimetres):
     schedule = pcmc.panels(squares, 0.01)
-    sheets = panels_at_true_size(schedule, name, millimetres)
+    sheets = panel_sheets(triangles_at_true_size(schedule, millimetres), name)
     assert len(sheets) > 1
     number = 0
     low, high = corner(), corner() + drawing_area(name)
@@ -120,7 +120,7 @@ def test_labels_of_neighbours_name_each_other_and_the_same_edge(squares):
     schedule = pcmc.panels(squares, 0.01)
     labels = {}
     number = 0
-    for sheet in panels_at_true_size(schedule, "A3", 100.0):
+    for sheet in panel_sheets(triangles_at_true_size(schedule, 100.0), "A3"):
         texts = [text.text for text in sheet.texts if text.layer == "PCMC-LABEL"]
         for k in range(0, len(texts), 3):
             number += 1
@@ -155,7 +155,9 @@ def test_panels_larger_than_the_sheet_are_flat_at_true_size_in_model_space(tmp_p
     assert max(a.intersection(b).area for a, b in combinations(shapes, 2)) < 1e-9
     assert min(outline[:, 0].min() for outline in outlines) > squares.vertices[:, 0].max()
     longest = drawings.schedule.panels[["a", "b", "c"]].max(axis=1).median()
-    some = panels_at_true_size(drawings.schedule, "A3", 400.0 / longest)  # some fit, and some do not
+    some = panel_sheets(
+        triangles_at_true_size(drawings.schedule, 400.0 / longest), "A3"
+    )  # some fit, and some do not
     assert {sheet.title.split()[1] == "larger" for sheet in some} == {True, False}
 
 

@@ -15,6 +15,7 @@ from pcmc.forces.second_variation import add_products, hessian
 from pcmc.forces.volume_below import volume_below, volume_below_gradient
 from pcmc.meshing.elevation import elevate
 from pcmc.meshing.refinement import refine
+from studies.reference import evolver
 
 
 def onto_rim(points):
@@ -146,3 +147,16 @@ def test_solve_raises_the_order_itself():
     assert solve(result.surface).surface.order == 2  # stays
     with pytest.raises(OptionError, match=r"^order: expected 1, 2, 4 or 8, found 5$"):
         solve(roof, order=5)
+
+
+@pytest.mark.skipif(not evolver.available(), reason="Surface Evolver is not installed")
+def test_surface_evolver_has_the_same_energy_of_order_2():
+    flat = solve(spherical_cap(0.25)).surface
+    onto = (
+        "foreach vertex vv where vv.fixed do { rr := sqrt(vv.x^2+vv.y^2); vv.x := vv.x/rr; vv.y := vv.y/rr }"
+    )
+    steps = f"quadratic\nhessian_normal on\n{onto}\n" + "hessian\n" * 4
+    theirs = evolver.energy(flat, steps, upright=True)
+    ours = solve(elevate(flat, 2, onto_rim)).energy
+    assert ours == pytest.approx(theirs, rel=1e-7)
+    assert abs(ours / spherical_cap_exact().energy - 1.0) < 1e-5

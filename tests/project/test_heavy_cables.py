@@ -125,6 +125,12 @@ def test_another_unit_keeps_the_forces(sail):
         assert weights_of(pcmc.read("sail.pcmc", units="mm"))["cable 1"] == pytest.approx(0.2e-3)
 
 
+def test_another_unit_moves_the_point_of_a_plane(sail):
+    plane = pcmc.Plane((2.0, 3.0, -4.0), (0.0, 0.0, 1.0))
+    small = scaled_surface(surface_of(load(sail)).rebuilt(plane=plane), 1000.0)
+    assert small.plane.point == (2000.0, 3000.0, -4000.0)
+
+
 def test_a_branch_follows_it(sail):
     start = surface_of(load(sail))
     rates = {"cable_weights": rates_of(start, "cable_weights", {"cable 1": 1.0, "cable 2": -2.0})}

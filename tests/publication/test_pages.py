@@ -29,7 +29,7 @@ SCRIPTS = sorted(path.stem for path in (DOCS / "pictures").glob("*.py") if path.
 @pytest.mark.parametrize("page", night_but(RUN))
 @pytest.mark.filterwarnings("ignore")
 def test_a_page_runs(page, tmp_path, monkeypatch):
-    if page.endswith("under-load.md") and shutil.which("ccx") is None:
+    if page.endswith(("under-load.md", "members.md")) and shutil.which("ccx") is None:
         pytest.skip("CalculiX is not installed")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PCMC_CACHE", str(tmp_path / "cache"))
@@ -62,7 +62,7 @@ def test_a_picture_is_beside_its_script_and_light(name):
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", [name for name in SCRIPTS if name not in ("page", "report", "drawings")])
 def test_a_script_draws_its_picture_again(name, tmp_path):
-    if name in ("load_case", "under_load", "slack") and shutil.which("ccx") is None:
+    if name in ("load_case", "members", "under_load", "slack") and shutil.which("ccx") is None:
         pytest.skip("CalculiX is not installed")
     subprocess.run([sys.executable, DOCS / "pictures" / f"{name}.py"], cwd=tmp_path, check=True)
     assert (tmp_path / f"{name}.png").stat().st_size > 1000

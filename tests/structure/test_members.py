@@ -12,9 +12,13 @@ import pcmc
 from generators import joined_caps
 from pcmc import Material, SelfWeight, Snow, StructuralModel
 from pcmc.base.errors import OptionError
+from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
+from pcmc.report.tables import Table
+from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, members_at_rest
+from pcmc.structure.member_keys import members_of
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 STEEL = Material(2.1e8, density=7.85)
@@ -34,6 +38,12 @@ def hall():
 def hall_with(member=None, **more):
     member = member or Member("wall 1", TUBE, STEEL)
     return StructuralModel(hall(), Material(5e5, 0.2, 1.2), 0.001, members=[member], **more)
+
+
+@cache
+def hall_under_load():
+    """The hall with an arch, by CalculiX."""
+    return analyse(hall_with(loads=[SelfWeight(), Snow(0.1)]), remedy=False)
 
 
 def test_the_edge_of_a_flat_sheet_pulls_a_straight_beam_sideways():
@@ -123,9 +133,9 @@ def test_the_junction_of_two_spheres_needs_no_bending():
 @needs_ccx
 def test_a_member_in_the_place_of_a_wall_carries_what_the_wall_did():
     """The reactions balance the loads; at rest the member carries the wall's pull; beam theory agrees."""
-    model = hall_with(loads=[SelfWeight(), Snow(0.1)])
+    analysis = hall_under_load()
+    model = analysis.model
     free = model.nodes & ~model.held & ~model.on_members
-    analysis = analyse(model, remedy=False)
     assert analysis.carried
     for case in analysis.cases:
         left = forces_on_members(model, case.results.step, case.results)
@@ -138,6 +148,37 @@ def test_a_member_in_the_place_of_a_wall_carries_what_the_wall_did():
     assert run.deflection == pytest.approx(rest.deflection, rel=0.1)
     assert run.within[:, 0] == pytest.approx(rest.within[:, 0], rel=0.03)
     assert set(analysis.tables) == {"cases", "patches", "supports", "members", "member-forces"}
+
+
+@needs_ccx
+def test_the_supports_have_the_ends_of_a_member_and_no_foot_of_its_wall():
+    """What holds an end is the force of its last bar, and the sheets' pull; all balance the loads."""
+    analysis = hall_under_load()
+    table = analysis.supports
+    assert table["support"].tolist() == ["B1", "B2", "M1", "M2"] * 3
+    for case in analysis.cases:
+        own = table[table["case"] == case.name]
+        forces = own[[f"force_{axis}" for axis in "xyz"]].to_numpy()
+        np.testing.assert_allclose(forces.sum(axis=0), case.results.reactions.sum(axis=0), atol=1e-9)
+        [beam] = case.members
+        for row, place, next_to in ((2, 0, 1), (3, -1, -2)):
+            np.testing.assert_allclose(own[[*"xyz"]].to_numpy()[row], beam.points[place], atol=1e-9)
+            of_bar = 0.5 * (beam.within[place] + beam.within[next_to])[:3]
+            left = np.linalg.norm(forces[row] + beam.pulls[place])
+            assert left == pytest.approx(np.linalg.norm(of_bar), rel=0.01)
+
+
+@needs_ccx
+def test_the_chapter_of_a_report_has_sections_and_forces_of_members():
+    blocks = list(chapter(hall_under_load(), Units("m", "kN")))
+    tables = {block.title: block for block in blocks if isinstance(block, Table)}
+    [arch] = tables["Members"].rows
+    assert arch == ["wall 1", "wall 1", "tube 0.1 × 0.005", "0.001492", "1.688e-06", "1.688e-06", "2.1e+08"]
+    assert [row[:2] for row in tables["Forces of members"].rows] == [
+        [case, "wall 1"] for case in ("form pressure", "self-weight", "snow")
+    ]
+    assert "M, kN·m" in tables["Forces of members"].head
+    assert any(isinstance(block, str) and block.startswith("wall 1: at rest N = ") for block in blocks)
 
 
 def test_a_cable_in_the_place_of_a_wall_has_the_tension_that_balances_best():
@@ -174,3 +215,51 @@ def test_a_member_that_cannot_be_is_refused_in_a_line():
         StructuralModel(hall(), FABRIC, 1e-3, members=[Member("wall 1", TUBE, STEEL)] * 2)
     with refused(OptionError, what="members"):
         StructuralModel(hall(), FABRIC, 1e-3, members=["wall 1"])
+    crossing = [[[4, 0], [4, 4]], [[0, 2], [8, 2]]]
+    bays = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], crossing, edge_length=0.8, tension=2.0).surface()
+    with refused(OptionError, what="members", where="wall 1"):
+        lines(bays, Member("wall 1", TUBE, STEEL))
+    assert (
+        len(model_of(bays, members=[Member(w, TUBE, STEEL) for w in ("wall 1", "wall 2")], anyway=True).lines)
+        == 2
+    )
+
+
+def test_members_of_a_project_are_refused_in_a_line():
+    """Without a section, on a divider without a wall, on a free hole, of a name that is not there."""
+    area = [[0, 0], [4, 0], [4, 2], [0, 2]]
+
+    def members(table, **divider):
+        line = {"curve": [[2, 0], [2, 2]], "member": "arch", **divider}
+        return members_of({"arch": table}, Plan(area, [line], tension=2.0))
+
+    good = {"young": 2.1e8, "diameter": 0.1, "thickness": 0.005}
+    assert [m.on for m in members(good)] == ["wall 1"]
+    with refused(OptionError, what="structure.members", where="arch"):
+        members({"young": 2.1e8})
+    with refused(OptionError, what="structure.members", where="arch"):
+        members({"diameter": 0.1})
+    with refused(OptionError, what="area"):
+        members({"young": 2.1e8, "area": 0.0, "upright": 1.0})
+    with refused(OptionError, found="depth"):
+        members({"young": 2.1e8, "depth": 1.0})
+    with refused(OptionError, what="member", found="truss"):
+        members(good, member="truss")
+    with refused(OptionError, what="member"):
+        members(good, wall=False)
+    hole = {"curve": circle([2, 1], 0.4), "edge": "free", "member": "arch"}
+    with refused(OptionError, what="member"):
+        members_of({"arch": good}, Plan(area, holes=[hole], tension=2.0))
+
+
+def test_a_cable_in_the_place_of_a_wall_finds_a_shape_that_does_not_bend():
+    """What the best force along the junction leaves is then nothing."""
+    bays = {name: {"tension": 1.5, "pressure": 0.3} for name in ("west", "east")}
+    line = {"curve": [[6, 0], [6, 8]], "wall": False, "cable": 6.56}
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [line], edge_length=1.2, patches=bays)
+    found = pcmc.solve(plan.surface())
+    assert found.certificate.certified
+    model = StructuralModel(found, Material(5e5), 1e-3, cable_area=1e-4)
+    [cable] = model.standing.cables
+    left = forces_on_members(model, model.steps[0])[np.unique(cable.edges)[2:-2]]
+    assert np.abs(left).max() < 0.05 * 6.56

@@ -1,0 +1,90 @@
+"""Drawings and tables of a net of panels: nodes and panels in plan, panels at true size."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.files import suffix_of
+from ..base.units import Units, as_units, expect_length, length_factor
+from ..certificate.certificate import warning_mark
+from ..panelling import PanelNet
+from .drawing_set import DECIMALS, DrawingSet
+from .drawing_set import SUFFIXES as DRAWINGS
+from .panel_sheets import flat_panels, panel_sheets, polygons_at_true_size
+from .sheet import SheetLine, add_frames, table_sheets
+from .views import DrawnView, placed
+
+CSV, OBJ = ".csv", ".obj"
+SUFFIXES = (*DRAWINGS, CSV, OBJ)
+TABLES = ("", "nodes", "beams")
+
+
+def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: str = "") -> DrawingSet:
+    """The plan of a net, tables of its nodes and panels, and each panel at true size, for .dxf, .pdf, .svg.
+
+    Parameters
+    ----------
+    units : of the lengths: "m", "cm", "mm", "ft" or "in".
+    sheet : format of the sheets, "A4" to "A0".
+    name : of the roof, in the title strips.
+
+    >>> from generators import delaunay
+    >>> from pcmc import panel_net
+    >>> drawings = net_drawings(panel_net(delaunay(exact=True), 0.5, anyway=True), "m", sheet="A0")
+    >>> [page.title for page in drawings.sheets[:4]]
+    ['Panels in plan', 'Nodes', 'Panels', 'Panels 1 to 2 at true size, outside up']
+    """
+    length = expect_length(as_units(units).length, "drawings of panels")
+    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    curves = [
+        SheetLine(net.points[loop], "PCMC-PANEL", True, name=f"panel {k}")
+        for k, loop in enumerate(net.polygons, start=1)
+    ]
+    lines = [line._replace(points=line.points[:, :2]) for line in curves]
+    numbers = [(line.points.mean(axis=0), str(k), np.zeros(2)) for k, line in enumerate(lines, start=1)]
+    ends = [np.array([column.min(), column.max()]) for column in net.points[:, :2].T]
+    plan = DrawnView("", lines, numbers, stations=(ends[0], ends[1]))
+    sheets = [placed([plan], "Panels in plan", sheet, millimetres, None, decimals)]
+    sheets += table_sheets("Nodes", net.nodes[["node", *"xyz", "kind"]], sheet, decimals, {})
+    sheets += table_sheets("Panels", net.panels[["panel", "patch", "kind", "corners", "area"]], sheet, 3, {})
+    panels = polygons_at_true_size(net, millimetres)
+    sheets += panel_sheets(panels, sheet)
+    add_frames(sheets, name, length, warning_mark(net.certificate))
+    points = net.nodes[["node", *"xyz"]].rename(columns={"node": "point"}).astype({"point": str})
+    points = points.assign(on="panel")
+    about = net.mesh, length, net.certificate, curves
+    return DrawingSet(*about, (), points, (), None, flat_panels(panels), sheets)
+
+
+def net_paths(path: Path) -> list[Path]:
+    """The files that one of a net is: those of a .csv are the tables of panels, nodes and beams."""
+    names = TABLES if path.suffix.lower() == CSV else TABLES[:1]
+    return [path.with_name(f"{path.stem}{'-' if one else ''}{one}{path.suffix}") for one in names]
+
+
+def net_files(
+    net: PanelNet,
+    paths: Iterable[str | os.PathLike[str]],
+    units: str | Units,
+    sheet: str = "A1",
+    name: str = "",
+) -> list[tuple[Path, Callable[[Path], Any]]]:
+    """Each file of a net with the function that writes it; FileError for an unknown suffix."""
+    given = [(path, suffix_of(path, SUFFIXES, "a net of panels")) for path in map(Path, paths)]
+    drawn = [path for path, suffix in given if suffix in DRAWINGS]
+    jobs: list[tuple[Path, Callable[[Path], Any]]] = []
+    if drawn:
+        jobs += net_drawings(net, units, sheet=sheet, name=name).files(*drawn)
+    for path, suffix in given:
+        if suffix == OBJ:
+            jobs.append((path, net.write_obj))
+        elif suffix == CSV:
+            tables = zip(net_paths(path), (net.panels, net.nodes, net.beams), strict=True)
+            jobs += [(file, partial(table.to_csv, index=False)) for file, table in tables]
+    return jobs

@@ -1,0 +1,254 @@
+"""Roofs of quads and hexagons: nets of panels on the surface, planar where its shape allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..base import validate
+from ..base.arrays import Floats, Ints
+from ..base.errors import OptionError, SurfaceError
+from ..base.units import NO_UNITS, Units
+from ..certificate import Certificate
+from ..certificate.certificate import certified
+from ..io.obj import SPECIAL
+from ..io.text import escaped
+from ..surface import Patch, Surface, expect_surface
+from ..surface.geometry import cross_2d
+from ..surface.pieces import point_text
+from .isothermic import curvature_coordinates
+from .net import line_ends, net, nudged
+from .net_tables import SheetNet, joined_nets, net_tables, shared_ends
+from .planar import planarised, torsion_free_axes
+from .sheet import Sheet, sheets_of
+
+PATTERNS = ("planar-quads", "quads", "hexagons")
+LARGEST = 0.5  # of a sheet's size: larger panels are refused
+
+
+@dataclass(frozen=True, eq=False)
+class PanelNet:
+    """Panels of a roof with three or more corners each. ``print`` shows the totals.
+
+    Panels, nodes and beams are numbered from 1. Lengths are in the surface's unit, angles in degrees.
+
+    Attributes
+    ----------
+    surface, certificate : the surface and its certificate.
+    pattern, size : as asked for.
+    points : (n,3) the nodes.
+    start, corner : the nodes of panel k are ``corner[start[k]:start[k + 1]]``, seen counter-clockwise from
+        outside.
+    axes : (n,3) node axes with as little torsion as can be; ``points + d * axes`` is a parallel net.
+    normals : (n,3) unit normals of the surface at the nodes.
+    nodes : a row per node: ``node``, ``x``, ``y``, ``z``, ``kind`` ("inside", "edge" on a ridge or rim,
+        "corner"); its ``distance`` from the surface; ``lean``, the angle of its axis from the normal.
+    panels : a row per panel: ``panel``, ``patch``, ``kind`` ("whole", "cut" by a ridge or rim that is no line
+        of the net, "umbilic"), ``corners``, ``area``; ``planarity``, the distance between the diagonals over
+        their mean length; ``distance`` from the surface, the largest of its corners and middle; ``turned``,
+        the mean angle between the net and the principal directions, NaN if the net does not follow them.
+    beams : a row per edge: ``beam``, ``node``, ``other``, ``length``, ``panel``, ``neighbour`` (0 for none);
+        ``torsion`` with the ``axes``, ``torsion_normal`` with the normals.
+    umbilics : (k,3) the places inside patches where the directions of a planar net have no sense.
+
+    >>> from generators import delaunay
+    >>> net = panel_net(delaunay(exact=True), 0.5, anyway=True)
+    >>> bool(net.panels["planarity"].max() < 1e-6), len(net.umbilics)
+    (True, 0)
+    """
+
+    surface: Surface
+    pattern: str
+    size: float
+    certificate: Certificate
+    points: Floats
+    start: Ints
+    corner: Ints
+    axes: Floats
+    normals: Floats
+    nodes: pd.DataFrame
+    panels: pd.DataFrame
+    beams: pd.DataFrame
+    umbilics: Floats
+
+    @property
+    def polygons(self) -> list[Ints]:
+        """The nodes of each panel."""
+        return np.split(self.corner, self.start[1:-1])
+
+    @property
+    def mesh(self) -> Surface:
+        """The panels as triangles around their middles, a patch for each panel: "panel 1" and so on."""
+        count, total = np.diff(self.start), len(self.corner)
+        owner = np.repeat(np.arange(len(count)), count)
+        after = np.arange(total) + 1
+        after[self.start[1:] - 1] = self.start[:-1]
+        middle = np.add.reduceat(self.points[self.corner], self.start[:-1]) / count[:, None]
+        faces = np.stack([self.corner, self.corner[after], len(self.points) + owner], axis=1)
+        tensions = {patch.name: patch.tension for patch in self.surface.patches}
+        patches = tuple(
+            Patch(f"panel {k}", tensions[name]) for k, name in enumerate(self.panels["patch"], start=1)
+        )
+        X = np.concatenate([self.points, middle])
+        return Surface(X, faces, owner, patches, fixed=np.ones(len(X), dtype=bool), plane=self.surface.plane)
+
+    def write_obj(self, path: str | PathLike[str]) -> None:
+        """Write the panels as polygons of a Wavefront .obj, a group per patch."""
+        lines = ["# panels of pcmc", *("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())]
+        patch = self.panels["patch"].tolist()
+        for k, loop in enumerate(self.polygons):
+            lines += [f"g {escaped(patch[k], SPECIAL)}"] if k == 0 or patch[k] != patch[k - 1] else []
+            lines.append("f " + " ".join(map(str, loop + 1)))
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def offset(self, distance: float, *, torsion: bool = False) -> Floats:
+        """(n,3) the nodes of a parallel net at a distance outside; with ``torsion``, along the normals."""
+        distance = validate.number("distance", distance)
+        return self.points + distance * (self.normals if torsion else self.axes)
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """Totals, with the units of the numbers if they are given."""
+        table, beams = self.panels, self.beams
+        kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
+        worst = table.iloc[table["planarity"].argmax()]
+        rows = [
+            ("panels", f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"),
+            (
+                "area",
+                f"{table['area'].sum():.6g}, panels {table['area'].min():.3g} to {table['area'].max():.3g}",
+            ),
+            (
+                "planarity",
+                f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g} "
+                f"(panel {worst['panel']}, {worst['kind']})",
+            ),
+            (
+                "distance",
+                f"from the surface, nodes {self.nodes['distance'].max():.3g}, "
+                f"panels {table['distance'].max():.3g}",
+            ),
+            (
+                "torsion",
+                f"of beams, median {beams['torsion'].median():.2g}, largest {beams['torsion'].max():.3g} "
+                f"degrees; along normals {beams['torsion_normal'].median():.2g} and "
+                f"{beams['torsion_normal'].max():.3g}",
+            ),
+        ]
+        if len(self.umbilics):
+            places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])
+            rows.append(("umbilics", f"{len(self.umbilics)}: {places}"))
+        if units:
+            rows.insert(0, ("units", units.sentence))
+        if not self.certificate.certified:
+            rows.insert(0, ("not certified", self.certificate.verdict.value))
+        return "\n".join(f"{name:>14}  {text}" for name, text in rows)
+
+
+def panel_net(
+    surface: Surface,
+    size: float,
+    pattern: str = "planar-quads",
+    *,
+    direction: float = 0.0,
+    anyway: bool = False,
+    certificate: Certificate | None = None,
+) -> PanelNet:
+    """Quads or hexagons on a roof.
+
+    Parameters
+    ----------
+    surface : a certified surface.
+    size : of a panel's edge, length, in the mean.
+    pattern : "planar-quads" along lines of curvature, made planar; "quads" between the lines of a grid in
+        plan, with their nodes on the surface; or "hexagons" of a grid in plan, made planar.
+    direction : of the grid in plan, degrees from x.
+    anyway : accept a surface that is not certified.
+    certificate : of the surface, where it is known; by default it is computed.
+
+    Raises
+    ------
+    SurfaceError : the surface is not certified, or is all walls.
+    OptionError : the size is too large for a patch, or the pattern does not exist on one.
+
+    >>> from generators import delaunay
+    >>> print(len(panel_net(delaunay(exact=True), 0.5, anyway=True).panels))
+    70
+    """
+    expect_surface(surface)
+    size = validate.positive("size", size)
+    validate.choice("pattern", pattern, PATTERNS)
+    direction = validate.number("direction", direction)
+    certificate = certified(surface, anyway, certificate)
+    sheets = sheets_of(surface)
+    if not sheets:
+        text = "surface: no panels: every patch is a wall"
+        raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
+    parts = [_sheet_net(surface, *one, size, pattern, direction) for one in sheets]
+    nets = []
+    for part, more in zip(parts, shared_ends(surface, parts), strict=True):
+        nets.append(net(part.sheet, part.at, part.ends, more, pattern == "hexagons"))
+        if not nets[-1].whole:
+            text = f"size: no net of panels of {size:g} fits patch {part.name!r}"
+            raise OptionError(f"{text}; choose a smaller size, or a finer mesh", what="size", found=size)
+    joined = joined_nets(surface, parts, nets, size)
+    points = joined.points
+    if pattern != "quads":
+        points = planarised(points, joined.start, joined.corner, joined.kind == 0)
+    axes = torsion_free_axes(points, joined.beams, joined.normals)
+    tables = net_tables(surface, joined, points, axes)
+    umbilics = np.concatenate([part.sheet.X[part.umbilics] for part in parts])
+    return PanelNet(
+        surface,
+        pattern,
+        size,
+        certificate,
+        points,
+        joined.start,
+        joined.corner,
+        axes,
+        joined.normals,
+        *tables,
+        umbilics,
+    )
+
+
+def _sheet_net(
+    surface: Surface, patch: int, faces: Ints, sheet: Sheet, size: float, pattern: str, direction: float
+) -> SheetNet:
+    """A sheet with the coordinates of its net."""
+    name = surface.patches[patch].name
+    most = LARGEST * float(np.ptp(sheet.X, axis=0).max())
+    if size > most:
+        text = f"size: panels of {size:g} are too large for patch {name!r}; choose at most {most:.2g}"
+        raise OptionError(text, what="size", found=size, expected=most)
+    if pattern == "planar-quads":
+        found = curvature_coordinates(sheet, size, name)
+        on_line = np.zeros(len(sheet.X), dtype=bool)
+        for curve in found.aligned:
+            on_line[curve.vertices] = True
+        turned = np.degrees(np.abs(found.turned))
+        return SheetNet(
+            name, faces, sheet, found.at, line_ends(sheet, found.at), found.umbilics, on_line, turned
+        )
+    hexagons = pattern == "hexagons"
+    angle = np.radians(direction)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    middle = 0.5 * (surface.vertices.max(axis=0) + surface.vertices.min(axis=0))
+    steps = size * (np.array([0.5 * np.sqrt(3.0), 1.5]) if hexagons else np.ones(2))
+    grid = (sheet.X - middle)[:, :2] @ turn.T / steps
+    at = np.stack([nudged(grid[:, k], sheet.F) for k in range(2)], axis=2)
+    over = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) <= 0.0
+    if over.any():
+        place = point_text(sheet.X[sheet.F[over]].mean(axis=1)[0].round(3))
+        text = f"pattern: patch {name!r} is upright or overhangs at {place}, where a grid in plan folds"
+        raise OptionError(f"{text}; choose 'planar-quads'", what="pattern", found=pattern)
+    none = np.zeros(len(sheet.X), dtype=bool)
+    ends = line_ends(sheet, at, hexagons)
+    return SheetNet(name, faces, sheet, at, ends, np.flatnonzero(none), none, np.full(len(faces), np.nan))

@@ -1,0 +1,144 @@
+"""Nets of quads and hexagons: planar along lines of curvature, closed forms, refusals."""
+
+import numpy as np
+import pytest
+
+import pcmc
+from generators import delaunay, spherical_cap
+from pcmc.base.errors import OptionError
+from pcmc.panelling import panel_net
+from pcmc.panelling.directions import shape_operators
+from pcmc.panelling.planar import by_corners
+from pcmc.plan import Plan
+
+
+def _curvatures(surface, waviness=0.4):
+    """κ₁ - κ₂ of Delaunay's surface at its vertices: κ = z'/r around and 1 - κ along it."""
+    square = (surface.vertices[:, :2] ** 2).sum(axis=1)
+    around = 0.5 * (1.0 + square - waviness**2) / square
+    return np.abs(2.0 * around - 1.0)
+
+
+def test_principal_curvatures_of_an_unduloid_converge_with_order_two():
+    error = []
+    for edge in (0.3, 0.15, 0.075):
+        surface = delaunay(edge, exact=True)
+        T = shape_operators(surface.vertices, surface.faces)
+        trace = np.trace(T, axis1=1, axis2=2)
+        apart = np.sqrt(np.maximum(2.0 * (T**2).sum(axis=(1, 2)) - trace**2, 0.0))
+        error.append(np.abs(apart - _curvatures(surface)).max())
+    assert (np.log2(np.divide(error[:-1], error[1:])) > 1.9).all()
+
+
+@pytest.mark.parametrize(
+    "shape", [{}, {"waviness": 1.6, "centre": "bulge"}, {"waviness": 0.0}, {"centre": "neck"}]
+)
+def test_panels_of_delaunays_surfaces_lie_between_meridians_and_parallels(shape):
+    surface = delaunay(0.15, exact=True, **shape)
+    net = panel_net(surface, 0.4, anyway=True)
+    assert set(net.panels["kind"]) == {"whole"}
+    assert net.panels["planarity"].max() < 1e-6
+    assert len(net.umbilics) == 0
+    count = int((net.beams["neighbour"] == 0).sum()) // 2  # meridians
+    rows = len(net.points) // count
+    assert len(net.points) == count * rows
+    assert len(net.panels) == count * (rows - 1)
+    heights = np.sort(net.points[:, 2]).reshape(rows, count)
+    assert np.ptp(heights, axis=1).max() < 0.01  # of parallels
+    assert net.beams["torsion_normal"].max() < 0.1
+
+
+def test_traces_of_a_net_close_and_beams_count_as_euler_says():
+    net = panel_net(delaunay(0.15, exact=True), 0.4, anyway=True)
+    assert len(net.points) - len(net.beams) + len(net.panels) == 0  # an annulus
+    assert (net.beams["neighbour"] == 0).sum() == 2 * 17
+    assert np.bincount(net.corner).max() == 4
+
+
+@pytest.fixture(scope="module")
+def rectangle():
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], edge_length=0.8, patches={"roof": {"tension": 5.0}})
+    return pcmc.solve(plan.surface()).surface
+
+
+def test_a_roof_over_a_rectangle_has_two_umbilics_on_its_axis_with_six_sided_panels(rectangle):
+    net = panel_net(rectangle, 1.0)
+    assert np.abs(net.umbilics[:, 1] - 4.0).max() < 0.8
+    assert abs(net.umbilics[:, 0].sum() - 12.0) < 0.8
+    around = net.panels.query("kind == 'umbilic'")
+    assert around["corners"].tolist() == [6, 6]
+    inside = net.panels.query("kind != 'cut'")
+    assert inside["planarity"].max() < 1e-5
+    assert net.panels["planarity"].max() < 0.03
+    assert net.nodes["distance"].max() < 0.15
+    assert len(net.points) - len(net.beams) + len(net.panels) == 1
+
+
+def test_panels_share_the_nodes_of_a_ridge():
+    from pcmc.plan import Divider
+
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [Divider([[6, 0], [6, 8]], wall=1.5)], edge_length=0.8,
+                patches={"west": {"tension": 5.0}, "east": {"tension": 4.5}})  # fmt: skip
+    net = panel_net(pcmc.solve(plan.surface()).surface, 1.0)
+    patch = net.panels["patch"].to_numpy()
+    pairs = net.beams.query("neighbour > 0")[["panel", "neighbour"]].to_numpy() - 1
+    assert (patch[pairs[:, 0]] != patch[pairs[:, 1]]).sum() >= 4
+    assert len(net.points) - len(net.beams) + len(net.panels) == 1
+
+
+def test_quads_of_a_grid_stay_on_the_surface_and_are_worse_planar(rectangle):
+    grid, planar = panel_net(rectangle, 1.0, "quads"), panel_net(rectangle, 1.0)
+    assert grid.nodes["distance"].max() < 1e-12
+    assert grid.panels["planarity"].median() > 100 * planar.panels["planarity"].median()
+    assert grid.beams["torsion_normal"].median() > 2 * planar.beams["torsion_normal"].median()
+    assert abs(grid.panels["area"].sum() / sum(pcmc.certify(rectangle).patches["area"]) - 1.0) < 0.02
+
+
+def test_hexagons_have_three_edges_at_each_node_inside_and_are_planar(rectangle):
+    net = panel_net(rectangle, 1.0, "hexagons")
+    ends = net.beams[["node", "other"]].to_numpy().ravel() - 1
+    inside = net.nodes["kind"].to_numpy() == "inside"
+    assert set(np.bincount(ends)[inside]) == {3}
+    whole = net.panels.query("kind == 'whole'")
+    assert set(whole["corners"]) == {6}
+    assert whole["planarity"].max() < 1e-4
+
+
+def test_a_parallel_net_has_parallel_edges_and_one_along_the_normals_has_not(rectangle):
+    net = panel_net(rectangle, 1.0)
+    ends = net.beams[["node", "other"]].to_numpy() - 1
+    for torsion, most in ((False, 0.2), (True, 20.0)):
+        shifted = net.offset(0.2, torsion=torsion)
+        one, other = (P[ends[:, 1]] - P[ends[:, 0]] for P in (net.points, shifted))
+        sine = np.linalg.norm(np.cross(one, other), axis=1)
+        sine /= np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+        assert np.degrees(np.arcsin(sine)).max() < most
+    assert net.beams["torsion"].max() < 0.2 < net.beams["torsion_normal"].max()
+
+
+def test_planarity_is_that_of_libigl_and_compas(rectangle):
+    import igl
+    from compas.geometry import distance_line_line
+
+    net = panel_net(rectangle, 1.0, "quads")
+    for chosen, loops in by_corners(net.start, net.corner):
+        if loops.shape[1] == 4:
+            for k, loop in zip(chosen[:20], loops[:20], strict=True):
+                a, b, c, d = net.points[loop].tolist()
+                gap = distance_line_line((a, c), (b, d))
+                lengths = np.linalg.norm(np.subtract(a, c)) + np.linalg.norm(np.subtract(b, d))
+                assert net.panels["planarity"][k] == pytest.approx(2.0 * gap / lengths, abs=1e-12)
+            found = igl.quad_planarity(net.points, loops.astype(np.int64))
+            assert np.allclose(np.abs(np.ravel(found)), net.panels["planarity"][chosen], atol=1e-9)
+
+
+def test_bad_input_is_refused_in_one_line(rectangle):
+    cap = pcmc.solve(spherical_cap(0.2)).surface
+    with pytest.raises(OptionError, match="part of a sphere: every point is an umbilic"):
+        panel_net(cap, 0.2)
+    with pytest.raises(OptionError, match="too large for patch 'roof'; choose at most 6"):
+        panel_net(rectangle, 7.0)
+    with pytest.raises(OptionError, match="is upright or overhangs at"):
+        panel_net(delaunay(exact=True), 0.4, "quads", anyway=True)
+    with pytest.raises(OptionError, match="pattern"):
+        panel_net(rectangle, 1.0, "octagons")
