@@ -115,7 +115,8 @@ def data(folder: Folder, short: bool) -> None:
                 place = float(places.parameter.iloc[0]) if len(places) else np.nan
                 turns.append({"case": case, "edge_length": edge, "place": place})
             if edge == EDGES[case][0]:
-                folder.write_mesh(case, {f"{k}": one.surface for k, one in enumerate(found.found, 1)})
+                for k, one in enumerate(found.found, 1):
+                    folder.write_mesh(f"{case}-{k}", {"at rest": one.surface})
     folder.write_table("records", pd.DataFrame(rows))
     folder.write_table("places", pd.DataFrame(turns))
 
@@ -168,8 +169,8 @@ def figure(folder: Folder) -> None:
     for case in EDGES:
         mine = records[records.case == case]
         mine = mine[mine.edge_length == mine.edge_length.max()]
-        for row, surface in zip(mine.to_dict("records"), folder.read_mesh(case).values(), strict=True):
-            shapes.append(surface)
+        for row in mine.to_dict("records"):
+            shapes.append(folder.read_mesh(f"{case}-{row['number']}")["at rest"])
             titles.append(f"{case} {row['number']}: index {row['index']}")
     panel(shapes, folder.figure("atlas"), columns=5, titles=titles, supports=False, one_scale=False)
 
@@ -181,6 +182,6 @@ STUDY = Study(
     table,
     figure,
     parameters={"edges": EDGES, "length": LENGTH, "wire": WIRE},
-    seconds=60,
+    seconds=110,
     paper=False,
 )
