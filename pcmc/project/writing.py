@@ -149,13 +149,14 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
 
 
 def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
-    """The tables and the picture of an analysis beside the structural model."""
-    from ..plot import under_load  # needs the extra plot
+    """The tables and pictures of an analysis beside the structural model."""
+    from ..plot import member_forces, under_load  # needs the extra plot
 
-    jobs: FileJobs = [(path.with_name(f"{path.stem}-cases.png"), partial(under_load, analysis))]
-    for name, table in analysis.tables.items():
-        jobs.insert(-1, (path.with_name(f"{path.stem}-{name}.csv"), partial(table.to_csv, index=False)))
-    return jobs
+    pictures: dict[str, Any] = {"cases": under_load}
+    pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
+    tables = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
+    jobs = tables | {f"{name}.png": partial(draw, analysis) for name, draw in pictures.items()}
+    return [(path.with_name(f"{path.stem}-{name}"), write) for name, write in jobs.items()]
 
 
 def draw_picture(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..base.units import Units
-from ..plot import under_load
+from ..plot import member_forces, under_load
 from ..plot.figure import png
 from ..structure.member_forces import sentences
 from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
@@ -82,4 +82,5 @@ def _members(analysis: Analysis, units: Units) -> Iterator[Block]:
     columns["span over it"] = [f"{over:.3g}" if over < 1e4 else f"{over:.0f}" for over in table["span_over"]]
     yield text_table("Forces of members", {"case": table["case"], "member": table["member"]}, columns)
     yield SIGNS
+    yield Picture("", png(member_forces(analysis, units=units, width=PIXELS)))
     yield from (f"{line}." for line in sentences(analysis.model, units))

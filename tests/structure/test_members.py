@@ -14,7 +14,8 @@ from pcmc import Material, SelfWeight, Snow, StructuralModel
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
-from pcmc.report.tables import Table
+from pcmc.plot import member_forces
+from pcmc.report.tables import Picture, Table
 from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, members_at_rest
@@ -179,6 +180,25 @@ def test_the_chapter_of_a_report_has_sections_and_forces_of_members():
     ]
     assert "M, kN·m" in tables["Forces of members"].head
     assert any(isinstance(block, str) and block.startswith("wall 1: at rest N = ") for block in blocks)
+    assert sum(isinstance(block, Picture) for block in blocks) == 3
+
+
+@needs_ccx
+def test_the_picture_of_forces_has_a_column_per_member_and_refuses_a_wrong_name():
+    """A straight edge bends in the plane of its sheet: what is across is dashed."""
+    edges = [Member(polyline([[0, y], [1, y]]), TUBE, STEEL, name=f"edge {y}") for y in (0, 1)]
+    both = analyse(model_of(square(8, tension=2.0), members=edges, anyway=True))
+    one, two = member_forces(both, members=("edge 0",), width=400), member_forces(both, width=800)
+    assert one.shape[1] == two.shape[1] // 2
+    assert one.shape[0] == two.shape[0]
+    inked = [(picture.min(axis=2) < 100).sum() for picture in (one, two)]
+    assert inked[1] > 1.5 * inked[0]
+    with refused(OptionError, what="members", found="edge 2"):
+        member_forces(both, members=("edge 2",))
+    with refused(OptionError, what="cases", found="wind"):
+        member_forces(both, cases=("wind",))
+    with refused(OptionError, what="analysis"):
+        member_forces(analyse(model_of(square(4, tension=2.0), anyway=True)))
 
 
 def test_a_cable_in_the_place_of_a_wall_has_the_tension_that_balances_best():
