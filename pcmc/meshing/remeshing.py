@@ -17,6 +17,7 @@ from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import lift, standing_part
 from ..surface import Surface
+from ..surface.lagrange import expect_flat
 from ..surface.geometry import angles, face_areas, segment_lengths
 from ..surface.topology import SIDES, edge_places
 from .angles import improve_angles
@@ -83,6 +84,7 @@ def remesh(
     >>> fine.m > 2 * dome.m, fine.patches == dome.patches
     (True, True)
     """
+    expect_flat(surface, "remesh")
     one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
     check_lengths(one, near_curves, growth, chord)
     if np.ndim(edge_length) == 0:

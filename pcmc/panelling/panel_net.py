@@ -18,6 +18,7 @@ from ..certificate.certificate import certified
 from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
+from ..surface.lagrange import expect_flat
 from ..surface.geometry import cross_2d
 from ..surface.pieces import point_text
 from .isothermic import curvature_coordinates
@@ -182,6 +183,7 @@ def panel_net(
     70
     """
     expect_surface(surface)
+    expect_flat(surface, "the net of panels")
     size = validate.positive("size", size)
     validate.choice("pattern", pattern, PATTERNS)
     direction = validate.number("direction", direction)
