@@ -19,7 +19,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
     between them. Inside, they follow a curved edge ab as smoothly as it runs: with its distance from the
     chord written as t (1 - t) Q(2t - 1), t from a to b, the map of the element has
 
-        x(λ) = x_flat(λ) + Σ_ab λ_a λ_b Q(λ_b - λ_a)       (Szabó and Babuška, Finite Element Analysis, 1991).
+        x(λ) = x_flat(λ) + Σ_ab λ_a λ_b Q(λ_b - λ_a)       (Szabó and Babuška 1991).
 
     So its derivatives of each order k are O(h^k), which elements of order 4 and more need for their accuracy.
 

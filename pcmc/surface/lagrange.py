@@ -182,7 +182,7 @@ def _quadrature(order: int) -> tuple[Floats, Floats]:
     """Barycentric points (q,3) and weights (q,), exact for the degree 3p - 2 of volumes.
 
     Up to order 2 the rules of degree 1 and 5 that treat the corners alike (Radon 1948); above, Gauss's in ξ
-    and in η/(1 - ξ), with Jacobi's weight (Stroud, Approximate Calculation of Multiple Integrals, 1971).
+    and in η/(1 - ξ), with Jacobi's weight (Stroud 1971).
     """
     if order == 1:
         return np.full((1, 3), 1.0 / 3.0), np.array([0.5])
