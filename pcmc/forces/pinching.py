@@ -177,7 +177,9 @@ class StandingPart:
     def of(cls, whole: Surface, walls: Walls, resting: Bools) -> StandingPart:
         """The part that stands where the given vertices rest; SurfaceError for curved elements there."""
         if whole.order > 1 and resting.any():
-            message = f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only flat"
+            message = (
+                f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only flat"
+            )
             message += " triangles have contact; give order=1"
             raise SurfaceError(message, what="order", found=whole.order, expected=1)
         surface = _without_pinched_walls(whole, walls, resting)

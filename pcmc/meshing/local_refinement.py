@@ -11,8 +11,8 @@ from ..base.arrays import Bools, Ints
 from ..base.errors import OptionError
 from ..forces.pinching import Walls, lift, standing_part
 from ..surface import Surface
-from ..surface.lagrange import expect_flat
 from ..surface.geometry import segment_lengths
+from ..surface.lagrange import expect_flat
 from ..surface.topology import edge_places
 from .curve_cutting import cut_triangles
 from .quality import edge_lengths

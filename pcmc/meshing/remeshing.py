@@ -17,8 +17,8 @@ from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import lift, standing_part
 from ..surface import Surface
-from ..surface.lagrange import expect_flat
 from ..surface.geometry import angles, face_areas, segment_lengths
+from ..surface.lagrange import expect_flat
 from ..surface.topology import SIDES, edge_places
 from .angles import improve_angles
 from .curve_cutting import CurveMesh, cut_curves

@@ -57,10 +57,14 @@ def test_a_solver_keeps_the_order():
 
 
 def test_only_flat_triangles_rest_on_the_plane():
-    with pytest.raises(SurfaceError, match=r"^order: the junction comes down to the plane at vertex \d+, and"):
+    with pytest.raises(
+        SurfaceError, match=r"^order: the junction comes down to the plane at vertex \d+, and"
+    ):
         solve(two_caps(), order=2)
     resting = refine(solve(two_squares(alpha_aux=4.0)).surface)
-    with pytest.raises(SurfaceError, match=r"^order: the junction comes down to the plane at vertex \d+, and"):
+    with pytest.raises(
+        SurfaceError, match=r"^order: the junction comes down to the plane at vertex \d+, and"
+    ):
         certify(resting.rebuilt(order=2))
 
 
@@ -74,5 +78,7 @@ def test_only_flat_triangles_rest_on_the_plane():
     ],
 )
 def test_what_is_for_flat_triangles_refuses_others(act, name):
-    with pytest.raises(SurfaceError, match=rf"^{name}: only for flat triangles, and the elements are of order 2"):
+    with pytest.raises(
+        SurfaceError, match=rf"^{name}: only for flat triangles, and the elements are of order 2"
+    ):
         act(elevate(spherical_cap(0.5), 2))
