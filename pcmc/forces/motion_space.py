@@ -246,9 +246,9 @@ def normal_vectors(
     """(n,3) along the sheets' normals: the area vectors of flat triangles around each vertex.
 
     At the nodes of curved elements the unit normals of the corners are interpolated, each of the triangles
-    around it in the same sheet, with their images: where the normals of nodes are uneven, so are their distances
-    after a step, and elements of order 4 and more lose their order. Quadratic in ``there``, if those of these positions
-    are asked for, with the lengths that make them unit normals at X.
+    around it in the same sheet and their mirror images: where the normals of nodes are uneven, so are their
+    distances after a step, and elements of order 4 and more lose their order. Quadratic in ``there``, if
+    those of these positions are asked for, with the lengths that make them unit normals at X.
     """
     if classes.nodes.shape[1] == 3:
         return vertex_area_vectors(X, classes.faces)[0]
