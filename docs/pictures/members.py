@@ -1,9 +1,9 @@
 """The forces along an arch in the place of a wall, by CalculiX."""
 
-from matplotlib import pyplot as plt
-
 import pcmc
+from pcmc.base.units import Units
 from pcmc.plan import Divider, Plan
+from pcmc.plot import member_forces
 
 plan = Plan(  # metres and kilonewtons
     [[0, 0], [12, 0], [12, 8], [0, 8]],
@@ -19,14 +19,4 @@ model = pcmc.StructuralModel(
     loads=[pcmc.SelfWeight(), pcmc.Snow(0.15)],
     members=[arch],
 )
-forces = pcmc.analyse(model).member_forces
-figure, axes = plt.subplots(2, 1, sharex=True, figsize=(7, 4.5), layout="constrained")
-for case, own in forces[forces["case"] != "self-weight"].groupby("case", sort=False):
-    for axis, column in zip(axes, ("N", "M"), strict=True):
-        axis.plot(own["s"], own[column], marker=".", label=case)
-for axis, label in zip(axes, ("N, kN", "M, kN m"), strict=True):
-    axis.axhline(0.0, color="0.6", linewidth=0.8)
-    axis.set_ylabel(label)
-axes[0].legend(frameon=False)
-axes[1].set_xlabel("along the arch, m")
-figure.savefig("members.png", dpi=110)
+member_forces(pcmc.analyse(model), "members.png", cases=("form pressure", "snow"), units=Units("m", "kN"))

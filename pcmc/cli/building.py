@@ -284,8 +284,8 @@ def structure(
 
     A project is solved first; its [structure] has the values that no option gives. With --run each case and
     combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv,
-    NAME-members.csv, NAME-member-forces.csv and NAME-cases.png come beside the model. A case that is not
-    carried as a whole ends with the code 1.
+    NAME-members.csv, NAME-member-forces.csv, NAME-cases.png and NAME-member-forces.png come beside the model.
+    A case that is not carried as a whole ends with the code 1.
 
     \b
     Examples:

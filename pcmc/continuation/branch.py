@@ -125,15 +125,54 @@ class Branch:
         """
         row, goals = self._bifurcation(event), _goals(stop, until)
         chosen = validate.build(FollowOptions, "switch", vars(self._options) | options)
-        if self._line is None:
-            message = "switch: this branch was put together from tables; only one that follow gave can switch"
-            raise OptionError(message, what="branch")
-        line, surface = replace(self._line, value=float(self.events.parameter[row])), self.event_surfaces[row]
+        line = replace(self._known_line("switch"), value=float(self.events.parameter[row]))
+        surface = self.event_surfaces[row]
         one, other = (
             _traced(self.parameter, Tracer(surface, line, goals, chosen, callback, start))
             for start in leaving(BranchMesh(surface, line, chosen.backend), line.value, chosen, row)
         )
         return one, other
+
+    def resume(self, row: int, stop: float, *, callback: Callback | None = None) -> Branch:
+        """Follow the branch again from one of its points to a value of λ exactly, with its own options.
+
+        Parameters
+        ----------
+        row : of ``points``, at which the surface is stored.
+        stop : value of λ; the branch starts towards it.
+        callback : as in ``follow``.
+
+        Raises
+        ------
+        OptionError : no surface is stored at that row.
+
+        Examples
+        --------
+        A pyramid's height between two points of its branch, with α h/√(1 + h²) = 1/3:
+
+        >>> from pcmc import Patch, Surface
+        >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+        >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+        ...                [Patch("roof", 1.0)], fixed=range(4))
+        >>> branch = follow(roof, "roof", 0.5)
+        >>> between = branch.resume(1, 2 / 3).points.iloc[-1]
+        >>> float(between.parameter), float((3 * between.height**2).round(6))
+        (0.6666666666666666, 1.0)
+        """
+        if row not in self.surfaces:
+            validate.refuse("row", row, "a row of points with its surface stored")
+        value = float(self.points.parameter[row])
+        chosen = replace(self._options, step=math.copysign(self._options.step, stop - value))
+        line, goals = replace(self._known_line("resume"), value=value), _goals(stop, None)
+        return _traced(self.parameter, Tracer(self.surfaces[row], line, goals, chosen, callback))
+
+    def _known_line(self, what: str) -> ParameterLine:
+        if self._line is None:
+            message = (
+                f"{what}: this branch was put together from tables; only one that follow gave can {what}"
+            )
+            raise OptionError(message, what="branch")
+        return self._line
 
     def _bifurcation(self, event: int | None) -> int:
         """The row of the event, which must be a bifurcation along one mode."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,8 +13,7 @@ from ..base.errors import NoBranch, OptionError
 from ..base.tolerances import HOMOTOPY_END
 from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..margins.varied import Varied
-from ..solvers import solve
-from ..solvers.result import Progress, Result
+from ..solvers.result import Progress
 from ..surface import Surface
 
 Span = tuple[float, float]
@@ -104,19 +103,35 @@ class Line:
 
         return callback
 
-    def crossings(self, branch: Branch, surface: Surface) -> Iterator[Result]:
-        """The equilibria on a branch at the present value; ``surface`` has it, and the boundary."""
-        off = branch.points.parameter.to_numpy() - self.value
+    def crossings(self, branch: Branch, surface: Surface) -> Iterator[tuple[Surface | str, str]]:
+        """The equilibria on a branch at the present value, or why one was not reached; and where that is.
+
+        ``surface`` has that value, and the boundary. The place is "" except beside a bifurcation: the first
+        point of a branch may be far from that, and the way back may lead onto the branch that was left.
+        """
+        values, slopes = branch.points.parameter.to_numpy(), branch.points.slope.to_numpy()
+        off = values - self.value
         for i in np.flatnonzero((off[:-1] * off[1:] < 0.0) & (np.abs(off[:-1] - off[1:]) > SWITCHED)):
-            before, after = branch.surfaces[int(i)].vertices, branch.surfaces[int(i) + 1].vertices
-            share = off[i] / (off[i] - off[i + 1])
-            if branch.points.slope[i] == 0.0:  # λ grows with the square of the distance from a pitchfork
-                share = share**0.5
-            X = before + share * (after - before)
-            X[surface.pinned] = surface.vertices[surface.pinned]
-            result = solve(surface.moved(X), target="stationary")
-            if result.converged:
-                yield result
+            beside = [int(k) for k in (i, i + 1) if slopes[k] != 0.0]  # a bifurcation is singular
+            there = self._reached(branch, sorted(beside, key=lambda k: abs(off[k])))
+            place = "" if len(beside) == 2 else f"{values[i]:.4g} and was first met at {values[i + 1]:.4g}"
+            if isinstance(there, Surface) and np.array_equal(there.faces, surface.faces):
+                there = surface.moved(there.vertices)
+            yield there, place
+
+    def _reached(self, branch: Branch, rows: Sequence[int]) -> Surface | str:
+        """The surface at the present value, from the first of some points that leads there; or why none."""
+        reason = ""
+        for row in rows:
+            try:
+                way = branch.resume(row, self.value)
+            except NoBranch as error:
+                reason = str(error)
+                continue
+            if way.ending is Ending.REACHED:
+                return way.last
+            reason = way.message
+        return reason
 
 
 def _from_event(branch: Branch, other: Branch, row: int) -> Branch:

@@ -24,6 +24,7 @@ from .branches import Line, Span
 from .deflation import deflated_newton
 from .found import Equilibria, FoundEquilibrium, WayDown
 from .shapes import Shape
+from .triangles import with_good_triangles
 from .ways_down import pass_between, way_down
 
 MODES = 8  # of the lowest modes a start is displaced along
@@ -114,8 +115,9 @@ def find_equilibria(
     (3) From saddles the ways down lead to minima, and between two minima that no saddle joins the highest
     surface on the straight way is a start for the pass between them.
 
-    Two equilibria are one if their shapes are nearer to each other than a quarter of an edge
-    (``shape_distance``) and their indices agree: other triangles change a shape by about as much.
+    Two equilibria are one if their shapes are nowhere farther apart than a quarter of an edge and their
+    indices agree: other triangles change a shape by about as much. An equilibrium found with poor
+    triangles is solved again on a new mesh (with the library mmgpy).
 
     Examples
     --------
@@ -210,7 +212,7 @@ class _Search:
             self.add(result.surface, "from the start given")
         low = low_start(surface)
         if low is not None and (result := existence.solve(low)).converged:
-            self.add(result.surface, "from a low start")
+            self.add(with_good_triangles(result.surface), "from a low start")
 
     def add(self, surface: Surface, how: str, certificate: Certificate | None = None) -> int | None:
         """The number of an equilibrium, new if its shape or index is; None if it cannot be certified."""
@@ -234,7 +236,12 @@ class _Search:
         def watch(_: Progress) -> None:
             self.tell(f"following the {line.name} from equilibrium {number + 1}")
 
-        branch = line.trace(self.found[number].surface, watch)
+        start = self.found[number].surface
+        if isinstance(line.parameter, BoundaryMotion) and start.pinned.sum() != self.surface.pinned.sum():
+            text = f"The equilibrium {self.found[number].found} has a new mesh; no branch in {line.name}"
+            self.failed.append(f"{text} was followed from it, as that moves the vertices of the boundary.")
+            return
+        branch = line.trace(start, watch)
         if branch is None:
             self.failed.append(
                 f"No branch in {line.name} starts at the equilibrium {self.found[number].found}."
@@ -245,13 +252,26 @@ class _Search:
             following = list[Branch]()
             for branch in level:
                 self.branches[line.name].append(branch)
-                for result in line.crossings(branch, self.surface):
-                    k = self.add(result.surface, how)
-                    if k is not None:
-                        self.on_branch.add(k)
+                for there, beside in line.crossings(branch, self.surface):
+                    self.cross(line, there, beside, how)
                 if depth < self.options.depth:
                     following += self.leaving(line, branch, watch)
             level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
+
+    def cross(self, line: Line, there: Surface | str, beside: str, how: str) -> None:
+        """Add the equilibrium where a branch passes the present value, or tell why there is none."""
+        now, known = f"{line.name} {line.value:.4g}", len(self.found)
+        if isinstance(there, str):
+            self.failed.append(f"A branch passes {now}, but its equilibrium there was not reached: {there}.")
+            return
+        k = self.add(with_good_triangles(there), how)
+        if k is None:
+            self.failed.append(f"A branch passes {now}, but its equilibrium there cannot be certified.")
+            return
+        self.on_branch.add(k)
+        if beside and k < known:
+            back = f"the way from there to {line.value:.4g} leads back to a known equilibrium"
+            self.failed.append(f"A branch left at {line.name} {beside}; {back}. Try a finer mesh.")
 
     def leaving(self, line: Line, branch: Branch, watch: Callable[[Progress], None]) -> list[Branch]:
         """The branches that leave one at bifurcations where no other was left before."""
@@ -276,7 +296,9 @@ class _Search:
                 if status is Status.STOPPED:
                     raise KeyboardInterrupt
                 rests = status is Status.CONVERGED
-                to = self.add(surface, "on the way down from a saddle") if rests else None
+                to = (
+                    self.add(with_good_triangles(surface), "on the way down from a saddle") if rests else None
+                )
                 if one.index == 1:
                     end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
                     self.ways.append(WayDown(number, to, end))

@@ -144,7 +144,7 @@ class Explorer:
             "title": roof.title,
             "name": roof.name,
             "units": page_data.unit_texts(roof.outcome.units),
-            "note": roof.note,
+            "note": "; ".join(filter(None, (roof.note, roof.outcome.members_left_out))),
             "note_met": roof.outcome.result is not None and roof.outcome.good,
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",

@@ -6,7 +6,7 @@ With a path every function writes a picture; each returns it as an (h,w,3) array
 from .branches import equilibria
 from .curves import convergence, diagram, heatmap, histories, lines
 from .pictures import draw, families, panel, panel_planarity, reactions, vectors
-from .uses import strains, under_load
+from .uses import member_forces, strains, under_load
 
 __all__ = [
     "convergence",
@@ -17,6 +17,7 @@ __all__ = [
     "heatmap",
     "histories",
     "lines",
+    "member_forces",
     "panel",
     "panel_planarity",
     "reactions",

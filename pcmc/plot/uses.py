@@ -1,4 +1,4 @@
-"""Pictures of cutting patterns, and of a roof under load."""
+"""Pictures of cutting patterns, of a roof under load, and of the forces along its members."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base import validate
-from ..base.errors import unknown
+from ..base.errors import OptionError, unknown
 from ..base.units import Units
 from ..surface import Patch, Surface
-from .figure import Image, Path
+from .curves import label_axes
+from .figure import CURVES, INK, SMALL, Image, Path, finish, grid, new, style
 from .pictures import draw, panel
 
 if TYPE_CHECKING:
     from ..cloth import CuttingPattern
     from ..structure import Analysis
+    from ..structure.analysis import Case
 
 
 def strains(pattern: CuttingPattern, path: Path | None = None, **options: Any) -> Image:
@@ -43,7 +45,10 @@ def strains(pattern: CuttingPattern, path: Path | None = None, **options: Any) -
     return draw(cut, path, scalars=largest, **look)
 
 
-MOST = 6  # cases of a picture
+MOST = 6  # cases, or members, of a picture
+BESIDE, HIGH = 3, 170  # members beside each other; pixels of a diagram
+ACROSS: dict[str, Any] = {"linewidth": 0.9, "linestyle": "--"}
+SMALL_SHARE = 0.02  # of the largest force: what is across and smaller is not drawn
 SHOWN = ("deflection", "least force")
 
 
@@ -68,14 +73,7 @@ def under_load(
     """
     validate.choice("what", what, SHOWN)
     units, surface = units or analysis.model.units, analysis.model.surface
-    names = [case.name for case in analysis.cases]
-    for name in cases:
-        if name not in names:
-            validate.refuse("cases", name, "names of cases", hint=unknown("case", name, names))
-    if not cases:
-        by_size = sorted(names[1:], key=lambda name: -analysis[name].results.largest_displacement)
-        cases = tuple(name for name in names if name in by_size[:MOST] or len(names) == 1)
-    chosen = [analysis[name] for name in cases]
+    chosen = _chosen(analysis, cases, 1 if len(analysis.cases) > 1 else 0)
     if what == "deflection":
         scalars = [case.results.deflections for case in chosen]
         look: dict[str, Any] = {"label": f"deflection, {units.length or 'length'}"}
@@ -89,3 +87,76 @@ def under_load(
     look |= {"edges": False, "supports": False, "titles": titles}
     look |= {"columns": 1} if len(chosen) == 1 else {}
     return panel([surface] * len(chosen), path, scalars=scalars, **(look | options))
+
+
+def member_forces(
+    analysis: Analysis,
+    path: Path | None = None,
+    *,
+    cases: tuple[str, ...] = (),
+    members: tuple[str, ...] = (),
+    units: Units | None = None,
+    width: int = 900,
+) -> Image:
+    """N, V and M along the beams of a roof under its cases; see ``pcmc.analyse``.
+
+    V and M in the upright plane are solid, M above 0 with tension below; those across it are dashed, where
+    they are not small.
+
+    Parameters
+    ----------
+    cases : names of those to draw; by default the form-finding load, and those with the largest
+        displacements, six at most.
+    members : names of the beams; by default those with the largest moments, six at most.
+    units : of the axes; by default those of the model.
+
+    Raises
+    ------
+    OptionError : the model has no beams, or none of a name.
+    """
+    units, table = units or analysis.model.units, analysis.member_forces
+    if not len(table):
+        raise OptionError("the model has no beams: no forces along them to draw", what="analysis")
+    drawn = [case.name for case in _chosen(analysis, cases, 0)]
+    largest = analysis.members.groupby("member", sort=False)["M"].max()
+    for name in members:
+        if name not in largest:
+            validate.refuse("members", name, "names of beams", hint=unknown("member", name, [*largest.index]))
+    names = members or tuple(name for name in largest.index if name in largest.nlargest(MOST).index)
+    force, length = units.force or "force", units.length or "length"
+    rows = {"N": force, "V": force, "M": f"{force}·{length}"}
+    columns = min(len(names), BESIDE)
+    figure = new(width, HIGH * len(rows) * -(-len(names) // columns), pad=8.0)
+    axes, _ = grid(figure, len(rows) * columns * -(-len(names) // columns), columns)
+    for k, name in enumerate(names):
+        own = table[table["member"] == name]
+        for row, (column, unit) in enumerate(rows.items()):
+            place = style(axes[(len(rows) * (k // columns) + row) * columns + k % columns])
+            label_axes(place, f"along {name}, {length}" if column == "M" else "", f"{column}, {unit}")
+            place.axhline(0.0, color=INK, linewidth=0.6)
+            for color, case in zip(CURVES, drawn, strict=False):
+                along = own[own["case"] == case]
+                place.plot(along["s"], along[column], color=color, linewidth=1.1, label=case)
+                across = along.get(f"{column}_across")
+                if across is not None and np.abs(across).max() > SMALL_SHARE * np.abs(own[column]).max():
+                    place.plot(along["s"], across, color=color, **ACROSS)
+    for unused in axes:
+        if not unused.lines:
+            unused.remove()
+    if any(line.get_linestyle() == ACROSS["linestyle"] for place in axes for line in place.lines):
+        axes[0].plot([], [], color=INK, label="across", **ACROSS)
+    handles, labels = axes[0].get_legend_handles_labels()
+    look = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4), **look)
+    return finish(figure, path)
+
+
+def _chosen(analysis: Analysis, cases: tuple[str, ...], first: int) -> list[Case]:
+    """The cases of these names; by default those with the largest displacements, from ``first`` on."""
+    names = [case.name for case in analysis.cases]
+    for name in cases:
+        if name not in names:
+            validate.refuse("cases", name, "names of cases", hint=unknown("case", name, names))
+    by_size = sorted(names[1:], key=lambda name: -analysis[name].results.largest_displacement)
+    by_size = [*names[: 1 - first], *by_size][:MOST]
+    return [analysis[name] for name in cases or [name for name in names if name in by_size]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -11,11 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 import numpy as np
 
 from ..base.arrays import Ints
-from ..base.errors import OptionError, PcmcError
+from ..base.errors import LostWarning, OptionError, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
 from ..solvers.result import Progress, Result
+from ..structure.member_keys import members_of
 from ..surface import Surface, mirrored, unfolded
 from .settings import Output, of_material
 
@@ -234,6 +236,7 @@ class Outcome:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
         from ..drawings import drawing_set
 
+        self.warn_of_members("drawings")
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
         return drawing_set(self.shown.surface, self.units, **self._about(output, anyway), **options)
 
@@ -276,6 +279,20 @@ class Outcome:
             text = "a member along an edge is known for the part of the plan alone, not for its images"
             raise OptionError(f"{text}; leave out whole, or the member", what="whole")
         return model
+
+    @property
+    def members_left_out(self) -> str:
+        """That surfaces and drawings have no members of the structural model; empty if there are none."""
+        if (project := self.project) is None or project.structure is None:
+            return ""
+        labels = dict.fromkeys(m.label for m in members_of(project.structure.members, project.plan))
+        text = f"members are left out ({', '.join(labels)}); a wall in whose place one stands is drawn"
+        return text if labels else ""
+
+    def warn_of_members(self, what: str) -> None:
+        """LostWarning that surface files or drawings leave out the members of the structural model."""
+        if self.members_left_out:
+            warnings.warn(f"{what}: {self.members_left_out}", LostWarning, stacklevel=3)
 
     @property
     def pattern_wanted(self) -> CuttingOptions | None:

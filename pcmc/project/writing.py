@@ -76,10 +76,14 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> FileJobs:
     """The files of a roof with all that their formats hold; ``colour`` is the scalar that colours vertices.
 
-    Scalars of a surface that was not solved are those of its file.
+    Scalars of a surface that was not solved are those of its file. LostWarning where the project has members,
+    which no file of a surface holds.
     """
+    paths = [*map(Path, files)]
+    if paths:
+        outcome.warn_of_members(", ".join(path.name for path in paths))
     if outcome.result is not None:
-        return certified_files(*outcome.shown, files, outcome.units, colour)
+        return certified_files(*outcome.shown, paths, outcome.units, colour)
     data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
@@ -87,7 +91,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         place = {half.m: unfold.face, half.n: unfold.vertex}
         carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
         about |= {"scalars": carried, "certificate": None}
-    return [(Path(file), partial(io.write, surface=outcome.shown.surface, **about)) for file in files]
+    return [(path, partial(io.write, surface=outcome.shown.surface, **about)) for path in paths]
 
 
 def certified_files(
@@ -145,13 +149,14 @@ def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path]
 
 
 def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
-    """The tables and the picture of an analysis beside the structural model."""
-    from ..plot import under_load  # needs the extra plot
+    """The tables and pictures of an analysis beside the structural model."""
+    from ..plot import member_forces, under_load  # needs the extra plot
 
-    jobs: FileJobs = [(path.with_name(f"{path.stem}-cases.png"), partial(under_load, analysis))]
-    for name, table in analysis.tables.items():
-        jobs.insert(-1, (path.with_name(f"{path.stem}-{name}.csv"), partial(table.to_csv, index=False)))
-    return jobs
+    pictures: dict[str, Any] = {"cases": under_load}
+    pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
+    tables = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
+    jobs = tables | {f"{name}.png": partial(draw, analysis) for name, draw in pictures.items()}
+    return [(path.with_name(f"{path.stem}-{name}"), write) for name, write in jobs.items()]
 
 
 def draw_picture(

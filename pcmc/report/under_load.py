@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..base.units import Units
-from ..plot import under_load
+from ..plot import member_forces, under_load
 from ..plot.figure import png
 from ..structure.member_forces import sentences
 from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
@@ -21,6 +21,10 @@ ABOUT = (
     "times the thickness; where the least of them is not above 0 the membrane is slack and wrinkles. A share "
     "below 100 % is the part of the loads up to which CalculiX finds an equilibrium, taut that up to which "
     "nothing is slack. Beyond it the share depends on the mesh; taut hardly does."
+)
+SIGNS = (
+    "N is above 0 in tension. V and M are the largest shear force and moment, in whichever direction. The "
+    "pull of the sheets is the load, in the deformed shape. Buckling is not checked."
 )
 
 
@@ -47,16 +51,36 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     table = analysis.supports
     columns = {f"length, {units.length}": column(table["length"].where(table["length"] > 0.0))}
     columns |= vectors_of(table, "force", "F", force)
-    words: Columns = {"case": table["case"], "": table["support"], "kind": table["kind"]}
+    words: Columns = {"case": table["case"], "": table["support"], "of": table["name"], "kind": table["kind"]}
     yield text_table("Forces of the supports on the roof", words, columns)
     table = analysis.cables
     if len(table):
         columns = columns_in(table, ["least", "largest"], force)
         yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)
+    if len(analysis.members):
+        yield from _members(analysis, units)
+
+
+def _members(analysis: Analysis, units: Units) -> Iterator[Block]:
+    """What the members are, the forces along them, and what they carry at rest."""
+    force, length, beams = units.force or "force", units.length, analysis.model.beams
+    profiles = [line.member.profile for line in beams]
+    words: Columns = {
+        "member": [line.name for line in beams],
+        "in the place of": [line.wall or "a support" for line in beams],
+        f"section, {length}": [profile.label for profile in profiles],
+    }
+    columns: Columns = {f"A, {units.area}": [f"{profile.area:.4g}" for profile in profiles]}
+    for k, where in enumerate(("upright", "across")):
+        columns[f"I {where}, {length}⁴"] = [f"{profile.moments[k]:.4g}" for profile in profiles]
+    columns[f"E, {units.pressure}"] = [f"{line.member.material.young:.4g}" for line in beams]
+    yield text_table("Members", words, columns)
     table = analysis.members
-    if len(table):
-        columns = columns_in(table, ["least_N", "largest_N", "V"], force)
-        columns |= columns_in(table, ["M"], f"{force} {units.length}")
-        columns |= columns_in(table, ["moved"], units.length)
-        yield text_table("Forces of members", {"case": table["case"], "member": table["member"]}, columns)
-        yield from (f"{line}." for line in sentences(analysis.model, units))
+    columns = columns_in(table, ["least_N", "largest_N", "V"], force)
+    columns |= columns_in(table, ["M"], f"{force}·{length}")
+    columns |= columns_in(table, ["moved"], length)
+    columns["span over it"] = [f"{over:.3g}" if over < 1e4 else f"{over:.0f}" for over in table["span_over"]]
+    yield text_table("Forces of members", {"case": table["case"], "member": table["member"]}, columns)
+    yield SIGNS
+    yield Picture("", png(member_forces(analysis, units=units, width=PIXELS)))
+    yield from (f"{line}." for line in sentences(analysis.model, units))

@@ -14,13 +14,12 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..base.units import Units
-from ..certificate.forces import Forces
-from ..certificate.supports import FORCE, support_table
+from ..certificate.supports import FORCE
 from ..surface.geometry import face_areas
 from .calculix import CalculixError, expect_program, run_as_far
 from .gas import balanced_pressure
 from .loads import Step
-from .member_forces import MemberForces, member_tables, members_in, sentences
+from .member_forces import MemberForces, member_tables, members_in, sentences, supports_with_members
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
@@ -146,11 +145,11 @@ class Analysis:
     @cached_property
     def supports(self) -> pd.DataFrame:
         """A row per case and support, numbered as in ``Certificate.supports``: ``support``, ``name``,
-        ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts."""
-        tables, columns = [], ["support", "name", "kind", "length", *"xyz", *FORCE]
+        ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts. M1, M2,
+        … hold the ends of members; see ``supports_with_members``."""
+        tables = []
         for case in self.cases:
-            acting = Forces.of(self.model.standing, case.results.reactions)
-            table = support_table(acting)[columns]
+            table = supports_with_members(self.model, case.results.reactions)
             table.insert(0, "case", case.name)
             tables.append(table)
         return pd.concat(tables, ignore_index=True)

@@ -10,7 +10,10 @@ import pandas as pd
 
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.units import Units
+from ..certificate.forces import Forces, cable_ends
+from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
+from ..forces.pinching import standing_part
 from ..surface.geometry import area_vectors
 from .frames import Frame
 from .loads import Step
@@ -178,6 +181,33 @@ def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
     return found
 
 
+def supports_with_members(model: StructuralModel, reactions: Floats) -> pd.DataFrame:
+    """The table of supports under reactions (n,3), as in ``Certificate.supports``, with a row of the kind
+    "member end" for each point that holds ends of members: all of the force there but that of cables. The
+    rows of lines in whose place members are, such as the foot of a wall, are left out."""
+    standing, alone, names = standing_part(model.surface).surface, reactions.copy(), dict[int, list[str]]()
+    for line in model.lines:
+        for v in [] if line.closed else line.vertices[[0, -1]].tolist():
+            if model.held[v]:
+                names.setdefault(v, []).append(line.name)
+    ends = sorted(names)
+    alone[ends] = 0.0
+    for _, v, force in cable_ends(standing):
+        alone[v] += force * (v in names)
+    acting = Forces.of(standing, alone)
+    table = support_table(acting)[["support", "name", "kind", "length", *"xyz", *FORCE]]
+    beside = model.held.copy()
+    beside[ends] = False
+    there = [beside[on].any() or alone[on].any() for on in support_vertices(acting).values()]
+    table = table[there if model.lines else [True] * len(table)]
+    rows = [
+        [f"M{k}", " + ".join(names[v]), "member end", 0.0, *standing.vertices[v], *(reactions - alone)[v]]
+        for k, v in enumerate(ends, 1)
+    ]
+    own = pd.DataFrame(rows, columns=table.columns)
+    return pd.concat([table, own], ignore_index=True) if rows else table.reset_index(drop=True)
+
+
 def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
@@ -220,6 +250,6 @@ def moment_unit(units: Units) -> str:
     """The unit of moments, with the blank before it; empty without units.
 
     >>> moment_unit(Units("m", "kN"))
-    ' kN m'
+    ' kN·m'
     """
-    return f" {units.force} {units.length}" if units else ""
+    return f" {units.force}·{units.length}" if units else ""

@@ -72,6 +72,15 @@ class Profile:
         return cls(area, inertia, shape="tube", sizes=(outer, s))
 
     @property
+    def label(self) -> str:
+        """Its shape and sizes; without a shape, "given".
+
+        >>> Profile.tube(0.1, 0.005).label
+        'tube 0.1 × 0.005'
+        """
+        return f"{self.shape} {' × '.join(f'{size:g}' for size in self.sizes)}" if self.shape else "given"
+
+    @property
     def moments(self) -> tuple[float, float]:
         """I for bending in the upright plane, and out of it."""
         return self.upright, self.upright if self.sideways is None else self.sideways

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from asking import Client
 from browsing import until
+from small_project import HALL_WITH_ARCH
 
 import pcmc
 from generators import spherical_cap
@@ -36,6 +37,15 @@ def client(explorer):
 
 def apex(surface, name):
     return measure(surface, Target("apex", name)).value
+
+
+def test_the_page_says_that_it_leaves_out_members(tmp_path):
+    (tmp_path / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
+    explorer = explore.start(read_roof(tmp_path / "hall.toml"))
+    try:
+        assert Client(explorer).ask("/api/open")[0]["note"].startswith("members are left out (wall 1)")
+    finally:
+        explorer.close()
 
 
 def test_a_project_opens_at_its_targets(hall_roof, client):

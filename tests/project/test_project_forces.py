@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from force_cases import BUBBLE_TOML, cables
 from refusals import refused
+from small_project import HALL_WITH_ARCH
 
 import pcmc
 from pcmc import Verdict, cli, io
@@ -95,6 +96,17 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     )
     assert "30.0" in (folder / "t.csv").read_text()
     capsys.readouterr()
+
+
+def test_files_and_drawings_say_that_they_leave_out_members(folder):
+    (folder / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
+    text = "members are left out (wall 1); a wall in whose place one stands is drawn"
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        outcome = run("hall.toml")
+    losses = [str(w.message) for w in caught if issubclass(w.category, LostWarning)]
+    assert losses == [f"hall.ifc, hall.obj: {text}", f"drawings: {text}"]
+    assert outcome.members_left_out == text
 
 
 def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_for(folder):

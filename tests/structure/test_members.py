@@ -12,7 +12,11 @@ import pcmc
 from generators import joined_caps
 from pcmc import Material, SelfWeight, Snow, StructuralModel
 from pcmc.base.errors import OptionError
+from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
+from pcmc.plot import member_forces
+from pcmc.report.tables import Picture, Table
+from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, members_at_rest
 from pcmc.structure.member_keys import members_of
@@ -35,6 +39,12 @@ def hall():
 def hall_with(member=None, **more):
     member = member or Member("wall 1", TUBE, STEEL)
     return StructuralModel(hall(), Material(5e5, 0.2, 1.2), 0.001, members=[member], **more)
+
+
+@cache
+def hall_under_load():
+    """The hall with an arch, by CalculiX."""
+    return analyse(hall_with(loads=[SelfWeight(), Snow(0.1)]), remedy=False)
 
 
 def test_the_edge_of_a_flat_sheet_pulls_a_straight_beam_sideways():
@@ -124,9 +134,9 @@ def test_the_junction_of_two_spheres_needs_no_bending():
 @needs_ccx
 def test_a_member_in_the_place_of_a_wall_carries_what_the_wall_did():
     """The reactions balance the loads; at rest the member carries the wall's pull; beam theory agrees."""
-    model = hall_with(loads=[SelfWeight(), Snow(0.1)])
+    analysis = hall_under_load()
+    model = analysis.model
     free = model.nodes & ~model.held & ~model.on_members
-    analysis = analyse(model, remedy=False)
     assert analysis.carried
     for case in analysis.cases:
         left = forces_on_members(model, case.results.step, case.results)
@@ -139,6 +149,56 @@ def test_a_member_in_the_place_of_a_wall_carries_what_the_wall_did():
     assert run.deflection == pytest.approx(rest.deflection, rel=0.1)
     assert run.within[:, 0] == pytest.approx(rest.within[:, 0], rel=0.03)
     assert set(analysis.tables) == {"cases", "patches", "supports", "members", "member-forces"}
+
+
+@needs_ccx
+def test_the_supports_have_the_ends_of_a_member_and_no_foot_of_its_wall():
+    """What holds an end is the force of its last bar, and the sheets' pull; all balance the loads."""
+    analysis = hall_under_load()
+    table = analysis.supports
+    assert table["support"].tolist() == ["B1", "B2", "M1", "M2"] * 3
+    for case in analysis.cases:
+        own = table[table["case"] == case.name]
+        forces = own[[f"force_{axis}" for axis in "xyz"]].to_numpy()
+        np.testing.assert_allclose(forces.sum(axis=0), case.results.reactions.sum(axis=0), atol=1e-9)
+        [beam] = case.members
+        for row, place, next_to in ((2, 0, 1), (3, -1, -2)):
+            np.testing.assert_allclose(own[[*"xyz"]].to_numpy()[row], beam.points[place], atol=1e-9)
+            of_bar = 0.5 * (beam.within[place] + beam.within[next_to])[:3]
+            left = np.linalg.norm(forces[row] + beam.pulls[place])
+            assert left == pytest.approx(np.linalg.norm(of_bar), rel=0.01)
+
+
+@needs_ccx
+def test_the_chapter_of_a_report_has_sections_and_forces_of_members():
+    blocks = list(chapter(hall_under_load(), Units("m", "kN")))
+    tables = {block.title: block for block in blocks if isinstance(block, Table)}
+    [arch] = tables["Members"].rows
+    assert arch == ["wall 1", "wall 1", "tube 0.1 × 0.005", "0.001492", "1.688e-06", "1.688e-06", "2.1e+08"]
+    assert [row[:2] for row in tables["Forces of members"].rows] == [
+        [case, "wall 1"] for case in ("form pressure", "self-weight", "snow")
+    ]
+    assert "M, kN·m" in tables["Forces of members"].head
+    assert any(isinstance(block, str) and block.startswith("wall 1: at rest N = ") for block in blocks)
+    assert sum(isinstance(block, Picture) for block in blocks) == 3
+
+
+@needs_ccx
+def test_the_picture_of_forces_has_a_column_per_member_and_refuses_a_wrong_name():
+    """A straight edge bends in the plane of its sheet: what is across is dashed."""
+    edges = [Member(polyline([[0, y], [1, y]]), TUBE, STEEL, name=f"edge {y}") for y in (0, 1)]
+    both = analyse(model_of(square(8, tension=2.0), members=edges, anyway=True))
+    one, two = member_forces(both, members=("edge 0",), width=400), member_forces(both, width=800)
+    assert one.shape[1] == two.shape[1] // 2
+    assert one.shape[0] == two.shape[0]
+    inked = [(picture.min(axis=2) < 100).sum() for picture in (one, two)]
+    assert inked[1] > 1.5 * inked[0]
+    with refused(OptionError, what="members", found="edge 2"):
+        member_forces(both, members=("edge 2",))
+    with refused(OptionError, what="cases", found="wind"):
+        member_forces(both, cases=("wind",))
+    with refused(OptionError, what="analysis"):
+        member_forces(analyse(model_of(square(4, tension=2.0), anyway=True)))
 
 
 def test_a_cable_in_the_place_of_a_wall_has_the_tension_that_balances_best():

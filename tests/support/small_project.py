@@ -21,6 +21,26 @@ method = "newton"
 files = ["roof.pcmc", "roof.obj"]
 """
 
+HALL_WITH_ARCH = """
+units = "m"
+force = "kN"
+[plan]
+edge_length = 1.6
+outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
+patches = {west = {tension = 1.5, pressure = 0.3}, east = {tension = 1.5, pressure = 0.3}}
+dividers = [{curve = [[6, 0], [6, 8]], wall = 0.6, member = "arch"}]
+[structure]
+young = 5e5
+thickness = 0.001
+[structure.members.arch]
+diameter = 0.1
+thickness = 0.005
+young = 2.1e8
+[output]
+files = ["hall.ifc", "hall.obj"]
+drawings = ["hall.dxf"]
+"""
+
 
 def changed(path, old, new):
     """The file with another text in place of ``old``, which it must have."""
