@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.files import suffix_of
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate.certificate import warning_mark
@@ -17,7 +18,7 @@ from ..panelling import PanelNet
 from .drawing_set import DECIMALS, DrawingSet
 from .drawing_set import SUFFIXES as DRAWINGS
 from .panel_sheets import flat_panels, panel_sheets, polygons_at_true_size
-from .sheet import SheetLine, add_frames, table_sheets
+from .sheet import FORMATS, SheetLine, add_frames, table_sheets
 from .views import DrawnView, placed
 
 CSV, OBJ = ".csv", ".obj"
@@ -38,8 +39,9 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
     >>> from pcmc import panel_net
     >>> drawings = net_drawings(panel_net(delaunay(exact=True), 0.5, anyway=True), "m", sheet="A0")
     >>> [page.title for page in drawings.sheets[:4]]
-    ['Panels in plan', 'Nodes', 'Panels', 'Panels 1 to 2 at true size, outside up']
+    ['Panels and nodes in plan', 'Nodes', 'Panels', 'Panels 1 to 2 at true size, outside up']
     """
+    validate.choice("sheet", sheet, tuple(FORMATS))
     length = expect_length(as_units(units).length, "drawings of panels")
     millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
     curves = [
@@ -49,10 +51,15 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
     lines = [line._replace(points=line.points[:, :2]) for line in curves]
     numbers = [(line.points.mean(axis=0), str(k), np.zeros(2)) for k, line in enumerate(lines, start=1)]
     ends = [np.array([column.min(), column.max()]) for column in net.points[:, :2].T]
-    plan = DrawnView("", lines, numbers, stations=(ends[0], ends[1]))
-    sheets = [placed([plan], "Panels in plan", sheet, millimetres, None, decimals)]
-    sheets += table_sheets("Nodes", net.nodes[["node", *"xyz", "kind"]], sheet, decimals, {})
-    sheets += table_sheets("Panels", net.panels[["panel", "patch", "kind", "corners", "area"]], sheet, 3, {})
+    nodes = [(at, str(k), "PCMC-POINT") for k, at in enumerate(net.points[:, :2], start=1)]
+    plan = DrawnView("", lines, numbers, nodes, stations=(ends[0], ends[1]))
+    sheets = [placed([plan], "Panels and nodes in plan", sheet, millimetres, None, decimals)]
+    tables = [
+        ("Nodes", net.nodes[["node", *"xyz", "kind"]], dict.fromkeys("xyz", length)),
+        ("Panels", net.panels[["panel", "patch", "kind", "corners", "area"]], {"area": f"{length}²"}),
+    ]
+    for title, table, head in tables:
+        sheets += table_sheets(title, table, sheet, decimals, head)
     panels = polygons_at_true_size(net, millimetres)
     sheets += panel_sheets(panels, sheet)
     add_frames(sheets, name, length, warning_mark(net.certificate))

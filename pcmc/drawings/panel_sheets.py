@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from string import ascii_lowercase
 from typing import NamedTuple
 
 import numpy as np
@@ -41,12 +42,15 @@ def panel_sheets(panels: Sequence[FlatPanel], name: str) -> list[Sheet]:
         if page == len(sheets):
             first = panel.number
             sheets.append(Sheet("", name, "1:1"))
-        sheets[page].title = f"Panels {first} to {panel.number} at true size, outside up"
+        named = f"Panel {first}" if panel.number == first else f"Panels {first} to {panel.number}"
+        sheets[page].title = f"{named} at true size, outside up"
         _add_panel(sheets[page], panel._replace(corners=placed + corner() + [0.0, high]))
     large = [panel for panel, corners in turned if corners is None]
     if large:
-        edges = [_edges(panel.corners)[1] for panel in large]
-        table = pd.DataFrame(edges, columns=list("abcdefghijklmnop")[: max(map(len, edges))])
+        edges = [_edges(panel.corners)[1].tolist() for panel in large]
+        most = max(map(len, edges))
+        letters = [f"{ascii_lowercase[k % 26]}{k // 26 or ''}" for k in range(most)]
+        table = pd.DataFrame([[*row, *[""] * (most - len(row))] for row in edges], columns=letters)
         table.insert(0, "panel", [panel.number for panel in large])
         title = f"Panels larger than {name}: flat at true size in the model space of the .dxf"
         sheets += table_sheets(title, table, name, 1, dict.fromkeys(table.columns[1:], "mm"))

@@ -216,7 +216,7 @@ def table_sheets(
     """A table in as many columns and sheets as it needs; its head has the units that columns have."""
     rows = [[", ".join(filter(None, (key, (units or {}).get(key)))) for key in table.columns]]
     rows += [
-        [f"{x:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
+        [f"{round(x, decimals) + 0.0:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
         for row in table.to_numpy(dtype=object).tolist()
     ]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -235,7 +235,7 @@ def table_sheets(
         for k, row in enumerate([rows[0], *rows[first : first + per_column]]):
             y = top - (k + 0.5) * step
             sheets[-1].texts += [Text((x, y), text, align="R") for x, text in zip(right, row, strict=True)]
-        rule = np.array([[left, top - step], [right[-1], top - step]])
+        rule = np.array([[left, top - 0.8 * step], [right[-1], top - 0.8 * step]])
         sheets[-1].lines.append(SheetLine(rule, "PCMC-FRAME"))
     return sheets
 

@@ -14,7 +14,7 @@ from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.topology import components
 from .distance import distances
 from .net import Ends, Net
-from .planar import by_corners, convex, planarity, torsion
+from .planar import before, convex, planarity, polygon_areas, torsion
 from .sheet import Sheet
 
 INSIDE, EDGE, CORNER = 0, 1, 2
@@ -57,9 +57,7 @@ class JoinedNets(NamedTuple):
     @property
     def sides(self) -> Ints:
         """(k,2) the nodes of each side of each panel, ascending."""
-        after = np.arange(len(self.corner)) + 1
-        after[self.start[1:] - 1] = self.start[:-1]
-        return np.sort(np.stack([self.corner, self.corner[after]], axis=1), axis=1)
+        return np.sort(np.stack([self.corner, self.corner[before(self.start)]], axis=1), axis=1)
 
 
 def shared_ends(surface: Surface, parts: Sequence[SheetNet]) -> list[tuple[Ints, Floats]]:
@@ -88,43 +86,47 @@ def _edges(surface: Surface, part: SheetNet, side: Ints) -> tuple[Ints, Bools]:
 
 
 def joined_nets(surface: Surface, parts: Sequence[SheetNet], nets: Sequence[Net], size: float) -> JoinedNets:
-    """One net of all sheets, without short edges."""
-    columns: list[tuple[Any, ...]] = []
-    loops: list[Ints] = []
-    patch: list[str] = []
-    total = 0
-    for part, one in zip(parts, nets, strict=True):
-        columns.append(_nodes(surface, part, one, total))
-        loops += [loop + total for loop in np.split(one.corner, one.start[1:-1])]
-        patch += [part.name] * (len(one.start) - 1)
-        total += len(one.face)
-    key, points, normal, kinds, on_line, turned = (
-        np.concatenate(rows) for rows in zip(*columns, strict=True)
-    )
+    """One net of all sheets, without short edges and slivers."""
+    first = np.cumsum([0] + [len(one.face) for one in nets])
+    columns = [_nodes(surface, *one) for one in zip(parts, nets, first.tolist(), strict=False)]
+    key, points, normal, kinds, on_line, turned = map(np.concatenate, zip(*columns, strict=True))
+    corner = np.concatenate([one.corner + k for one, k in zip(nets, first.tolist(), strict=False)])
+    counts = np.concatenate([np.diff(one.start) for one in nets])
+    owner = np.repeat(np.arange(len(counts)), counts)
+    patch = np.repeat([part.name for part in parts], [len(one.start) - 1 for one in nets])
     number: Ints
     _, keep, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
     P, kind = points[keep], kinds[keep]
     number = np.asarray(number).reshape(-1)
     N = np.stack([np.bincount(number, column, len(P)) for column in normal.T], axis=1)
-    stays = _merged(P, kind, [number[loop] for loop in loops], SHORT * size)
-    number = stays[number]
-    loops = [loop[number[loop] != number[np.roll(loop, 1)]] for loop in loops]
-    shown = [k for k, loop in enumerate(loops) if len(loop) > 2 and not _sliver(P, kind, number[loop], size)]
-    uses = np.bincount(np.concatenate([number[loops[k]] for k in shown]), minlength=len(P))
-    needed = (kind != EDGE) | (uses > 1)  # else no other panel ends there
-    loops = [loop[needed[number[loop]]] for loop in loops]
-    shown = [k for k in shown if len(loops[k]) > 2 and not _sliver(P, kind, number[loops[k]], size)]
-    state = [_state(on_line[loops[k]], kind[number[loops[k]]], parts) for k in shown]
-    used, corner = np.unique(np.concatenate([number[loops[k]] for k in shown]), return_inverse=True)
+    start = _starts(owner)
+    pairs = number[np.stack([corner, corner[before(start)]], axis=1)]
+    number = _merged(P, kind, pairs, SHORT * size)[number]
+    shown = number[corner] != number[corner[before(start)]]
+    while True:
+        corner, owner = corner[shown], owner[shown]
+        start, used = _starts(owner), number[corner]
+        sliver = (np.add.reduceat(kind[used] == INSIDE, start[:-1]) == 0) & (
+            2.0 * polygon_areas(P, start, used) < SLIVER * size**2
+        )
+        shown = np.repeat((np.diff(start) > 2) & ~sliver, np.diff(start))
+        uses = np.bincount(used[shown], minlength=len(P))
+        shown &= (kind[used] != EDGE) | (uses[used] > 1)  # else no other panel ends there
+        if shown.all():
+            break
+    used, ends = np.unique(number[corner], return_inverse=True)
+    inside = np.add.reduceat(kind[number[corner]] != INSIDE, start[:-1]) == 0
+    umbilic = inside & (np.diff(start) != 4) & any(len(part.umbilics) for part in parts)
+    cut = ~np.logical_and.reduceat(on_line[corner], start[:-1])
     return JoinedNets(
         P[used],
         N[used] / np.linalg.norm(N[used], axis=1)[:, None],
         kind[used],
-        np.append(0, np.cumsum([len(loops[k]) for k in shown])),
-        corner,
-        [patch[k] for k in shown],
-        state,
-        np.array([turned[loops[k]].mean() for k in shown]),
+        start,
+        ends,
+        patch[owner[start[:-1]]].tolist(),
+        np.select([cut, umbilic], ["cut", "umbilic"], "whole").tolist(),
+        np.add.reduceat(turned[corner], start[:-1]) / np.diff(start),
     )
 
 
@@ -152,19 +154,11 @@ def _nodes(surface: Surface, part: SheetNet, one: Net, total: int) -> tuple[Any,
     return key, points, normals, kind, on_line, part.turned[one.face]
 
 
-def _state(on_line: Bools, kind: Ints, parts: Sequence[SheetNet]) -> str:
-    if not on_line.all():
-        return "cut"
-    follows = any(len(part.umbilics) for part in parts)
-    return "umbilic" if follows and len(kind) != 4 and (kind == INSIDE).all() else "whole"
-
-
-def _merged(P: Floats, kind: Ints, loops: list[Ints], short: float) -> Ints:
+def _merged(P: Floats, kind: Ints, pairs: Ints, short: float) -> Ints:
     """(n,) for each node the one that it is merged with: at the ends of edges shorter than ``short``.
 
     A corner stays, else a node of a ridge or rim; two corners are not merged.
     """
-    pairs = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
     label = components(pairs[segment_lengths(P, pairs) < short], len(P))
     first = np.lexsort((-kind, label))
     stays = first[np.unique(label[first], return_index=True)[1]]
@@ -172,10 +166,40 @@ def _merged(P: Floats, kind: Ints, loops: list[Ints], short: float) -> Ints:
     return np.where(crowded[label], np.arange(len(P)), stays[label])
 
 
-def _sliver(P: Floats, kind: Ints, loop: Ints, size: float) -> bool:
-    """Whether a panel is only what lies between a rim and its chord."""
-    twice = np.linalg.norm(np.cross(P[loop], np.roll(P[loop], -1, axis=0)).sum(axis=0))
-    return bool((kind[loop] != INSIDE).all() and twice < SLIVER * size**2)
+def _starts(owner: Ints) -> Ints:
+    """The first corner of each panel and the end, from the panels that corners are of."""
+    return np.append(np.flatnonzero(np.diff(owner, prepend=-1)), len(owner))
+
+
+def without_flat(joined: JoinedNets, P: Floats, size: float) -> tuple[JoinedNets, Floats]:
+    """Without triangles that planarity has laid flat on a straight rim; and the nodes P (n,3), theirs on it.
+
+    The panels on both sides of such a triangle reach the rim: their planes meet only there, and so their
+    common node comes to lie on it.
+    """
+    start, corner = joined.start, joined.corner
+    _, row, uses = np.unique(joined.sides, axis=0, return_inverse=True, return_counts=True)
+    back, rim, count = before(start), uses[row.ravel()] == 1, np.diff(start)
+    tip = corner[back[back]]  # of a triangle, opposite the side that ends at a corner
+    flat = (count == 3) & (2.0 * polygon_areas(P, start, corner) < SLIVER * size**2)
+    flat &= np.add.reduceat(rim, start[:-1]) == 1
+    flat &= np.add.reduceat(rim & (joined.kind[tip] == INSIDE), start[:-1]) == 1
+    kept = ~np.repeat(flat, count)
+    on_rim = rim & ~kept
+    tip, first, last = (nodes[on_rim] for nodes in (tip, corner[back], corner))
+    along = P[last] - P[first]
+    share = np.einsum("ti,ti->t", P[tip] - P[first], along) / np.einsum("ti,ti->t", along, along)
+    P, kind = P.copy(), joined.kind.copy()
+    P[tip], kind[tip] = P[first] + share[:, None] * along, EDGE
+    left = joined._replace(
+        kind=kind,
+        start=np.append(0, np.cumsum(count[~flat])),
+        corner=corner[kept],
+        patch=np.array(joined.patch)[~flat].tolist(),
+        state=np.array(joined.state)[~flat].tolist(),
+        turned=joined.turned[~flat],
+    )
+    return left, P
 
 
 def net_tables(
@@ -183,11 +207,7 @@ def net_tables(
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Nodes, panels and beams of a net with nodes at P (n,3); see ``PanelNet``."""
     start, corner, N = joined.start, joined.corner, joined.normals
-    middle, area = np.zeros((len(start) - 1, 3)), np.zeros(len(start) - 1)
-    for chosen, loops in by_corners(start, corner):
-        Q = P[loops]
-        middle[chosen] = Q.mean(axis=1)
-        area[chosen] = 0.5 * np.linalg.norm(np.cross(Q, np.roll(Q, -1, axis=1)).sum(axis=1), axis=1)
+    middle = np.add.reduceat(P[corner], start[:-1]) / np.diff(start)[:, None]
     roof = surface.faces[surface.roof[surface.patch_of_face]]
     away = distances(np.concatenate([P, middle]), surface.vertices, roof)
     cosine = np.einsum("ni,ni->n", axes, N) / np.linalg.norm(axes, axis=1)
@@ -206,7 +226,7 @@ def net_tables(
             "patch": joined.patch,
             "kind": joined.state,
             "corners": np.diff(start),
-            "area": area,
+            "area": polygon_areas(P, start, corner),
             "planarity": planarity(P, start, corner),
             "convex": convex(P, start, corner),
             "distance": np.maximum(np.maximum.reduceat(away[corner], start[:-1]), away[len(P) :]),

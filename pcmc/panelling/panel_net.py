@@ -18,16 +18,18 @@ from ..certificate.certificate import certified
 from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
-from ..surface.geometry import cross_2d
+from ..surface.geometry import cross_2d, face_areas
 from ..surface.pieces import point_text
 from .isothermic import curvature_coordinates
 from .net import line_ends, net, nudged
-from .net_tables import SheetNet, joined_nets, net_tables, shared_ends
-from .planar import planarised, torsion_free_axes
+from .net_tables import SheetNet, joined_nets, net_tables, shared_ends, without_flat
+from .planar import before, planarised, torsion_free_axes
 from .sheet import Sheet, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
+FAR = 0.25  # of the size: nodes that planarity moves so far from the surface are told of
+NO_AREA = 1e-3  # of the size squared: smaller panels are told of
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,20 @@ class PanelNet:
     umbilics: Floats
 
     @property
+    def covered(self) -> float:
+        """The panels' area over that of the roof's patches that have panels, 1.
+
+        Below 1 by what chords cut off, and by slivers at rims that have no panel.
+
+        >>> from generators import delaunay
+        >>> round(panel_net(delaunay(exact=True), 0.5, anyway=True).covered, 3)
+        0.989
+        """
+        roof = self.surface.roof[self.surface.patch_of_face]
+        area = face_areas(self.surface.vertices[self.surface.faces[roof]]).sum()
+        return float(self.panels["area"].sum() / area)
+
+    @property
     def polygons(self) -> list[Ints]:
         """The nodes of each panel."""
         return np.split(self.corner, self.start[1:-1])
@@ -83,12 +99,10 @@ class PanelNet:
     @property
     def mesh(self) -> Surface:
         """The panels as triangles around their middles, a patch for each panel: "panel 1" and so on."""
-        count, total = np.diff(self.start), len(self.corner)
+        count = np.diff(self.start)
         owner = np.repeat(np.arange(len(count)), count)
-        after = np.arange(total) + 1
-        after[self.start[1:] - 1] = self.start[:-1]
         middle = np.add.reduceat(self.points[self.corner], self.start[:-1]) / count[:, None]
-        faces = np.stack([self.corner, self.corner[after], len(self.points) + owner], axis=1)
+        faces = np.stack([self.corner[before(self.start)], self.corner, len(self.points) + owner], axis=1)
         tensions = {patch.name: patch.tension for patch in self.surface.patches}
         patches = tuple(
             Patch(f"panel {k}", tensions[name]) for k, name in enumerate(self.panels["patch"], start=1)
@@ -122,7 +136,8 @@ class PanelNet:
             ("panels", f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"),
             (
                 "area",
-                f"{table['area'].sum():.6g}, panels {table['area'].min():.3g} to {table['area'].max():.3g}",
+                f"{table['area'].sum():.6g}, {100.0 * self.covered:.2f} % of the roof's; "
+                f"panels {table['area'].min():.3g} to {table['area'].max():.3g}",
             ),
             (
                 "planarity",
@@ -144,6 +159,14 @@ class PanelNet:
         if len(self.umbilics):
             places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])
             rows.append(("umbilics", f"{len(self.umbilics)}: {places}"))
+        far = self.nodes["distance"].max() / self.size
+        if far > FAR:
+            text = f"nodes are up to {100.0 * far:.0f} % of the size from the surface: choose a smaller size"
+            rows.append(("far off", f"{text}, or pattern 'quads'"))
+        flat = table["panel"][table["area"] < NO_AREA * self.size**2].tolist()
+        if flat:
+            text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
+            rows.append(("slivers", text))
         if units:
             rows.insert(0, ("units", units.sentence))
         if not self.certificate.certified:
@@ -201,6 +224,7 @@ def panel_net(
     points = joined.points
     if pattern != "quads":
         points = planarised(points, joined.start, joined.corner, joined.kind == 0)
+        joined, points = without_flat(joined, points, size)
     axes = torsion_free_axes(points, joined.beams, joined.normals)
     tables = net_tables(surface, joined, points, axes)
     umbilics = np.concatenate([part.sheet.X[part.umbilics] for part in parts])

@@ -27,6 +27,28 @@ def by_corners(start: Ints, corner: Ints) -> Iterator[tuple[Ints, Ints]]:
         yield chosen, corner[start[chosen][:, None] + np.arange(k)]
 
 
+def before(start: Ints) -> Ints:
+    """(k,) the place of the corner before each corner, around its polygon.
+
+    >>> before(np.array([0, 3, 7])).tolist()
+    [2, 0, 1, 6, 3, 4, 5]
+    """
+    places = np.arange(start[-1]) - 1
+    places[start[:-1]] = start[1:] - 1
+    return places
+
+
+def polygon_areas(P: Floats, start: Ints, corner: Ints) -> Floats:
+    """(p,) areas of polygons of nodes P (n,3), length²; of a warped one, seen along its mean normal.
+
+    >>> P = np.array([[0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0.0]])
+    >>> polygon_areas(P, np.array([0, 4]), np.arange(4)).tolist()
+    [6.0]
+    """
+    Q = P[corner] - np.repeat(P[corner[start[:-1]]], np.diff(start), axis=0)
+    return 0.5 * np.linalg.norm(np.add.reduceat(np.cross(Q[before(start)], Q), start[:-1]), axis=1)
+
+
 def planarity(P: Floats, start: Ints, corner: Ints) -> Floats:
     """(p,) of polygons of nodes P (n,3): 0 if planar.
 

@@ -1,11 +1,14 @@
 """Nets of quads and hexagons: planar along lines of curvature, closed forms, refusals."""
 
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import pcmc
 from generators import delaunay, spherical_cap
-from pcmc.base.errors import OptionError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.panelling import panel_net
 from pcmc.panelling.directions import shape_operators
 from pcmc.panelling.planar import by_corners
@@ -74,16 +77,52 @@ def test_a_roof_over_a_rectangle_has_two_umbilics_on_its_axis_with_six_sided_pan
     assert len(net.points) - len(net.beams) + len(net.panels) == 1
 
 
-def test_panels_share_the_nodes_of_a_ridge():
+@pytest.fixture(scope="module")
+def walled():
     from pcmc.plan import Divider
 
     plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [Divider([[6, 0], [6, 8]], wall=1.5)], edge_length=0.8,
                 patches={"west": {"tension": 5.0}, "east": {"tension": 4.5}})  # fmt: skip
-    net = panel_net(pcmc.solve(plan.surface()).surface, 1.0)
+    return pcmc.solve(plan.surface()).surface
+
+
+def test_panels_share_the_nodes_of_a_ridge(walled):
+    net = panel_net(walled, 1.0)
     patch = net.panels["patch"].to_numpy()
     pairs = net.beams.query("neighbour > 0")[["panel", "neighbour"]].to_numpy() - 1
     assert (patch[pairs[:, 0]] != patch[pairs[:, 1]]).sum() >= 4
     assert len(net.points) - len(net.beams) + len(net.panels) == 1
+
+
+@pytest.mark.parametrize("size", [1.0, 1.3])
+def test_triangles_that_planarity_lays_flat_on_a_rim_are_left_out_and_the_rim_stays_closed(rectangle, size):
+    net = panel_net(rectangle, size)
+    assert net.panels["area"].min() > 0.01 * size**2
+    assert 0.99 < net.covered < 1.0
+    rim = net.beams.query("neighbour == 0")
+    assert rim["length"].sum() == pytest.approx(40.0, rel=1e-9)
+    on_rim = np.unique(rim[["node", "other"]]) - 1
+    assert "inside" not in set(net.nodes["kind"][on_rim])
+    assert np.ptp(net.points[on_rim, 2]) < 1e-9
+    assert len(net.points) - len(net.beams) + len(net.panels) == 1
+
+
+def test_the_share_of_the_roof_that_panels_cover_grows_as_they_get_smaller(walled):
+    left = [1.0 - panel_net(walled, size, "quads").covered for size in (1.6, 0.8)]
+    assert 0.0 < 2.0 * left[1] < left[0] < 0.01
+    assert f"{100.0 * (1.0 - left[1]):.2f} % of the roof's" in str(panel_net(walled, 0.8, "quads"))
+
+
+def test_a_net_that_leaves_the_roof_says_so(rectangle):
+    assert "far off  nodes are up to" in str(panel_net(rectangle, 3.0))
+    assert "far off" not in str(panel_net(rectangle, 0.9))
+
+
+def test_panels_without_area_are_told_of(rectangle):
+    net = panel_net(rectangle, 1.0, "quads")
+    thin = net.panels.assign(area=net.panels["area"].where(net.panels["panel"] != 7, 1e-4))
+    assert "slivers  1 panels have next to no area, as panel 7" in str(replace(net, panels=thin))
+    assert "slivers" not in str(net)
 
 
 def test_quads_of_a_grid_stay_on_the_surface_and_are_worse_planar(rectangle):
@@ -142,3 +181,23 @@ def test_bad_input_is_refused_in_one_line(rectangle):
         panel_net(delaunay(exact=True), 0.4, "quads", anyway=True)
     with pytest.raises(OptionError, match="pattern"):
         panel_net(rectangle, 1.0, "octagons")
+    with pytest.raises(OptionError, match="size"):
+        panel_net(rectangle, -1.0)
+    with pytest.raises(OptionError, match="direction"):
+        panel_net(rectangle, 1.0, "quads", direction=np.nan)
+    flat = replace(rectangle, vertices=rectangle.vertices * [1.0, 1.0, 0.0])
+    with pytest.raises(OptionError, match="patch 'roof' is flat: every point is an umbilic"):
+        panel_net(flat, 1.0, anyway=True)
+    with pytest.raises(SurfaceError, match="not converged"):
+        panel_net(flat, 1.0)
+    wall = [replace(patch, pressure=0.0, wall=True) for patch in rectangle.patches]
+    with pytest.raises(SurfaceError, match="no panels: every patch is a wall"):
+        panel_net(replace(rectangle, patches=tuple(wall)), 1.0, anyway=True)
+
+
+def test_a_net_with_a_line_that_is_lost_is_refused(monkeypatch, rectangle):
+    module = sys.modules["pcmc.panelling.panel_net"]
+    whole = module.net
+    monkeypatch.setattr(module, "net", lambda *args: whole(*args)._replace(whole=False))
+    with pytest.raises(OptionError, match="no net of panels of 1 fits patch 'roof'; choose a smaller size"):
+        panel_net(rectangle, 1.0)
