@@ -86,7 +86,7 @@ class PanelNet:
 
         >>> from generators import delaunay
         >>> round(panel_net(delaunay(exact=True), 0.5, anyway=True).covered, 3)
-        0.989
+        0.985
         """
         roof = self.surface.roof[self.surface.patch_of_face]
         area = face_areas(self.surface.vertices[self.surface.faces[roof]]).sum()
