@@ -35,6 +35,7 @@ from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from ..surface import Surface
 from ..surface.geometry import face_areas
+from .quantities import summit
 
 GROWTH = 1.5  # of neighbouring edges
 FINER, COARSER = 0.1, 3.0  # times the edge length, in one round
@@ -151,8 +152,11 @@ def _interpolation_error(coarse: Surface, field: Floats) -> Floats:
 
 def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     """(n,3) the derivative of a quantity by the positions."""
-    if quantity in ("height", "area", "volume"):
-        quantity = {"height": "apex"}.get(quantity, quantity)
+    if quantity == "height":
+        slope = np.zeros_like(surface.vertices)
+        slope[summit(surface, surface.patch_index(of))[0]] = surface.plane.normal
+        return slope
+    if quantity in ("area", "volume"):
         return MEASURES[quantity].measure(surface, of or None).by_position
     acting, vertices = Forces.of(surface), _held_vertices(surface, of)
     if quantity == "reaction per length":

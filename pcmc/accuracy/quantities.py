@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import ON
 from ..certificate import Certificate
 from ..certificate.supports import held_curves
 from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
@@ -125,7 +126,7 @@ def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[Ed
 
 
 def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float, float]:
-    """Greatest height of a patch's vertices over Π, ``rounding``, and the height of the smooth surface
+    """Height of a patch's ``summit`` over Π, ``rounding``, and the height of the smooth surface
     through the vertices there.
 
     The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
@@ -133,8 +134,7 @@ def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float
     mirror plane the images of its neighbours belong to them.
     """
     local, topo = surface.plane.to_local(surface.vertices), surface.topology
-    vertices = np.unique(surface.faces[surface.patch_of_face == patch])
-    top = int(vertices[local[vertices, 2].argmax()])
+    top, side = summit(surface, patch)
     value, on_junction = float(local[top, 2]), topo.on_junction[top]
     mirrors = [plane for plane, mask in surface.on_planes if plane.mirror and mask[top]]
     if surface.fixed[top] or surface.on_plane[top] or (surface.held[top] and not mirrors):
@@ -152,7 +152,16 @@ def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float
         along = step[0, :2] - step[1, :2]
         along /= np.linalg.norm(along) or 1.0
         step = np.column_stack([step[:, :2] @ along, np.zeros(2), step[:, 2]])
-    return value, rounding, value + _rise(step)
+    return value, rounding, value + side * _rise(step * [1.0, 1.0, side])
+
+
+def summit(surface: Surface, patch: int) -> tuple[int, float]:
+    """The highest vertex of a patch, and 1; of one with none above Π, as a cushion's lower sheet, the lowest,
+    and -1."""
+    vertices = np.unique(surface.faces[surface.patch_of_face == patch])
+    height = surface.plane.height(surface.vertices[vertices])
+    side = 1.0 if height.max() > ON * surface.size else -1.0
+    return int(vertices[(side * height).argmax()]), side
 
 
 def _rise(step: Floats) -> float:

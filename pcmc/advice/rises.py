@@ -154,7 +154,7 @@ def first_tension(least: float, pressure: float, rise: float) -> float:
 
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried
-LEAST = 0.25  # smallest radius of a ring over the length of edges
+LEAST_RING = 0.25  # smallest radius of a ring over the length of edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,7 @@ def point_masts(plan: Plan) -> list[Mast]:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))
     found = zip(given, points, away.tolist(), inside, strict=True)
-    least = LEAST * plan.edge_length
+    least = LEAST_RING * plan.edge_length
     return [Mast(number, point, clearance, least) for number, point, clearance, free in found if free]
 
 

@@ -37,7 +37,12 @@ class Quantity(NamedTuple):
 
 _ROWS = (
     Quantity("apex", "length", ("roof", "patch"), "greatest height over Π"),
-    Quantity("height", "length", ("point", "patch"), "height over Π at a point; of a patch the greatest"),
+    Quantity(
+        "height",
+        "length",
+        ("point", "patch"),
+        "height over Π at a point; of a patch the greatest, below Π the least",
+    ),
     Quantity("rise", "length", ("roof",), "apex less the height of the lowest support"),
     Quantity("area", "area", ("roof", "patch", "wall"), "Σ A_T"),
     Quantity("volume", "volume", ("roof", "patch", "room"), "∫ z ν·n dA, the volume between patch and Π"),

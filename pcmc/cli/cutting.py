@@ -7,11 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from .. import project as projects
 from ..base import validate
 from ..cloth import CuttingOptions
 from ..cloth.sheets import pattern_files
 from ..plot import strains
+from ..project import start_of
 from ..project.settings import of_material
 from ..project.writing import write_all
 from . import arguments, reports
@@ -93,8 +93,9 @@ def pattern(
         project = arguments.load(file, units)
         wanted, own = given.of(project.pattern), project.output
         own = replace(own, pattern=files, sheet=sheet or own.sheet)
-        own.check(project.units, project.structure, wanted)
-        of_material(wanted, project.structure, projects.surface_of(project))
+        start = start_of(project)
+        own.check(start.units, project.structure, wanted)
+        of_material(wanted, project.structure, start.surface)
         roof = build.roof(project, progress)
         progress("cutting strips")
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)

@@ -20,6 +20,7 @@ from ..continuation import BoundaryMotion, Branch, Direction
 from ..solvers.result import Progress, Result, Status
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
+from ..surface.lagrange import expect_flat
 from .branches import Line, Span
 from .deflation import deflated_newton
 from .found import Equilibria, FoundEquilibrium, WayDown
@@ -134,6 +135,7 @@ def find_equilibria(
     """
     given = surface.surface if isinstance(surface, Result) else surface
     expect_surface(given)
+    expect_flat(given, "find_equilibria")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a sentence")
     chosen = validate.build(SearchOptions, "find_equilibria", options)

@@ -50,7 +50,7 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
     if surface.order > 1:
-        normal = normal_vectors(vertex_classes(surface), surface.vertices)
+        normal = normal_vectors(surface, vertex_classes(surface), surface.vertices)
         symmetric_part(surface.on_planes, normal)
         normal /= np.where(normal.any(axis=1), np.linalg.norm(normal, axis=1), 1.0)[:, None]
         share = 3.0 * np.einsum("ij,ij->i", weighted(surface, 0.0, -1.0)[2], normal)

@@ -60,7 +60,7 @@ class Linearisation:
         if classes.nodes.shape[1] == 3:
             _add_turns(classes.faces, self.X, d, self.sheet_factor, turn)
         else:  # the normals are quadratic in X
-            ends = [normal_vectors(classes, self.X, self.X + side * d) for side in (1.0, -1.0)]
+            ends = [normal_vectors(surface, classes, self.X, self.X + side * d) for side in (1.0, -1.0)]
             turn = 0.5 * (self.sheet_factor * (ends[0] - ends[1])).sum(axis=1)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
@@ -76,7 +76,7 @@ def linearise(
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
     freedom, axis = surface.admissible_at(X)
     single = (classes.kind == SHEET) & (space.dimension == 1) & (freedom > 1)
-    sheet_factor, area_vector = np.zeros_like(X), normal_vectors(classes, X)
+    sheet_factor, area_vector = np.zeros_like(X), normal_vectors(surface, classes, X)
     _across_normals(area_vector, single, freedom, axis, space.basis, gradient, sheet_factor)
     free = freedom[classes.curve]
     rows = np.flatnonzero((space.dimension[classes.curve] == free - 1) & (free > 1))

@@ -39,7 +39,7 @@ from ..surface.geometry import (
     vertex_area_vectors,
 )
 from ..surface.lagrange import lattice
-from ..surface.supports import mirror_edges
+from ..surface.supports import mirror_edges, symmetric_part
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -190,7 +190,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     chord = np.zeros_like(X)
     chord[classes.curve] = curve_chords(surface, classes, X)
     basis, dimension = np.zeros((surface.n, 3, 3)), np.zeros(surface.n, dtype=np.int64)
-    area_vector = normal_vectors(classes, X)
+    area_vector = normal_vectors(surface, classes, X)
     _fill(classes.kind, area_vector, chord, freedom, axis, basis, dimension)
     return MotionSpace.of(basis, dimension)
 
@@ -240,22 +240,30 @@ def _fill(
             basis[v, 1, d], basis[v, 2, d] = second[d], third[d]
 
 
-def normal_vectors(classes: VertexClasses, X: Floats, there: Floats | None = None) -> Floats:
+def normal_vectors(
+    surface: Surface, classes: VertexClasses, X: Floats, there: Floats | None = None
+) -> Floats:
     """(n,3) along the sheets' normals: the area vectors of flat triangles around each vertex.
 
     At the nodes of curved elements the unit normals of the corners are interpolated, each of the triangles
-    around it in the same sheet: where the normals of nodes are uneven, so are their distances after a step,
-    and elements of order 4 and more lose their order. Quadratic in ``there``, if those of these positions
-    are asked for, with the lengths that make them unit normals at X.
+    around it in the same sheet and their mirror images: where the normals of nodes are uneven, so are their
+    distances after a step, and elements of order 4 and more lose their order. Quadratic in ``there``, if
+    those of these positions are asked for, with the lengths that make them unit normals at X.
     """
     if classes.nodes.shape[1] == 3:
         return vertex_area_vectors(X, classes.faces)[0]
     law, n, nodes = classes.topology.patch_of_face, len(X), classes.nodes
     sheets, faces = int(law.max(initial=0)) + 1, classes.faces + n * law[:, None]
-    around = vertex_area_vectors(np.tile(X, (sheets, 1)), faces)[0]
+
+    def stars(X: Floats) -> Floats:
+        found = vertex_area_vectors(np.tile(X, (sheets, 1)), faces)[0]
+        for sheet in found.reshape(sheets, n, 3):
+            symmetric_part(surface.on_planes, sheet)
+        return found
+
+    around = stars(X)
     length = np.linalg.norm(around, axis=1)[:, None]
-    if there is not None:
-        around = vertex_area_vectors(np.tile(there, (sheets, 1)), faces)[0]
+    around = around if there is None else stars(there)
     around /= np.where(length > 0.0, length, 1.0)
     per_element = len(law) // len(nodes)
     corners = nodes[:, :3] + n * law[::per_element, None]

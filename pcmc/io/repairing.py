@@ -134,8 +134,10 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     patches = tuple(data.patches[k] for k in kept)
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
-    given = {"supports": data.support is not None, "cables": data.cables, "rooms": data.rooms}
-    given |= {"planes": data.planes, "lines": data.lines}
+    names = ("cables", "rooms", "planes", "lines")
+    given = {name: getattr(data, name) or data.parts.get(name) for name in names}
+    given = {"supports": data.support is not None, **given}
+    given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     left_out = ", ".join(name for name, there in given.items() if there)
     notes = (*data.notes, *([f"left out: {left_out}; the boundary is fixed"] if left_out else []))
     if edge_length is not None:

@@ -12,6 +12,7 @@ from ..base.errors import OptionError
 from ..forces.pinching import Walls, lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from ..surface.lagrange import expect_flat
 from ..surface.topology import edge_places
 from .curve_cutting import cut_triangles
 from .quality import edge_lengths
@@ -94,6 +95,7 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     >>> refine_faces(square, [0]).m
     6
     """
+    expect_flat(surface, "refine_faces")
     given, faces, topo = np.asarray(chosen), np.zeros(surface.m, dtype=bool), surface.topology
     is_mask = given.dtype == bool and given.shape == faces.shape
     if not is_mask and given.size:

@@ -13,6 +13,7 @@ from ..base.errors import OptionError
 from ..base.tolerances import ON
 from ..forces.pinching import standing_part, under_low
 from ..surface import Surface, expect_surface
+from ..surface.lagrange import middles_of_sides
 
 CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner
 
@@ -41,7 +42,8 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     - every other edge, such as one across a sheet between two fixed boundary vertices: free.
 
     A new vertex is the middle of its edge, except beside a junction that rests on Π: there the rows of
-    the wall coincide, and their new vertices are placed apart.
+    the wall coincide, and their new vertices are placed apart. Those of curved elements lie on them, so that
+    four elements have the shape of one, but for new places on the curves.
 
     Parameters
     ----------
@@ -212,7 +214,11 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     below the middle of the top edge: rows that coincide where the junction rests part again beside it.
     """
     start, end = edges.T
-    X = surface.vertices
+    X, topo = surface.vertices, surface.topology
+    if surface.order > 1:
+        on_edges = np.empty((len(topo.edges), 3))
+        on_edges[topo.edge_of_face] = middles_of_sides(X, surface.nodes, surface.order)
+        return np.asarray(on_edges[topo.edge_numbers(edges)])
     middle = 0.5 * (X[start] + X[end])
     part = standing_part(surface)
     walls, rows, resting = part.walls, part.walls.rows, part.resting

@@ -18,6 +18,7 @@ from ..forces.curvature import mean_curvature
 from ..forces.pinching import lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
+from ..surface.lagrange import expect_flat
 from ..surface.topology import SIDES, edge_places
 from .angles import improve_angles
 from .curve_cutting import CurveMesh, cut_curves
@@ -83,6 +84,7 @@ def remesh(
     >>> fine.m > 2 * dome.m, fine.patches == dome.patches
     (True, True)
     """
+    expect_flat(surface, "remesh")
     one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
     check_lengths(one, near_curves, growth, chord)
     if np.ndim(edge_length) == 0:

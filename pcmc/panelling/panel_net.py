@@ -19,6 +19,7 @@ from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
 from ..surface.geometry import cross_2d, face_areas
+from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .isothermic import curvature_coordinates
 from .net import line_ends, net, nudged
@@ -205,6 +206,7 @@ def panel_net(
     70
     """
     expect_surface(surface)
+    expect_flat(surface, "the net of panels")
     size = validate.positive("size", size)
     validate.choice("pattern", pattern, PATTERNS)
     direction = validate.number("direction", direction)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .plan import Plan
 
 RISE = 0.3  # of the radius of the largest circle without supports: a shallow dome
+BELOW = " below"  # behind the name of a patch: that of a cushion's sheet below it
 FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper at its edge
 SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room
@@ -116,7 +117,7 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
     free = surface.vertices[inner]
     image = free - 2.0 * surface.plane.height(free)[:, None] * normal
     below = [
-        replace(patch, name=f"{patch.name} below", tension=factor * patch.tension, snow=0.0)
+        replace(patch, name=f"{patch.name}{BELOW}", tension=factor * patch.tension, snow=0.0)
         for patch in surface.patches
     ]
     return Surface(

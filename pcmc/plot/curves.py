@@ -36,6 +36,7 @@ MARKERS = "osD^vPX"
 EVENT_MARKERS = {"fold": "o", "index": "D", "contact": "x"}
 MEANINGS = {"fold": "fold", "index": "change of index", "contact": "change of contact"}
 LEGEND_INSIDE = 6  # labels at most; a longer legend is beside the axes
+WIDEST_BESIDE = 0.4  # of a figure's width: a wider legend stays inside the axes
 
 
 def lines(
@@ -294,7 +295,8 @@ def label_axes(axes: Any, x: str, y: str) -> None:
 
 
 def add_legend(axes: Any, count: int) -> None:
-    """A legend of the curves, where there are several; beside the axes if it is long or would cover one."""
+    """A legend of the curves, where there are several; beside the axes if it is long, or would cover one and
+    leaves them room."""
     text = {"fontsize": SMALL, "labelcolor": INK}
     if count <= LEGEND_INSIDE:
         if count <= 1 and axes.get_legend_handles_labels()[1] in ([], [""]):
@@ -304,7 +306,8 @@ def add_legend(axes: Any, count: int) -> None:
         axes.figure.draw_without_rendering()
         inside, paths = legend.get_window_extent(), (line.get_path() for line in axes.lines)
         drawn = (path.transformed(line.get_transform()) for path, line in zip(paths, axes.lines, strict=True))
-        if not any(path.intersects_bbox(inside, filled=False) for path in drawn):
+        wide = inside.width > WIDEST_BESIDE * axes.figure.bbox.width
+        if wide or not any(path.intersects_bbox(inside, filled=False) for path in drawn):
             return
         legend.remove()
     axes.figure.legend(handlelength=2.4, frameon=False, loc="outside right upper", **text)

@@ -252,13 +252,14 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
         if project.wanted.accuracy and not after and not project.targets:
             outcome = _solve_to_accuracy(project, surface, progress)
             return replace(outcome, notes=[*filter(None, notes), *outcome.notes], project=project)
-        outcome = _solve_or_meet(project, surface, progress)
+        flat = replace(project, options={**project.options, "order": None}) if after else project
+        outcome = _solve_or_meet(flat if "order" in project.options else project, surface, progress)
         notes += outcome.notes
         for stage in after:
             if outcome.good:
                 progress("remeshing")
                 before, (surface, note) = outcome, stage.remeshed(outcome.surface)
-                outcome = _again(project, surface, progress)
+                outcome = _again(project if stage is after[-1] else flat, surface, progress)
                 notes += [note, *outcome.notes]
                 notes += _met_before(project.targets, before, outcome)
         if project.wanted.accuracy and outcome.good:

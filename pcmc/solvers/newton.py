@@ -45,6 +45,8 @@ def newton(
     refinable("levels", options.levels, surface.m)
     log, first, rows = Log(callback), surface, list[dict[str, Any]]()
     order = options.order or surface.order
+    if order != surface.order > 1:
+        elevate(surface, order)  # refuses it before the work
     last = options.levels + (order > surface.order)
     for level in range(last + 1):
         end = _solve_level(surface, options, log, level, rows)

@@ -262,7 +262,8 @@ def in_the_open(surface: Surface) -> Bools:
     P, patch_of = surface.plane.to_local(surface.vertices)[surface.faces], surface.patch_of_face
     middle, reach = P.mean(axis=1), np.ptp(P, axis=1)[:, :2].max(axis=1)
     found: Bools = surface.roof.copy()
-    trees = {k: cKDTree(middle[patch_of == k, :2]) for k in np.flatnonzero(surface.roof)}
+    roof = np.flatnonzero(surface.roof & (np.bincount(patch_of, minlength=len(found)) > 0))
+    trees = {k: cKDTree(middle[patch_of == k, :2]) for k in roof}
     for k in trees:
         mine = patch_of == k
         for other in trees.keys() - {k}:

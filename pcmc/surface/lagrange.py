@@ -77,8 +77,9 @@ def expect_flat(surface: Any, what: str) -> None:
     >>> expect_flat(flat, "the panels")
     """
     if surface.order > 1:
-        message = f"{what}: only for flat triangles, and the elements are of order {surface.order}; pass"
-        message += " surface.rebuilt(order=1), the triangles that join their nodes"
+        message = f"{what}: only for flat triangles, and the elements are of order {surface.order}; type"
+        message += " order = 1 under [solve], or pass surface.rebuilt(order=1), the triangles that join the"
+        message += " nodes"
         raise SurfaceError(message, what="order", found=surface.order, expected=1)
 
 
@@ -117,6 +118,34 @@ def element_nodes(F: Ints, order: int) -> Ints:
         message += " 1→4 refinement, in its order; give order=1 for flat triangles"
         raise SurfaceError(message, what="order", where=face, found=order)
     return read_only(np.ascontiguousarray(nodes))
+
+
+def turned_over(F: Ints, order: int) -> Ints:
+    """The small triangles (…,m,3) of elements turned over, in the order that elements have.
+
+    >>> turned_over(np.array([[0, 3, 4], [1, 5, 3], [2, 4, 5], [5, 4, 3]]), 2).tolist()
+    [[2, 5, 4], [1, 3, 5], [0, 4, 3], [3, 4, 5]]
+    """
+    here = lattice(order)
+    place = {tuple(place): number for number, place in enumerate(here.nodes.tolist())}
+    mirror = np.array([place[tuple(l[::-1])] for l in here.nodes.tolist()])
+    cut = F.reshape(-1, order**2, 3)
+    nodes = cut[:, here.face, here.corner][:, mirror]
+    return np.ascontiguousarray(nodes[:, here.node].reshape(F.shape))
+
+
+def middles_of_sides(X: Floats, nodes: Ints, order: int) -> Floats:
+    """(m,3,3) the points of elements (e,k) half way along the sides of their small triangles, by barycentric
+    coordinates; side k is opposite corner k.
+
+    >>> bow = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [1, 0, 1], [0, 1, 0], [1, 1, 0]])
+    >>> middles_of_sides(bow, np.arange(6)[None], 2)[0, 2].tolist()
+    [0.5, 0.0, 0.75]
+    """
+    corner = lattice(order).nodes[lattice(order).node]  # (p²,3,3)
+    middle = (corner.sum(axis=1, keepdims=True) - corner) / (2.0 * order)
+    value = shape_functions(order, middle.reshape(-1, 3))[0]
+    return np.asarray(np.einsum("qk,ekd->eqd", value, X[nodes]).reshape(-1, 3, 3))
 
 
 @cache

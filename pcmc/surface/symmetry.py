@@ -15,6 +15,7 @@ from ..base.errors import SurfaceError
 from ..base.tolerances import ON, PARALLEL
 from .guides import Guide, Plane
 from .held_curve import HeldCurve
+from .lagrange import turned_over
 from .parts import Cable, Room
 from .supports import refuse_in_mirror
 from .surface import Surface, expect_surface
@@ -52,7 +53,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     plane = replace(plane, mirror=True)
     height = plane.height(surface.vertices)
     side = np.where(np.abs(height) <= ON * surface.size, 0, np.sign(height)).astype(int)
-    corners = side[surface.faces]
+    corners = np.repeat(side[surface.nodes], surface.order**2, axis=0)
     names = [patch.name for patch in surface.patches]
     crossing = np.flatnonzero((corners > 0).any(axis=1) & (corners < 0).any(axis=1))
     if len(crossing):
@@ -190,7 +191,7 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
     X = np.concatenate([surface.vertices @ R.T + t for R, t in images])[first]
     F = place[:, surface.faces]
     reflected = np.array([np.linalg.det(image.R) < 0.0 for image in images])
-    F[reflected] = F[reflected][:, :, ::-1]
+    F[reflected] = turned_over(F[reflected], surface.order)
     F = F.reshape(-1, 3)
     # which patch goes on behind which plane, at edges in no other of them
     inside = masks[:, edges].all(axis=2) & boundary

@@ -24,10 +24,11 @@ import numpy as np
 
 from ..base.errors import FileError, FileWarning
 from ..base.files import check_regular, system_error
-from .case_script import WORDS, version
+from .case_script import WORDS, answer, version
 from .grid import Sweep
 
 FORMAT = 2
+COLUMNS = ["parameters", "record", "crc"]  # of the table of cases
 FIELDS = (*WORDS, "numbers", "wall_time", "provenance")  # of a Record, in the second of them
 SQLITE = b"SQLite format 3\0"  # how its files begin
 READERS = 60.0  # seconds that a commit waits for programs that read the store
@@ -183,11 +184,12 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
     if found != FORMAT:
         text = f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
         raise FileError(f"{text} {written_by}", what=str(path), found=found, expected=FORMAT)
+    columns = [row[1] for row in database.execute("PRAGMA table_info(cases)")]
     try:
         declared = {**json.loads(text), "version": written_by}
         axes = declared["grid"].values()
         sound = isinstance(declared["case"], str) and isinstance(declared["fixed"], dict)
-        if not sound or not all(isinstance(axis, list) for axis in axes):
+        if columns != COLUMNS or not sound or not all(isinstance(axis, list) for axis in axes):
             raise ValueError
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         text = f"{path}: is damaged (it does not say which sweep it belongs to); name another file"
@@ -241,8 +243,24 @@ def _records(
         try:
             if zlib.crc32((key + str(text)).encode()) != crc:
                 raise ValueError
-            records[number] = Record(case=number, parameters=parameters, **json.loads(text))
+            records[number] = _record(number, parameters, json.loads(text))
         except (ValueError, TypeError, RecursionError):
             text = f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
             warn(f"{text} case again", FileWarning, stacklevel=4)
     return dict(sorted(records.items()))
+
+
+def _record(number: int, parameters: dict[str, Any], fields: Mapping[str, Any]) -> Record:
+    """The record of a case; ValueError or TypeError for one that no case can have, such as one with a number
+    that would take the place of a parameter or a word in a table."""
+    record = Record(case=number, parameters=parameters, **fields)
+    words = (record.status, record.verdict, record.message)
+    tables = (record.numbers, record.provenance)
+    if not all(isinstance(word, str) for word in words) or not all(isinstance(t, dict) for t in tables):
+        raise TypeError
+    if {*WORDS, "case"} & record.numbers.keys() or {"case", "wall_time"} & record.provenance.keys():
+        raise ValueError
+    if isinstance(record.wall_time, bool) or not isinstance(record.wall_time, int | float):
+        raise TypeError
+    answer(record.numbers, parameters)
+    return record

@@ -21,6 +21,7 @@ from pcmc.accuracy.persistence import compared
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.meshing.held_curves import smooth_midpoints
 from pcmc.meshing.refinement import held_midpoints, refine
+from pcmc.plan import Plan
 from pcmc.project import run
 from pcmc.solvers import solve as solve_once
 from pcmc.sweep import run as run_sweep
@@ -56,6 +57,17 @@ def test_joined_caps_persist_and_their_limits_are_the_exact_values():
     ):
         assert abs(row.value - value) <= row.error <= 2.0 * abs(row.value - value)
         assert abs(row.limit - value) <= row.limit_error < 0.2 * row.error
+
+
+def test_the_height_of_a_cushions_lower_sheet_is_that_of_its_lowest_point():
+    """Over a circle of radius 3 the sheets are caps of the radii 2α/p, 4 and 6."""
+    plan = Plan({"circle": {"centre": [0, 0], "radius": 3.0}}, edge_length=0.8, tension=2.0, cushion=1.5)
+    found = check_mesh(solve(plan.surface()))
+    for name, value in ("patch 1", 4.0 - np.sqrt(7.0)), ("patch 1 below", np.sqrt(27.0) - 6.0):
+        row = found.row("height", name)
+        assert abs(row.value - value) <= row.error <= 5.0 * abs(row.value - value)
+        assert abs(row.limit - value) <= row.limit_error < 0.2 * row.error
+        assert row.order == pytest.approx(2.0, abs=0.4)
 
 
 def test_exact_quantities_have_bars_at_rounding_and_no_order():

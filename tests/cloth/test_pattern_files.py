@@ -8,7 +8,7 @@ from printed import words_of
 from shapely import Point, Polygon
 
 from generators import joined_caps
-from pcmc import cutting_pattern, project, solve
+from pcmc import cutting_pattern, project, solve, write
 from pcmc.base.errors import MissingExtra, OptionError, PcmcError
 from pcmc.cli import main
 from pcmc.cloth import pattern_drawings
@@ -191,6 +191,14 @@ def test_the_command_cuts_a_project(tmp_path, capsys):
     assert capsys.readouterr().err.startswith("pcmc: error: --seam: expected points X,Y,X,Y and so on")
     assert main(["pattern", str(path), "--strips", "2", "-o", str(files[1])]) == 0
     assert pd.read_csv(files[1])["patch"].tolist() == ["west", "west", "east", "east"]
+
+
+def test_a_surface_has_the_unit_of_its_file(pattern, tmp_path, capsys):
+    for unit, code in ("m", 0), ("", 2):
+        write(tmp_path / "roof.pcmc", pattern.surface, units=unit)
+        command = ["pattern", str(tmp_path / "roof.pcmc"), "--strips", "1", "-o", str(tmp_path / "cloth.dxf")]
+        assert main(command) == code
+    assert "add units = " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

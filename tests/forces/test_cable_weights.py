@@ -136,8 +136,3 @@ def test_a_margin_ends_where_a_cable_is_compressed():
     found = pcmc.margin(heavy_rope(), "cable")
     assert found.ends_by is pcmc.margins.MarginEnd.COMPRESSION
     assert found.factor == pytest.approx(0.5, abs=0.003)  # τ λ + g z = 0 at z = -1, and the sag 0.0033
-
-
-def test_a_margin_of_all_weights_is_refused_where_a_cable_has_one():
-    with pytest.raises(OptionError, match="cable 'rope' has a weight of its own; name one patch"):
-        pcmc.margin(heavy_rope(), "weight")

@@ -1,11 +1,22 @@
 """Curved elements: derivatives, identities, and the order of closed forms."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generators import spherical_cap, spherical_cap_exact
+from generators import (
+    delaunay,
+    delaunay_exact,
+    double_bubble,
+    double_bubble_exact,
+    joined_caps,
+    joined_caps_exact,
+    spherical_cap,
+    spherical_cap_exact,
+)
 from pcmc import Patch, Surface, energy, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.diagnostics import check_gradient, check_hessian, taylor
@@ -112,6 +123,47 @@ def test_a_cap_of_curved_elements(order, energy_order, position_order):
     assert min(energies, volumes, areas) > energy_order
     assert positions > position_order
     assert errors[1][0] < {2: 1e-6, 4: 1e-10}[order] * exact.energy
+
+
+def onto_arcs(points):
+    """Points near the boundary of ``joined_caps`` on its two arcs."""
+    out, spheres = points.copy(), joined_caps_exact().shapes
+    for side, here in (("left", points[:, 0] < 0.0), ("right", points[:, 0] > 0.0)):
+        centre = np.array(spheres[side].centre)
+        away = points[here, :2] - centre[:2]
+        radius = np.sqrt(spheres[side].radius ** 2 - centre[2] ** 2)
+        out[here, :2] = centre[:2] + radius * away / np.linalg.norm(away, axis=1)[:, None]
+    return out
+
+
+def onto_rings(points):
+    """Points near the rings of ``delaunay`` on them."""
+    start = delaunay(0.6, exact=True)
+    radius = np.linalg.norm(start.vertices[start.fixed][0, :2])
+    on = points.copy()
+    on[:, :2] *= radius / np.hypot(*points.T[:2])[:, None]
+    return on
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+@pytest.mark.parametrize(
+    ("make", "exact", "project"),
+    [
+        (partial(joined_caps, 0.7), joined_caps_exact(), onto_arcs),
+        (partial(delaunay, 0.6), delaunay_exact(), onto_rings),
+        (partial(double_bubble, 1.0), double_bubble_exact(), None),
+    ],
+    ids=["two joined caps", "unduloid", "double bubble"],
+)
+def test_closed_forms_with_junctions_and_waves(make, exact, project):
+    start, errors = make(), []
+    for flat in (start, refine(start, 1, project)):
+        reached = solve(flat, target="stationary").surface
+        result = solve(elevate(reached, 2, project), target="stationary")
+        assert result.converged
+        errors.append(abs(result.energy - exact.energy))
+        assert errors[-1] < 0.01 * abs(energy(reached) - exact.energy)
+    assert np.log2(errors[0] / errors[1]) > 3.6
 
 
 def test_the_variational_curvature_is_exact_at_rest():

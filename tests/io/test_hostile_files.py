@@ -234,13 +234,6 @@ def test_arrays_of_the_wrong_shape_or_type_are_named(tmp_path, name, array):
         pcmc.read(path)
 
 
-@pytest.mark.parametrize("mask", [np.zeros((1, 3), bool), np.zeros((1, 6), int), np.full((1, 6), 99)])
-def test_masks_of_lines_of_the_wrong_shape_or_type_are_named(tmp_path, mask):
-    path = native(tmp_path, lines=np.array([[[0.0, 0, 0], [1, 0, 0]]]), on_line=mask)
-    with refused(FileError, what=str(path), where="on_line"):
-        pcmc.read(path)
-
-
 @pytest.mark.parametrize(
     ("name", "array", "row"),
     [

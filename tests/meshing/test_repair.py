@@ -11,6 +11,7 @@ from refusals import refused
 import pcmc
 from pcmc import cli, io
 from pcmc.base.errors import FileError, FileWarning, OptionError, SurfaceError
+from pcmc.meshing.elevation import elevate
 from pcmc.surface.geometry import area_vectors
 
 pytest.importorskip("pymeshlab")
@@ -69,6 +70,16 @@ def test_open_seams_are_welded(tmp_path):
     assert changes == {"vertices welded": 3 * len(F) - len(X)}
     loose, _ = changed(path, weld=0.0)
     assert loose.n == 3 * len(F)
+
+
+def test_curved_elements_are_left_out_and_this_is_said(tmp_path):
+    X, F = sheet()
+    flat = pcmc.Surface(X, F, [0] * len(F), [pcmc.Patch("roof", 1.0)], fixed=range(len(X)))
+    for name in ("a.pcmc", "a.vtp"):
+        pcmc.write(tmp_path / name, elevate(flat, 2))
+        repaired = pcmc.repair(tmp_path / name)
+        assert repaired.surface.order == 1
+        assert "left out: supports, curved elements; the boundary is fixed" in repaired.notes
 
 
 def test_repeated_and_flat_triangles_are_left_out(tmp_path):

@@ -201,6 +201,15 @@ def solved(text, name="mesh.toml"):
         return project.run(name)
 
 
+def test_a_remeshed_roof_gets_its_curved_elements_at_the_end(folder):
+    text = WITH_UNITS + "[solve]\norder = 2\n[remesh]\nedge_length = 0.8\n"
+    (folder / "curved.toml").write_text(text, encoding="utf-8")
+    found = project.run("curved.toml")
+    assert (found.good, found.surface.order) == (True, 2)
+    assert len(found.surface.nodes) == found.surface.m / 4
+    assert found.certificate.residual < 1e-12
+
+
 def test_a_mesh_is_a_project_with_units_supports_rise_remesh_and_output(mesh):
     plan = project.designed("roof.toml")
     table = '[mesh]\nfile = "pavilion.obj"\nsupports = "boundary"\npatches = {roof = {tension = 2.0}}\n'

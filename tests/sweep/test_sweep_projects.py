@@ -55,6 +55,18 @@ points = {crown = [4.5, 3]}
 """
 
 
+def test_both_sheets_of_a_cushion_have_the_pressure_that_one_is_given(tmp_path):
+    path = tmp_path / "cushion.toml"
+    path.write_text(
+        "[plan]\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\nedge_length = 1.0\ncushion = 1.2\ntension = 4.0"
+    )
+    for name in "patch 1.pressure", "patch 1 below.pressure":
+        assert varied(path, {name: 0.8})[1].pressures.tolist() == [0.8, 0.8]
+    both = {"patch 1.pressure": 0.8, "patch 1 below.pressure": 0.7}
+    assert varied(path, both)[1].pressures.tolist() == [0.8, 0.7]
+    assert varied(path, {"patch 1.tension": 5.0})[1].tensions.tolist() == [5.0, 4.8]
+
+
 def test_lines_and_points_are_shifted_as_they_are(roof):
     roof.write_text(DRAWN, encoding="utf-8")
     aims = '[targets]\nmeet = [{quantity = "height", of = "crown", value = 1}]\nvary = ["patch 2"]\n'
