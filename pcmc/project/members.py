@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from ..base.errors import LostWarning, OptionError
 from ..structure.member_keys import members_of
 from ..structure.members import Member, MemberLine, lines_on
-from .outcome import Outcome
+
+if TYPE_CHECKING:
+    from .outcome import Outcome
 
 
 def members_named(outcome: Outcome) -> tuple[Member, ...]:
