@@ -17,7 +17,7 @@ from ..panelling.planar import laid_flat_polygons
 from ..surface.geometry import cross_2d
 from .sheet import WIDTH, Sheet, SheetLine, Text, corner, drawing_area, table_sheets
 
-LEAST_WARP = 0.05  # mm: a corner so far from the panel's plane is told of
+LEAST_WARP = 0.05  # mm: corners that are farther from the panel's plane are marked on its sheet
 
 
 class FlatPanel(NamedTuple):

@@ -26,7 +26,7 @@ SWITCHED = 1e-6  # of the span: nearer to its present value, a switched branch h
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class TracedParameter:
     """A parameter λ of a surface: its name, its value there, and between which values it is followed."""
 
     name: str
@@ -35,7 +35,7 @@ class Line:
     span: Span
 
     @classmethod
-    def of(cls, surface: Surface, what: Any, span: Span | None) -> Line:
+    def of(cls, surface: Surface, what: Any, span: Span | None) -> TracedParameter:
         """That of a name as of ``margin``, a Direction, or a BoundaryMotion."""
         name, parameter = "parameter", what
         if isinstance(what, str):

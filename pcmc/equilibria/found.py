@@ -18,7 +18,7 @@ from ..forces.functional import patch_volumes
 from ..forces.rooms import room_pressures
 from ..forces.volume_below import volume_below
 from ..surface import Surface
-from .branches import Line
+from .branches import TracedParameter
 
 INCOMPLETE = (
     "No search of this kind proves that there is no further equilibrium: one that no branch in the span"
@@ -94,7 +94,7 @@ class Equilibria:
 
     found: tuple[FoundEquilibrium, ...]
     ways: tuple[WayDown, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[TracedParameter, ...]
     branches: Mapping[str, tuple[Branch, ...]] = field(repr=False)
     searched: tuple[str, ...] = ()
     failed: tuple[str, ...] = ()

@@ -21,7 +21,7 @@ from ..solvers.result import Progress, Result, Status
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
-from .branches import Line, Span
+from .branches import Span, TracedParameter
 from .deflation import deflated_newton
 from .found import Equilibria, FoundEquilibrium, WayDown
 from .shapes import Shape
@@ -140,7 +140,7 @@ def find_equilibria(
         validate.refuse("callback", callback, "a function of a sentence")
     chosen = validate.build(SearchOptions, "find_equilibria", options)
     every = [along] if isinstance(along, str | Direction | BoundaryMotion) else list(along)
-    lines = [Line.of(given, what, chosen.span) for what in every]
+    lines = [TracedParameter.of(given, what, chosen.span) for what in every]
     search = _Search(given, lines, chosen, callback)
     try:
         search.run()
@@ -156,7 +156,7 @@ class _Search:
     def __init__(
         self,
         surface: Surface,
-        lines: Sequence[Line],
+        lines: Sequence[TracedParameter],
         options: SearchOptions,
         callback: Callable[[str], None] | None,
     ) -> None:
@@ -232,7 +232,7 @@ class _Search:
         self.shapes.append(shape)
         return len(self.found) - 1
 
-    def follow(self, line: Line, number: int) -> None:
+    def follow(self, line: TracedParameter, number: int) -> None:
         """The branch through an equilibrium, those that leave it, and the equilibria on them."""
 
         def watch(_: Progress) -> None:
@@ -260,7 +260,7 @@ class _Search:
                     following += self.leaving(line, branch, watch)
             level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
 
-    def cross(self, line: Line, there: Surface | str, beside: str, how: str) -> None:
+    def cross(self, line: TracedParameter, there: Surface | str, beside: str, how: str) -> None:
         """Add the equilibrium where a branch passes the present value, or tell why there is none."""
         now, known = f"{line.name} {line.value:.4g}", len(self.found)
         if isinstance(there, str):
@@ -275,7 +275,9 @@ class _Search:
             back = f"the way from there to {line.value:.4g} leads back to a known equilibrium"
             self.failed.append(f"A branch left at {line.name} {beside}; {back}. Try a finer mesh.")
 
-    def leaving(self, line: Line, branch: Branch, watch: Callable[[Progress], None]) -> list[Branch]:
+    def leaving(
+        self, line: TracedParameter, branch: Branch, watch: Callable[[Progress], None]
+    ) -> list[Branch]:
         """The branches that leave one at bifurcations where no other was left before."""
         found = list[Branch]()
         for row, value in line.bifurcations(branch):

@@ -34,8 +34,8 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
       it is H̄ |Σ A_T ν_T| / Σ A_T ≤ H̄: it sees that the star is not flat.
     - ``"variational"``: ⟨∇A, ∇V⟩ / (2 ⟨∇V, ∇V⟩), exactly H̄ at a stationary vertex.
 
-    At the nodes of curved elements ∇V = ∫ N_i ν dA, of which the part along the node's normal counts, stands
-    for both A_b and ∇V; NaN where it is next to nothing, as at the corners of elements of order 2.
+    At a node of curved elements the part of ∇V = ∫ N_i ν dA along the node's normal replaces A_b and ∇V.
+    Where it nearly vanishes, as at the corners of elements of order 2, the value is NaN.
 
     >>> from pcmc import Patch, Surface
     >>> pyramid = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]],

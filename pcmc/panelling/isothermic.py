@@ -27,16 +27,16 @@ from ..surface.geometry import face_areas
 from ..surface.topology import EdgeCurve, Topology, components
 from .directions import Directions, principal_directions
 from .net import nudged
-from .sheet import Sheet
+from .sheet import SheetMesh
 
-ALIGNED = np.radians(10.0)  # a curve half of which is this near to the directions is a line of curvature
-ROUND = 0.05  # of the mean curvature: a sheet half of which has a smaller (κ₁ - κ₂)/2 is part of a sphere
+ALIGNED = np.radians(10.0)  # a curve is a line of curvature if half of it is within this of the directions
+ROUND = 0.05  # of the mean curvature: a sheet is part of a sphere if (κ₁ - κ₂)/2 is smaller on half of it
 FLAT = 1e-6  # curvature times size
 STRETCHES, SHIFTS = np.linspace(0.8, 1.25, 46), np.arange(0.0, 1.0, 0.025)  # of the lattice, that are tried
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates:
+class NetCoordinates:
     """Coordinates u, v at the corners of a sheet's triangles; lines of the net are whole numbers."""
 
     at: Floats  # (m,3,2)
@@ -46,7 +46,7 @@ class Coordinates:
     turned: Floats  # (m,) angle between the lines and the principal directions, radians
 
 
-def curvature_coordinates(sheet: Sheet, size: float, name: str) -> Coordinates:
+def curvature_coordinates(sheet: SheetMesh, size: float, name: str) -> NetCoordinates:
     """The coordinates of a sheet; panels have about the ``size``, length."""
     topo = sheet.topology
     directions = principal_directions(sheet.X, sheet.F)
@@ -63,7 +63,7 @@ def curvature_coordinates(sheet: Sheet, size: float, name: str) -> Coordinates:
 class _OpenSheet:
     """A sheet cut open, so that the directions have one sign all over it."""
 
-    def __init__(self, sheet: Sheet, topo: Topology, directions: Directions) -> None:
+    def __init__(self, sheet: SheetMesh, topo: Topology, directions: Directions) -> None:
         self.sheet, self.topo, self.directions = sheet, topo, directions
         X, F = sheet.X, sheet.F
         one, other = sheet.inner_sides
@@ -153,7 +153,7 @@ class _OpenSheet:
         )
         self.gradient, self.area = csr_array(gradient), area
 
-    def coordinates(self, size: float, name: str) -> Coordinates:
+    def coordinates(self, size: float, name: str) -> NetCoordinates:
         """Solve freely, choose the lattice, then hold umbilics, aligned curves and the cuts on it."""
         curves, _ = self.sheet.boundary()
         along = [self._along(curve) for curve in curves]  # 0 where u is constant, 1 for v, -1 for none
@@ -203,7 +203,7 @@ class _OpenSheet:
         slope = self.gradient @ solved[0]
         turned = np.angle((slope[::2] + 1j * slope[1::2]) / self.root)
         aligned = tuple(c for c, a in zip(curves, along, strict=True) if a >= 0)
-        return Coordinates(at, umbilics, self.index[umbilics], aligned, turned)
+        return NetCoordinates(at, umbilics, self.index[umbilics], aligned, turned)
 
     def _solve(self, part: Any, common: list[csr_array], held: list[tuple[csr_array, float]]) -> Floats:
         """(count,) the function with the gradient ``part`` (m,) in the mean, under linear conditions."""

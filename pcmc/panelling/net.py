@@ -14,7 +14,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface.geometry import cross_2d
-from .sheet import Sheet
+from .sheet import SheetMesh
 
 NUDGE = 1e-6  # of a step: a vertex is at least so far from every line
 SAME = 1e-6  # of an edge: two lines that end so near to each other end at one node
@@ -58,7 +58,7 @@ def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
     return np.where(np.abs(values - line) < NUDGE, away, values)[place]
 
 
-def line_ends(sheet: Sheet, at: Floats, hexagons: bool = False) -> Ends:
+def line_ends(sheet: SheetMesh, at: Floats, hexagons: bool = False) -> Ends:
     """The ends of all lines on the boundary; for hexagons but those of the edges left out."""
     topo = sheet.topology
     rim = np.flatnonzero(topo.boundary_edge[topo.edge_of_face.ravel()])
@@ -78,7 +78,7 @@ def line_ends(sheet: Sheet, at: Floats, hexagons: bool = False) -> Ends:
     return Ends(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def net(sheet: Sheet, at: Floats, ends: Ends, more: tuple[Ints, Floats], hexagons: bool = False) -> Net:
+def net(sheet: SheetMesh, at: Floats, ends: Ends, more: tuple[Ints, Floats], hexagons: bool = False) -> Net:
     """The net of a sheet with coordinates ``at`` (m,3,2).
 
     ``more`` are sides and places of further nodes on the boundary, as of the sheets beyond it. Hexagons need
@@ -150,7 +150,7 @@ def net(sheet: Sheet, at: Floats, ends: Ends, more: tuple[Ints, Floats], hexagon
     )
 
 
-def _transitions(sheet: Sheet, at: Floats) -> tuple[Ints, Floats, Floats]:
+def _transitions(sheet: SheetMesh, at: Floats) -> tuple[Ints, Floats, Floats]:
     """For each side the side beyond it or -1, and z → flip z + shift to the coordinates there."""
     one, other = sheet.inner_sides
     opposite, flip, shift = np.full(sheet.F.size, -1), np.ones(sheet.F.size), np.zeros((sheet.F.size, 2))
@@ -165,7 +165,7 @@ def _transitions(sheet: Sheet, at: Floats) -> tuple[Ints, Floats, Floats]:
     return opposite, flip, shift
 
 
-def _next_on_rim(sheet: Sheet, rim: Ints, side: Ints) -> Ints:
+def _next_on_rim(sheet: SheetMesh, rim: Ints, side: Ints) -> Ints:
     """(k,) the node that follows each node of the boundary; they are ordered by side, then along it."""
     corner = sheet.F.ravel()
     begins = np.full(len(sheet.X), -1)

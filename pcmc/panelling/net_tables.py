@@ -15,13 +15,13 @@ from ..surface.topology import components
 from .distance import distances
 from .net import Ends, Net
 from .planar import before, convex, planarity, polygon_areas, torsion
-from .sheet import Sheet
+from .sheet import SheetMesh
 
 INSIDE, EDGE, CORNER = 0, 1, 2
 KINDS = np.array(["inside", "edge", "corner"])
 SHORT = 0.1  # of the size: the ends of an edge that is shorter become one node
 SLIVER = 0.02  # of the size squared: twice the area of a panel between a rim and its chord that is left out
-PLACES = 1e5  # on an edge that are told apart
+PLACES = 1e5  # per edge: crossings are distinct if they round to different places
 
 
 class SheetNet(NamedTuple):
@@ -29,7 +29,7 @@ class SheetNet(NamedTuple):
 
     name: str
     faces: Ints  # in the surface
-    sheet: Sheet
+    sheet: SheetMesh
     at: Floats  # (m,3,2)
     ends: Ends
     umbilics: Ints  # vertices of the sheet

@@ -25,12 +25,12 @@ from .isothermic import curvature_coordinates
 from .net import line_ends, net, nudged
 from .net_tables import SheetNet, joined_nets, net_tables, shared_ends, without_flat
 from .planar import before, planarised, torsion_free_axes
-from .sheet import Sheet, sheets_of
+from .sheet import SheetMesh, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
-FAR = 0.25  # of the size: nodes that planarity moves so far from the surface are told of
-NO_AREA = 1e-3  # of the size squared: smaller panels are told of
+FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
+NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +246,7 @@ def panel_net(
 
 
 def _sheet_net(
-    surface: Surface, patch: int, faces: Ints, sheet: Sheet, size: float, pattern: str, direction: float
+    surface: Surface, patch: int, faces: Ints, sheet: SheetMesh, size: float, pattern: str, direction: float
 ) -> SheetNet:
     """A sheet with the coordinates of its net."""
     name = surface.patches[patch].name

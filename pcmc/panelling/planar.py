@@ -117,7 +117,7 @@ def laid_flat_polygons(P: Floats, start: Ints, corner: Ints) -> tuple[list[Float
 
 
 def planarised(P: Floats, start: Ints, corner: Ints, moves: Bools) -> Floats:
-    """Nodes P (n,3), of which some (n,) may move, moved so that the polygons are planar.
+    """Nodes P (n,3) moved until the polygons are planar; only those in the mask (n,) move.
 
     First as far as the nodes stay near their places. Polygons that are still ``WARPED`` are then left: they
     would draw others far away. The rest is made planar to ``FLAT``.

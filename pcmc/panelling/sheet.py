@@ -15,7 +15,7 @@ KINK = np.cos(np.radians(35.0))  # a boundary that turns by more has a corner
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class SheetMesh:
     """A connected part of one patch, oriented, with its own numbers of vertices."""
 
     X: Floats  # (n,3)
@@ -51,10 +51,10 @@ class Sheet:
         return topo.chains(np.stack([start, end], axis=1), corner), corner
 
 
-def sheets_of(surface: Surface) -> list[tuple[int, Ints, Sheet]]:
+def sheets_of(surface: Surface) -> list[tuple[int, Ints, SheetMesh]]:
     """The connected parts of the patches that are no walls: patch, triangles in the surface, sheet."""
     topo = surface.topology
-    found: list[tuple[int, Ints, Sheet]] = []
+    found: list[tuple[int, Ints, SheetMesh]] = []
     inner = np.flatnonzero(topo.valence[topo.edge_of_face.ravel()] == 2)
     one, other = inner[np.argsort(topo.edge_of_face.ravel()[inner], kind="stable")].reshape(-1, 2).T // 3
     same = surface.patch_of_face[one] == surface.patch_of_face[other]
@@ -65,6 +65,6 @@ def sheets_of(surface: Surface) -> list[tuple[int, Ints, Sheet]]:
         if surface.roof[patch]:
             vertex, F = np.unique(surface.faces[faces], return_inverse=True)
             point = topo.vertex_kind[vertex] == POINT
-            sheet = Sheet(surface.vertices[vertex], F.reshape(-1, 3).astype(np.int64), vertex, point)
+            sheet = SheetMesh(surface.vertices[vertex], F.reshape(-1, 3).astype(np.int64), vertex, point)
             found.append((patch, faces, sheet))
     return found

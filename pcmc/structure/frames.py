@@ -26,7 +26,7 @@ LOOSE = 1e-9  # a rigid motion that supports hold less than so moves freely
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class BarFrame:
     """Bars between points, rigidly joined there, and what holds the points."""
 
     points: Floats  # (n,3)

@@ -15,7 +15,7 @@ from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
 from ..surface.geometry import area_vectors
-from .frames import Frame
+from .frames import BarFrame
 from .loads import Step
 from .members import MemberLine
 from .model import StructuralModel
@@ -140,7 +140,7 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
     return forces
 
 
-def frame_of(model: StructuralModel, X: Floats) -> tuple[Frame, Ints]:
+def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
     """The beams of a model as a frame at X (n,3), and the vertices (k,) that its points are."""
     pairs, vertices = np.concatenate([line.pairs for line in model.beams]), model.beam_vertices
     place = np.full(len(X), -1)
@@ -163,7 +163,7 @@ def frame_of(model: StructuralModel, X: Floats) -> tuple[Frame, Ints]:
                 rows.append(row)
     holds = np.array(rows).reshape(-1, 6 * len(vertices))
     normal = np.array(model.surface.plane.normal)
-    return Frame(X[vertices], place[pairs], np.vstack(stiffness), holds, normal), vertices
+    return BarFrame(X[vertices], place[pairs], np.vstack(stiffness), holds, normal), vertices
 
 
 def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:

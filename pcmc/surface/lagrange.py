@@ -52,7 +52,7 @@ def known_order(order: object, error: type[PcmcError] = SurfaceError) -> int:
     """
     if isinstance(order, bool) or order not in ORDERS:
         validate.refuse("order", order, "1, 2, 4 or 8", error=error)
-    return int(order)  # type: ignore[call-overload,no-any-return]
+    return next(known for known in ORDERS if known == order)
 
 
 def checked_order(given: object, F: Ints, patch: Ints) -> int:

@@ -178,7 +178,7 @@ def test_where_contact_hides_a_change_of_index_the_branch_is_followed_in_shorter
 
     monkeypatch.setattr(branches, "follow", follow)
     cap = spherical_cap(0.5)
-    line = branches.Line.of(cap, "pressure", None)
+    line = branches.TracedParameter.of(cap, "pressure", None)
     assert line._half(cap, 1.0, lambda _: None).events.arclength.tolist() == [0.3, 0.31]
     assert steps == list(branches.LARGEST)
 

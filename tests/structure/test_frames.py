@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pcmc.structure.frames import Frame, bar_axes
+from pcmc.structure.frames import BarFrame, bar_axes
 from pcmc.structure.profile import Profile
 from pcmc.structure.pulls import balancing_force
 
@@ -18,7 +18,7 @@ def frame_along(X, holds=(), closed=False, stiffness=(1e6, 2000.0, 500.0, 300.0)
     rows = np.zeros((len(holds), 6 * n))
     for row, (point, coordinate) in zip(rows, holds, strict=True):
         row[6 * (point % n) + coordinate] = 1.0
-    return Frame(X, bars, np.tile(stiffness, (len(bars), 1)), rows, UP)
+    return BarFrame(X, bars, np.tile(stiffness, (len(bars), 1)), rows, UP)
 
 
 def hinged(*coordinates):
