@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..certificate.quantities import Parameter
-from ..continuation import Direction
+from ..solvers.continuation import Direction
 from ..surface import Surface
 
 Part = tuple[str, str]  # the kind of a parameter, such as "tension", and the name of what it belongs to
