@@ -60,7 +60,7 @@ def flat_places(surface: Surface, X: Floats) -> Floats:
 
 
 def blended(surface: Surface, X: Floats, on_curve: Bools) -> Floats:
-    """X (n,3) with the nodes of elements where their flat triangles have them, but for those ``on_curve`` (n,).
+    """X (n,3) with the nodes of elements on their flat triangles, but for those ``on_curve`` (n,).
 
     Inside an element the distances that nodes ``on_curve`` on its sides have from there are blended.
     """
