@@ -9,10 +9,9 @@ forces                     E with its derivatives, its curvature, and walls that
 meshing                    triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes, Morse index; the verdict on a finished surface, a proof, its figures
-solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
-continuation existence     branches of equilibria; whether there is one at all
-accuracy                   error bars from finer meshes, and meshes for an accuracy
-margins equilibria         how far a roof is from the edge; its other equilibria, and the barriers to them
+solvers                    the paper's flow, L-BFGS, the geometric Newton solver; branches; further starts
+accuracy                   error bars from finer meshes, meshes for an accuracy, margins to the edge
+equilibria                 the other equilibria of a roof, and the barriers to them
 design                     tensions that meet targets
 compas                     meshes of COMPAS, and a server for them
 panelling structure        families of panels; structural models
@@ -32,22 +31,21 @@ from .base import errors
 
 if TYPE_CHECKING:
     from . import explore
-    from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
+    from .accuracy import Margin, MeshCheck, MeshVerdict, check_mesh, margin, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
     from .certificate.theorem import Theorem, verify
     from .cloth import CuttingPattern, cutting_pattern
-    from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .equilibria import Equilibria, find_equilibria
-    from .existence import solve
     from .forces.curvature import curvature_error, mean_curvature, target_curvature
     from .forces.functional import energy, gradient
     from .forces.rooms import room_volume_gradients, room_volumes
     from .forces.second_variation import hessian
     from .io import read, write
     from .io.repairing import Repaired, repair
-    from .margins import Margin, margin
     from .panelling import FewerFamilies, PanelNet, Panels, fewer_families, panel_net, panels
+    from .solvers import solve
+    from .solvers.continuation import BoundaryMotion, Direction, follow
     from .structure import (
         Gas,
         Material,
@@ -133,17 +131,15 @@ __all__ = [
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
 # handle Ctrl-C before numpy and scipy are imported.
 _NAMES = {
-    "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
+    "accuracy": ("Margin", "MeshCheck", "MeshVerdict", "check_mesh", "margin", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
     "cloth": ("CuttingPattern", "cutting_pattern"),
-    "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "forces.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
     "forces.rooms": ("room_volume_gradients", "room_volumes"),
     "equilibria": ("Equilibria", "find_equilibria"),
-    "existence": ("solve",),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (
@@ -159,7 +155,8 @@ _NAMES = {
         "read_results",
         "write_structure",
     ),
-    "margins": ("Margin", "margin"),
+    "solvers": ("solve",),
+    "solvers.continuation": ("BoundaryMotion", "Direction", "follow"),
     "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
     "certificate.theorem": ("Theorem", "verify"),

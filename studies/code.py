@@ -13,12 +13,12 @@ import json
 import re
 import subprocess
 import sys
-import tarfile
 import tempfile
 from collections.abc import Iterator, Sequence
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 HOME = Path(__file__).resolve().parent.parent
 PACKAGES = ("pcmc", "generators", "studies")
@@ -68,11 +68,11 @@ def code_at(commit: str, studies: Sequence[str]) -> dict[str, dict[str, str]]:
     Computed by the rules of today, so that these may change without every result being stale.
     """
     paths = [*PACKAGES, *(f"notebooks/{project}" for project in PROJECTS)]
-    words = ["git", "-C", str(HOME), "archive", commit, "--", *paths]
+    words = ["git", "-C", str(HOME), "archive", "--format=zip", commit, "--", *paths]
     with tempfile.TemporaryDirectory() as folder:
         packed = subprocess.run(words, capture_output=True, check=True).stdout
-        with tarfile.open(fileobj=BytesIO(packed)) as files:
-            files.extractall(folder, filter="data")
+        with ZipFile(BytesIO(packed)) as files:
+            files.extractall(folder)
         words = [sys.executable, "-c", THERE, folder, *studies]
         found = subprocess.run(words, capture_output=True, check=True, cwd=HOME, text=True).stdout
     return dict(json.loads(found))

@@ -21,7 +21,6 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from .. import existence
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError
 from ..base.interrupts import stop_requested
@@ -30,7 +29,7 @@ from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
-from ..solvers import solve
+from ..solvers import solve, solve_once
 from ..solvers.result import Result, Status
 from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
@@ -283,7 +282,7 @@ class _Search:
 
     def run(self, surface: Surface) -> AccurateResult:
         """Rounds until one of the ends."""
-        first = result = existence.solve(surface, **self.options)
+        first = result = solve(surface, **self.options)
         status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
         try:
             for _ in range(ROUNDS):
@@ -369,7 +368,7 @@ class _Search:
         factor = SPARE * evenness(shares) * here.excess if math.isfinite(here.excess) else MOST
         triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
         sizes = size_field(surface, shares, triangles)
-        result = solve(remesh(surface, sizes, growth=GROWTH, project=self.project), **self.options)
+        result = solve_once(remesh(surface, sizes, growth=GROWTH, project=self.project), **self.options)
         if result.converged or result.status is Status.STOPPED or not finer:
             return result
-        return solve(finer[0], **self.options) if finer[0].m <= self.most_triangles else result
+        return solve_once(finer[0], **self.options) if finer[0].m <= self.most_triangles else result

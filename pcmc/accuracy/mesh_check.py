@@ -19,7 +19,7 @@ from ..certificate import certify
 from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import doubted_midpoints, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
-from ..solvers import solve
+from ..solvers import solve_once
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from ..surface.lagrange import expect_flat
@@ -150,7 +150,7 @@ def check_mesh(
     >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     >>> disc = Surface([[0, 0, 0.5], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
     ...                [Patch("cap", 0.6)], fixed=range(1, 13))
-    >>> check = check_mesh(solve(disc))
+    >>> check = check_mesh(solve_once(disc))
     >>> check.verdict.name, [s.m for s in check.surfaces]
     ('PERSISTS', [12, 48, 192])
     >>> row, exact = check.row("volume"), 0.9239415226
@@ -217,7 +217,7 @@ def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Sur
 
 
 def _solved(start: Surface, callback: Callback | None) -> Result:
-    result = solve(start, "newton", callback, target="stationary", iterations=STEPS)
+    result = solve_once(start, "newton", callback, target="stationary", iterations=STEPS)
     if result.status is Status.STOPPED:
         raise KeyboardInterrupt
     return result

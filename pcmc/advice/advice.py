@@ -17,9 +17,9 @@ from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
 from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
-from ..existence import solve
 from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
+from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.pieces import two_digits

@@ -1,6 +1,6 @@
 """Design: the tensions and pressures with which a surface meets its targets.
 
-Gives ``meet``, ``sensitivities`` and their values. May import ``margins`` and the rooms below it.
+Gives ``meet``, ``sensitivities`` and their values. May import ``accuracy`` and the rooms below it.
 """
 
 from .outcome import Design, DesignStatus, NoStart

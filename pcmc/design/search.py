@@ -23,7 +23,7 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..certificate.balance import coarseness, overload
 from ..certificate.measures import vertices_up
-from ..solvers import solve
+from ..solvers import solve_once
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
@@ -232,7 +232,7 @@ class Search:
         if load is not None and load.ratio > 1.0 + coarseness(surface):
             self.record(Trial(x, load))
             return None
-        result = solve(surface, "newton", **{**quality, **self.options})
+        result = solve_once(surface, "newton", **{**quality, **self.options})
         trial = self.trial(x, result) if result.converged else Trial(x, result)
         self.record(trial)
         if result.status is Status.STOPPED:
@@ -365,7 +365,7 @@ def _unsolved(surface: Surface) -> Result:
     def stop(_: Progress) -> None:
         raise StopIteration
 
-    return solve(surface, "newton", stop)
+    return solve_once(surface, "newton", stop)
 
 
 def _middle(surface: Surface, vertices: Ints, held: Bools) -> Target:

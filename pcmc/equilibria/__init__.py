@@ -1,6 +1,6 @@
 """All equilibria of a surface that a search finds: branches, deflation, ways down; and barriers.
 
-Gives ``find_equilibria`` and ``Equilibria``. May import ``margins`` and below.
+Gives ``find_equilibria`` and ``Equilibria``. May import ``accuracy`` and below.
 """
 
 from .found import Equilibria, FoundEquilibrium

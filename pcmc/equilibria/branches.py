@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..accuracy.varied import Varied
 from ..base.errors import NoBranch, OptionError
 from ..base.tolerances import HOMOTOPY_END
-from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
-from ..margins.varied import Varied
+from ..solvers.continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..solvers.result import Progress
 from ..surface import Surface
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.tolerances import COLLAPSED
-from ..solvers import solve
+from ..solvers import solve_once
 from ..solvers.result import Result
 from ..solvers.state import SolverState
 from ..solvers.steps import Stepper
@@ -43,7 +43,7 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
         near = _approach(SolverState(start, MIN_QUALITY), known)
     except SingularMatrix:
         return None
-    result = None if near is None else solve(near, target="stationary")
+    result = None if near is None else solve_once(near, target="stationary")
     return result if result is not None and result.converged else None
 
 

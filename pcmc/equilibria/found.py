@@ -13,10 +13,10 @@ from ..accuracy import MeshCheck
 from ..base import validate
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
-from ..continuation import Branch
 from ..forces.functional import patch_volumes
 from ..forces.rooms import room_pressures
 from ..forces.volume_below import volume_below
+from ..solvers.continuation import Branch
 from ..surface import Surface
 from .branches import TracedParameter
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from .. import existence
 from ..accuracy import check_mesh
 from ..base import validate
 from ..base.errors import OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
 from ..certificate import Certificate, certify
-from ..continuation import BoundaryMotion, Branch, Direction
+from ..solvers import solve
+from ..solvers.continuation import BoundaryMotion, Branch, Direction
 from ..solvers.result import Progress, Result, Status
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
@@ -203,9 +203,9 @@ class _Search:
         if certificate.index is not None and certificate.residual <= AT_REST:
             self.add(surface, "given", certificate)
         else:
-            result = existence.solve(surface)
+            result = solve(surface)
             if not result.converged:
-                result = existence.solve(surface, target="stationary")
+                result = solve(surface, target="stationary")
             if result.status is Status.STOPPED:
                 raise KeyboardInterrupt
             if not result.converged:
@@ -213,7 +213,7 @@ class _Search:
                 raise SurfaceError(text, what="surface", found=result.status.name)
             self.add(result.surface, "from the start given")
         low = low_start(surface)
-        if low is not None and (result := existence.solve(low)).converged:
+        if low is not None and (result := solve(low)).converged:
             self.add(with_good_triangles(result.surface), "from a low start")
 
     def add(self, surface: Surface, how: str, certificate: Certificate | None = None) -> int | None:

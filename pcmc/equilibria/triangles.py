@@ -7,7 +7,7 @@ from ..forces.functional import patch_areas
 from ..forces.pinching import standing_part
 from ..meshing.quality import worst_quality
 from ..meshing.remeshing import remesh
-from ..solvers import solve
+from ..solvers import solve_once
 from ..surface import Surface
 from .shapes import Shape
 
@@ -24,7 +24,7 @@ def with_good_triangles(surface: Surface) -> Surface:
         return surface
     edge = (4.0 / 3.0**0.5 * float(patch_areas(surface).sum()) / surface.m) ** 0.5
     try:
-        result = solve(remesh(surface, edge), target="stationary")
+        result = solve_once(remesh(surface, edge), target="stationary")
     except (MissingExtra, SurfaceError):
         return surface
     near = result.converged and Shape.of(result.surface).distance(Shape.of(surface)) <= edge

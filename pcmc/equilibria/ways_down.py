@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..forces.functional import energy_at
-from ..solvers import solve
+from ..solvers import solve_once
 from ..solvers.attempt import Log, NewtonOptions, NewtonRun
 from ..solvers.result import Result, Status
 from ..solvers.state import SolverState
@@ -41,5 +41,5 @@ def pass_between(one: Surface, other: Surface) -> Result | None:
     highest = int(np.argmax([energy_at(one, X) for X in ways]))
     if highest in (0, len(ways) - 1):
         return None
-    result = solve(one.moved(ways[highest]), target="stationary")
+    result = solve_once(one.moved(ways[highest]), target="stationary")
     return result if result.converged else None

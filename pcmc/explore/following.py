@@ -19,7 +19,7 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra, PcmcError
 from ..certificate import Certificate, Verdict
 from ..project.values import changeable_values, data_with_values, single_points
-from ..solvers import solve
+from ..solvers import solve_once
 from ..solvers.result import Progress, Result
 from ..surface import Surface
 from ..surface.values import KINDS, all_values
@@ -44,7 +44,7 @@ def solve_until(surface: Surface, stop: Stop, **options: Any) -> Result:
         if stop():
             raise StopIteration
 
-    return solve(surface, callback=check, **options)
+    return solve_once(surface, callback=check, **options)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
+from ..accuracy.varied import named
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
@@ -18,7 +19,6 @@ from ..certificate.quantities import dimension_of
 from ..design import Parameter, Target
 from ..design.targets import MEASURES, NAMED
 from ..forces.curvature import curvature_error, mean_curvature
-from ..margins.varied import named
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import changeable_values

@@ -15,18 +15,16 @@ from functools import cached_property, partial, wraps
 from itertools import count
 from typing import Any, TypeVar
 
-from .. import existence
-from ..accuracy import MeshCheck, check_mesh
+from ..accuracy import Margin, MeshCheck, check_mesh, margin
 from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..certificate.quantities import figures
 from ..certificate.theorem import Theorem, verify
 from ..design import Parameter, Target, meet
-from ..margins import Margin, margin
 from ..meshing.remeshing import remesh
 from ..project.values import changeable_values
-from ..solvers import solve
+from ..solvers import solve, solve_once
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
@@ -172,7 +170,7 @@ def solved_start(surface: Surface) -> SessionState:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
     certificate = certify(surface)
     failure = None if certificate.verdict in AT_REST else certificate
-    for solver, target in ((solve, "stationary"), (existence.solve, "minimum")):
+    for solver, target in ((solve_once, "stationary"), (solve, "minimum")):
         if failure is None:
             break
         result = solver(surface, target=target)

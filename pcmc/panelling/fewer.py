@@ -21,7 +21,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import compare, worst_quality
-from ..solvers import solve
+from ..solvers import solve_once
 from ..surface import Surface
 from ..surface.geometry import edge_vectors
 from ..surface.supports import onto_circles
@@ -96,8 +96,8 @@ def fewer_families(
     callback : called after each round with its number and the number of families so far.
 
     >>> from generators import two_squares
-    >>> from pcmc.solvers import solve
-    >>> result = fewer_families(solve(two_squares(4, alpha_aux=1.0)).surface, 0.02, change=0.05)
+    >>> from pcmc.solvers import solve_once
+    >>> result = fewer_families(solve_once(two_squares(4, alpha_aux=1.0)).surface, 0.02, change=0.05)
     >>> result.before.count > result.after.count, result.after.certificate.certified
     (True, True)
     """
@@ -176,7 +176,7 @@ class _Search:
             return None
         surface = self.best.moved(X)
         if self.at_rest:
-            result = solve(surface, target="stationary")
+            result = solve_once(surface, target="stationary")
             if not result.converged or result.certificate.certified is not self.certified:
                 return None
             surface = result.surface

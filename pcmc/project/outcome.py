@@ -20,14 +20,13 @@ from ..surface import Surface, mirrored, unfolded
 from .settings import Output, of_material
 
 if TYPE_CHECKING:
-    from ..accuracy import AccurateResult, MeshCheck
+    from ..accuracy import AccurateResult, Margin, MeshCheck
     from ..certificate.quantities import Figure
     from ..certificate.theorem import Theorem
     from ..cloth import CuttingOptions, CuttingPattern
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
-    from ..margins import Margin
     from ..panelling import FewerFamilies, Panels
     from ..report import RoofReport
     from ..structure import Analysis
@@ -349,7 +348,7 @@ class Outcome:
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
-        from ..margins import margin  # takes long to import
+        from ..accuracy import margin  # takes long to import
 
         surface, certificate = self.shown
         callback = _reporter(f"margin of {what}", progress)

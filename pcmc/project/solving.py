@@ -9,16 +9,15 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import solvers
 from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
 from ..certificate.balance import unbalanced
-from ..existence import solve
 from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..plan import Plan
+from ..solvers import solve, solve_once
 from ..solvers.result import Progress, Result, Status
 from ..structure.calculix import expect_program
 from ..surface import Surface
@@ -223,7 +222,7 @@ def _check_wishes(project: Project, surface: Surface) -> None:
         if project.pattern is not None and (output.pattern or output.report):
             of_material(project.pattern, structure, surface)
         if project.margin:
-            from ..margins.varied import Varied  # takes long to import
+            from ..accuracy.varied import Varied  # takes long to import
 
             for what in project.margin:
                 Varied.of(surface, what)
@@ -314,7 +313,7 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
 
 
 def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    solver = solve if project.search else solvers.solve
+    solver = solve if project.search else solve_once
     result = solver(surface, project.method, reporter(report), **project.options)
     return _certified(result, report, result.status is Status.STOPPED)
 

@@ -7,11 +7,10 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from .. import existence, solvers
 from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..forces.functional import gradient
-from ..solvers import find_method
+from ..solvers import find_method, solve, solve_once
 from ..solvers.result import Result
 from .case_script import resolve
 from .grid import checked
@@ -84,8 +83,8 @@ def solve_case(
     ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
-    solve = existence.solve if search else solvers.solve
-    result = solve(build(**shape), method, **solver)
+    find = solve if search else solve_once
+    result = find(build(**shape), method, **solver)
     answer = case_row(result, arguments)
     if mesh_check:
         from ..project import Outcome  # takes long to import

@@ -16,10 +16,10 @@ from pcmc import Surface, certify
 from pcmc.base.arrays import Bools, Floats
 from pcmc.base.errors import SurfaceError
 from pcmc.base.tolerances import HOMOTOPY_END, SOUND
-from pcmc.continuation import Branch, Direction, Ending, follow
-from pcmc.existence.homotopy import BACK, classify_end, until_turned
 from pcmc.meshing.refinement import refine
-from pcmc.solvers import solve
+from pcmc.solvers import solve_once
+from pcmc.solvers.continuation import Branch, Direction, Ending, follow
+from pcmc.solvers.homotopy import BACK, classify_end, until_turned
 from pcmc.solvers.result import Progress, Result
 
 PATCHES = ("wall", "large", "small")
@@ -38,7 +38,7 @@ def initial(edge_length: float) -> Surface:
 def equilibrium(triple: Floats, edge_length: float) -> Result:
     """What the geometric solver finds at three tensions."""
     named = dict(zip(PATCHES, np.asarray(triple, dtype=float).tolist(), strict=True))
-    return solve(initial(edge_length).retensioned(named), "newton", target="stationary")
+    return solve_once(initial(edge_length).retensioned(named), "newton", target="stationary")
 
 
 def balanced(triples: Floats) -> Bools:
@@ -65,7 +65,7 @@ def patch_fold(edge_length: float, name: str) -> float:
     patch = whole.patches[whole.patch_index(name)]
     held = whole.fixed[used] | seam
     part = Surface(X, local.reshape(-1, 3), np.zeros(len(faces), int), (patch,), fixed=held)
-    branch = follow(solve(part).surface, name, 0.1 * patch.tension, folds=1)
+    branch = follow(solve_once(part).surface, name, 0.1 * patch.tension, folds=1)
     return float(branch.folds.parameter.iloc[0])
 
 
@@ -178,7 +178,7 @@ def finer_case(tensions: list[float], edge_length: float) -> dict[str, Any]:
     found = equilibrium(np.array(tensions), 0.5 * edge_length)
     if not found.converged and coarse.converged:
         try:
-            again = solve(refine(coarse.surface), "newton", target="stationary")
+            again = solve_once(refine(coarse.surface), "newton", target="stationary")
         except SurfaceError:  # a wall that lies on Π has no triangles to cut
             again = found
         found = again if again.converged else found

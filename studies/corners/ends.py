@@ -17,7 +17,7 @@ import pandas as pd
 
 from generators import two_caps
 from pcmc import Surface
-from pcmc.solvers import solve
+from pcmc.solvers import solve_once
 from pcmc.sweep import Sweep
 
 from ..alpha_grid.grid import AXES, EDGE_LENGTH
@@ -109,7 +109,7 @@ def _shifted_ends(case: Case) -> list[dict[str, Any]]:
     X, half = initial.vertices, float(np.abs(initial.vertices[:, 0]).max())
     for shift in SHIFTS:
         moved = X + np.outer(shift * half * (1.0 - (X[:, 0] / half) ** 2), [1.0, 0.0, 0.0])
-        result = solve(initial.moved(moved), "newton", target="stationary")
+        result = solve_once(initial.moved(moved), "newton", target="stationary")
         forces = result.certificate.reactions[ends(initial), 0]
         rows.append(
             {

@@ -34,7 +34,7 @@ from pcmc.base.errors import SurfaceError
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.quality import edge_lengths
 from pcmc.meshing.refinement import refine
-from pcmc.solvers import solve
+from pcmc.solvers import solve_once
 from pcmc.solvers.result import Result
 from pcmc.surface.geometry import angles
 
@@ -243,7 +243,7 @@ def _solved_finer(surface: Surface, support: str, project: Projection | None) ->
 
 def _solved(shape: Surface, support: str) -> Result:
     start = SUPPORTS[support](shape)
-    return solve(start, "newton", target="stationary", iterations=ITERATIONS)
+    return solve_once(start, "newton", target="stationary", iterations=ITERATIONS)
 
 
 def _findings(certificate: Certificate, surface: Surface) -> dict[str, Any]:

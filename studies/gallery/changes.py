@@ -29,8 +29,8 @@ from generators import (
 )
 from pcmc import BoundaryMotion, certify, follow, mean_curvature, solve
 from pcmc.base.arrays import Floats
-from pcmc.continuation import Branch
 from pcmc.meshing.remeshing import remesh
+from pcmc.solvers.continuation import Branch
 
 from ..folder import Folder
 from ..orders import slope

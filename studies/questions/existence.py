@@ -26,7 +26,7 @@ import pandas as pd
 
 from generators import four_fans, spherical_cap, two_caps
 from pcmc import Direction, Surface, certify, follow, solve
-from pcmc.continuation import Branch, Ending
+from pcmc.solvers.continuation import Branch, Ending
 
 from ..folder import Folder
 from ..study import Study

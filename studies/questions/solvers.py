@@ -25,7 +25,7 @@ import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
 from pcmc import Surface, certify
-from pcmc.solvers import solve
+from pcmc.solvers import solve_once
 from pcmc.solvers.result import Progress
 
 from ..examples.flow import NOISE_RESIDUAL, PAPER, SHORT_ITERATIONS, Case, errors, forced_steps, start_of
@@ -124,7 +124,7 @@ def _run(start: Surface, label: str, t0: float, short: bool) -> tuple[dict[str, 
     if short and limit:
         options |= {limit: SHORT_ITERATIONS}
     samples = Samples(options[limit] if limit else 200)
-    result = solve(start, method, samples, **options)
+    result = solve_once(start, method, samples, **options)
     seconds = time.process_time() - samples.begin - samples.own
     final = result.surface
     found = result.certify(modes=0)

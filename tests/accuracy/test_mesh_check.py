@@ -23,7 +23,7 @@ from pcmc.meshing.held_curves import smooth_midpoints
 from pcmc.meshing.refinement import held_midpoints, refine
 from pcmc.plan import Plan
 from pcmc.project import run
-from pcmc.solvers import solve as solve_once
+from pcmc.solvers import solve_once
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep import solve_case
 from pcmc.sweep.projects import project_sweep
@@ -314,7 +314,7 @@ def test_ctrl_c_during_the_check_keeps_the_files(hall, capsys, monkeypatch):
     def pressed(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pcmc.accuracy.mesh_check.solve", pressed)
+    monkeypatch.setattr("pcmc.accuracy.mesh_check.solve_once", pressed)
     assert cli.main(["solve", "hall.toml"]) == 130
     assert "written: hall.pcmc" in capsys.readouterr().out
     assert certify(read("hall.pcmc")).certified

@@ -109,9 +109,9 @@ def test_for_a_drawing_the_ring_is_drawn(tmp_path, monkeypatch):
 
 def stalled(surface, *_, **__):
     """A solve that is stopped after a step, as on a mesh with too sharp a peak."""
-    from pcmc.solvers import solve
+    from pcmc.solvers import solve_once
 
-    return solve(surface, iterations=1)
+    return solve_once(surface, iterations=1)
 
 
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.PlanWarning")

@@ -7,13 +7,13 @@ from shapes import pyramid, tube
 from starts import spherical_cap, two_squares
 
 from generators.grid import grid_faces
-from pcmc import Cable, Patch, Plane, Surface, Verdict, certify, continuation, cut, existence, margin, solve
+from pcmc import Cable, Patch, Plane, Surface, Verdict, certify, cut, margin, solve, solvers
 from pcmc.base.errors import NoBranch, SurfaceError
 from pcmc.certificate.balance import load_is_given, load_ratio, overload
 from pcmc.certificate.cables import weak_cable
-from pcmc.continuation import Direction, follow
 from pcmc.plan import Plan
-from pcmc.solvers import solve as one_start
+from pcmc.solvers import solve_once
+from pcmc.solvers.continuation import Direction, Ending, follow
 from pcmc.solvers.result import Status
 
 HEAVIEST = 1.0 / 1.5088795615383199  # w a/α of a strip of half-width a: α/w = c cosh(a/c) needs 1.5089 a
@@ -267,7 +267,7 @@ def test_strips_too_heavy_for_their_span_fold_in_the_weight():
 
 def test_a_strip_that_can_carry_its_weight_is_found_from_far_below():
     heavy = strip(0.6, height=4.0)
-    assert not one_start(heavy).converged
+    assert not solve_once(heavy).converged
     result = solve(heavy)
     assert result.certificate.verdict is Verdict.STABLE
     assert result.energy == pytest.approx(solve(strip(0.6)).energy, rel=1e-6)
@@ -291,13 +291,13 @@ def test_a_fault_on_a_branch_is_not_a_branch_that_does_not_start(monkeypatch):
     def broken(*_, **__):
         raise SurfaceError("a fault")
 
-    monkeypatch.setattr(existence.homotopy, "follow", broken)
+    monkeypatch.setattr(solvers.homotopy, "follow", broken)
     with pytest.raises(SurfaceError, match="a fault"):
         solve(spherical_cap(0.25, alpha=0.45))
 
 
 def test_where_no_branch_starts_the_error_says_so():
-    surface = one_start(pyramid()).surface
+    surface = solve_once(pyramid()).surface
     with pytest.raises(NoBranch, match="not at rest"):
         follow(pyramid(height=3.0), "roof", 2.0)
     with pytest.raises(NoBranch, match="changes no force"):
@@ -339,7 +339,7 @@ def test_only_a_raised_stop_iteration_is_a_request(method):
 
 def test_the_same_holds_along_branches_and_in_a_search():
     at_rest = solve(pyramid()).surface
-    assert follow(at_rest, "roof", 2.0, callback=helped).ending is continuation.Ending.STOPPED
+    assert follow(at_rest, "roof", 2.0, callback=helped).ending is Ending.STOPPED
     with pytest.raises(RuntimeError, match="StopIteration out of next"):
         follow(at_rest, "roof", 2.0, callback=by_next)
 
@@ -352,6 +352,6 @@ def test_the_same_holds_along_branches_and_in_a_search():
 
 
 def test_a_verdict_on_evidence_alone_is_not_that_of_a_search():
-    alone = one_start(strip(1.5)).certificate
+    alone = solve_once(strip(1.5)).certificate
     assert alone.verdict is Verdict.RAN_AWAY
     assert alone.tried == certify(strip(1.5)).tried == ()

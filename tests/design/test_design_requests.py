@@ -188,7 +188,7 @@ def interrupted(monkeypatch, count):
 
         return pcmc.solve(surface, method, pressed if len(solves) == count else callback, **options)
 
-    monkeypatch.setattr("pcmc.design.search.solve", solve)
+    monkeypatch.setattr("pcmc.design.search.solve_once", solve)
 
 
 def test_ctrl_c_in_a_solve_ends_the_search_with_the_best_so_far(monkeypatch):

@@ -22,10 +22,10 @@ from generators import (
 )
 from pcmc import BoundaryMotion, Direction, Room, find_equilibria, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.continuation import Branch, Ending
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.shapes import Shape
 from pcmc.forces.functional import patch_areas
+from pcmc.solvers.continuation import Branch, Ending
 from studies.reference import evolver
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)

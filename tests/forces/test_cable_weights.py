@@ -134,5 +134,5 @@ def heavy_rope():
 
 def test_a_margin_ends_where_a_cable_is_compressed():
     found = pcmc.margin(heavy_rope(), "cable")
-    assert found.ends_by is pcmc.margins.MarginEnd.COMPRESSION
+    assert found.ends_by is pcmc.accuracy.MarginEnd.COMPRESSION
     assert found.factor == pytest.approx(0.5, abs=0.003)  # τ λ + g z = 0 at z = -1, and the sag 0.0033

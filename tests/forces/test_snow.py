@@ -14,13 +14,13 @@ from pcmc import Parameter, Patch, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
 from pcmc.certificate.balance import load_name, load_ratio
 from pcmc.design.targets import measure
-from pcmc.existence.homotopy import Solves, attempt, raise_loads
 from pcmc.explore.following import between, reach, wanted
 from pcmc.forces.rooms import room_pressures
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import PatchSpec, Plan
 from pcmc.project import digest, run, varied
 from pcmc.project.values import changeable_values
+from pcmc.solvers.homotopy import Solves, attempt, raise_loads
 from pcmc.solvers.starts import low_start
 from pcmc.structure import Material, Snow, StructuralModel
 from studies.reference import evolver

@@ -9,13 +9,13 @@ from generators import hypar_roof, lens, two_squares
 from pcmc import Plane, Surface
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
-from pcmc.continuation import Direction
 from pcmc.drawings import drawing_set
 from pcmc.explore.page_data import _controls, outline
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
 from pcmc.report.tables import table_of_patches
+from pcmc.solvers.continuation import Direction
 from pcmc.surface.colours import SHEETS, patch_colors, rgb
 
 BOX = [[0, 0], [8, 0], [8, 6], [0, 6]]

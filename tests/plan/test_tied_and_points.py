@@ -9,7 +9,7 @@ from pcmc.base.errors import FileError, OptionError, PlanError
 from pcmc.design import sensitivities
 from pcmc.plan import Plan
 from pcmc.project import load, run_project
-from pcmc.solvers import solve
+from pcmc.solvers import solve_once
 
 HALL = [[0, 0], [10, 0], [10, 5], [0, 5]]
 PROJECT = """
@@ -33,7 +33,7 @@ def halves():
 
 
 def test_a_tied_parameter_has_the_sum_of_the_slopes():
-    roof = solve(halves()).surface
+    roof = solve_once(halves()).surface
     apex = Target("apex", "west")
     single = sensitivities(roof, apex, ["west", "east"]).to_numpy().sum()
     assert sensitivities(roof, apex, [["west", "east"]]).to_numpy() == pytest.approx(single, rel=1e-8)

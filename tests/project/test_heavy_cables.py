@@ -8,7 +8,6 @@ import pytest
 import pcmc
 from pcmc import cli
 from pcmc.base.errors import OptionError
-from pcmc.continuation import Direction
 from pcmc.explore.page_data import state_data
 from pcmc.explore.session import Session, solved_start
 from pcmc.forces.parameters import energy_by, gradient_by
@@ -17,6 +16,7 @@ from pcmc.plan import CableLine, Divider, Hole, Plan
 from pcmc.project import designed, load, surface_of, varied
 from pcmc.project.file import read_data
 from pcmc.project.values import changeable_values, data_with_values
+from pcmc.solvers.continuation import Direction
 from pcmc.surface.values import rates_of
 
 SAIL = """

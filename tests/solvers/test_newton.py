@@ -19,7 +19,7 @@ from starts import (
 
 from pcmc import certify, curvature_error, solve
 from pcmc.certificate import Verdict
-from pcmc.solvers import solve as one_start
+from pcmc.solvers import solve_once
 from pcmc.solvers.result import Status
 
 nightly = pytest.mark.nightly
@@ -139,7 +139,7 @@ def test_a_way_down_that_runs_past_a_shallow_minimum_is_taken_back():
 def test_a_junction_that_slips_along_its_support_is_named():
     """The closed form holds at α = (4, 3, 3) alone: with a stronger right cap the crest slips."""
     start = joined_caps(0.5, alpha_right=3.5)
-    result = one_start(start)
+    result = solve_once(start)
     assert result.certificate.verdict is Verdict.DEGENERATE
     assert "slips along a support" in result.certificate.detail
     assert solve(start).certificate.verdict is Verdict.STABLE  # from a lower start

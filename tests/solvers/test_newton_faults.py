@@ -10,7 +10,7 @@ from pcmc import Patch, Surface, energy, solve
 from pcmc.base.errors import SurfaceError
 from pcmc.certificate import Verdict
 from pcmc.meshing.quality import triangle_quality
-from pcmc.solvers import solve as one_start
+from pcmc.solvers import solve_once
 from pcmc.solvers.result import Status
 from pcmc.stability.factorisation import available
 
@@ -35,7 +35,7 @@ def test_a_lost_run_tells_of_the_saddle_that_is_near(backend):
     cap = spherical_cap(0.25, alpha=0.8)
     X = cap.vertices * [1.0, 1.0, 0.0]
     X[:, 2] = 8.0 * (1.0 - (X**2).sum(axis=1)) * cap.free
-    result = one_start(cap.moved(X), backend=backend)
+    result = solve_once(cap.moved(X), backend=backend)
     assert result.status is Status.DEGENERATE
     assert "a saddle of index 1 is near: target='stationary' returns it" in result.message
 
@@ -99,7 +99,7 @@ def test_bad_triangles_at_the_start_are_mended(backend, target, move):
 @TARGETS
 def test_a_mesh_that_cannot_be_mended_is_named(backend, target):
     """A needle a million times as high as wide."""
-    result = one_start(pyramid(height=1e6), target=target, backend=backend)
+    result = solve_once(pyramid(height=1e6), target=target, backend=backend)
     assert result.status is Status.DEGENERATE
     assert result.certificate.verdict is Verdict.DEGENERATE
     assert "of patch 'roof' near [" in result.certificate.detail

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from generators import four_fans, three_patches, two_caps, two_squares
-from pcmc.solvers import solve
+from pcmc.solvers import solve_once
 from studies.corners import ends as corners
 from studies.corners import ladder
 from studies.corners.cases import CASES
@@ -121,7 +121,7 @@ def test_a_case_of_the_grid_with_its_bottoms_held_and_sliding():
 def test_held_bottoms_are_held():
     surface = ladder.hold_bottoms(two_squares(4))
     assert not surface.on_plane.any()
-    assert solve(surface, "newton").converged
+    assert solve_once(surface, "newton").converged
 
 
 def test_ends_slide_along_a_round_outline():

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.tolerances import EVENT_ACCURACY, FOLD_ACCURACY, GOAL_ACCURACY
-from ..forces.functional import patch_volumes
+from ...base.tolerances import EVENT_ACCURACY, FOLD_ACCURACY, GOAL_ACCURACY
+from ...forces.functional import patch_volumes
 from .branch_point import BranchPoint, branch_point
 from .state import BranchState
 

@@ -12,8 +12,8 @@ from scipy.optimize import brentq, minimize_scalar
 from generators import barrel, catenoid, joined_caps, spherical_cap, two_caps, two_squares
 from generators.catenary import FOLD
 from pcmc import certify, margin, solve
+from pcmc.accuracy import MarginEnd
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.margins import MarginEnd
 from studies.reference import evolver
 
 

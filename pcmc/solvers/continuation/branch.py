@@ -10,11 +10,11 @@ from typing import Any
 
 import pandas as pd
 
-from ..base import validate
-from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..solvers.result import Callback
-from ..surface import Surface
-from ..surface.lagrange import expect_flat
+from ...base import validate
+from ...base.errors import MissingExtra, OptionError, SurfaceError
+from ...surface import Surface
+from ...surface.lagrange import expect_flat
+from ..result import Callback
 from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
 from .direction import Direction, Named, ParameterLine

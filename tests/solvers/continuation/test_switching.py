@@ -20,8 +20,8 @@ from generators import (
 )
 from pcmc import BoundaryMotion, certify, follow, solve
 from pcmc.base.errors import OptionError
-from pcmc.continuation import Branch, Ending
-from pcmc.continuation.state import BranchMesh, BranchState
+from pcmc.solvers.continuation import Branch, Ending
+from pcmc.solvers.continuation.state import BranchMesh, BranchState
 
 
 def rings(surface):

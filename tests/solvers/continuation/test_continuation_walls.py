@@ -7,10 +7,10 @@ from nightly import at_night
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
-from pcmc.continuation import Ending
 from pcmc.forces.pinching import standing_part
 from pcmc.forces.pull import pull_and_capacity
 from pcmc.plan import Divider, Plan
+from pcmc.solvers.continuation import Ending
 
 
 def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
@@ -105,7 +105,7 @@ def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
     def interrupted(surface, method, **options):
         return solve(surface, method, pressed, **options)
 
-    monkeypatch.setattr("pcmc.continuation.tracing.solve", interrupted)
+    monkeypatch.setattr("pcmc.solvers.continuation.tracing.solve_once", interrupted)
     branch = follow(start, "wall", 2.51)
     assert branch.ending is Ending.STOPPED
     assert len(branch.points) > 0 == len(branch.events)

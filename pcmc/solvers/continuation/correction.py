@@ -23,10 +23,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Floats
-from ..base.tolerances import BRANCH_END, ON_BRANCH
-from ..stability.bordered import BorderedFactor, solve_preconditioned
-from ..stability.factorisation import SingularMatrix
+from ...base.arrays import Floats
+from ...base.tolerances import BRANCH_END, ON_BRANCH
+from ...stability.bordered import BorderedFactor, solve_preconditioned
+from ...stability.factorisation import SingularMatrix
 from .state import BranchMesh, BranchState
 
 ITERATIONS = 12  # most Newton steps of a correction

@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import solvers
 from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END, SOUND
 from ..certificate.diagnosis import held_groups
 from ..certificate.proof import Attempt
-from ..continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..forces.functional import gradient
-from ..solvers.result import Callback, Progress, Result, Status
 from ..surface import Surface
+from .continuation import BoundaryMotion, Branch, Direction, Ending, follow
+from .methods import solve_once
+from .result import Callback, Progress, Result, Status
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
 MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
@@ -90,7 +90,7 @@ class Solves:
         def count(progress: Progress) -> None:
             self._show(progress.surface, {**progress.row, "iteration": before + progress.iteration})
 
-        result = solvers.solve(surface, "newton", count, **{**self.options, **changes})
+        result = solve_once(surface, "newton", count, **{**self.options, **changes})
         self.steps = before + len(result.rows)
         self.evaluations += result.evaluations
         if result.status is Status.STOPPED:

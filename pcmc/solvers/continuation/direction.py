@@ -14,15 +14,15 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from ..base import validate
-from ..base.arrays import Floats
-from ..base.errors import OptionError
-from ..base.tolerances import ON_BRANCH
-from ..forces.parameters import Rates, energy_by, gradient_by
-from ..forces.rooms import refuse_varied_pressure
-from ..surface import Surface
-from ..surface.supports import apply_supports
-from ..surface.values import KINDS, part_index, part_values, rates_of
+from ...base import validate
+from ...base.arrays import Floats
+from ...base.errors import OptionError
+from ...base.tolerances import ON_BRANCH
+from ...forces.parameters import Rates, energy_by, gradient_by
+from ...forces.rooms import refuse_varied_pressure
+from ...surface import Surface
+from ...surface.supports import apply_supports
+from ...surface.values import KINDS, part_index, part_values, rates_of
 
 VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables", "cable_weights")
 

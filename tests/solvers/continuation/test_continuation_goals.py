@@ -10,12 +10,12 @@ from shapes import octahedron, pyramid
 from generators import two_caps, two_squares
 from pcmc import Direction, Parameter, follow, solve
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
-from pcmc.continuation import Ending, FollowOptions
-from pcmc.continuation.correction import NotOnBranch, correct, fixed_parameter
-from pcmc.continuation.options import CONTROLS
-from pcmc.continuation.segment import root
-from pcmc.continuation.state import QUANTITIES, BranchMesh, BranchState
-from pcmc.continuation.tracing import Tracer
+from pcmc.solvers.continuation import Ending, FollowOptions
+from pcmc.solvers.continuation.correction import NotOnBranch, correct, fixed_parameter
+from pcmc.solvers.continuation.options import CONTROLS
+from pcmc.solvers.continuation.segment import root
+from pcmc.solvers.continuation.state import QUANTITIES, BranchMesh, BranchState
+from pcmc.solvers.continuation.tracing import Tracer
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_tensions_that_are_zero_have_no_ratio_and_no_branch():
 
 
 def test_remeshing_without_its_library_is_refused_at_once(monkeypatch):
-    monkeypatch.setattr("pcmc.continuation.branch.find_spec", lambda name: None)
+    monkeypatch.setattr("pcmc.solvers.continuation.branch.find_spec", lambda name: None)
     with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[remesh\]"):
         follow(pyramid(height=AT_REST), "roof", remesh=0.5)
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats
-from ..base.errors import OptionError
-from ..base.tolerances import NULL_MODE
-from ..stability.factorisation import SingularMatrix
-from ..stability.modes import lowest
+from ...base.arrays import Floats
+from ...base.errors import OptionError
+from ...base.tolerances import NULL_MODE
+from ...stability.factorisation import SingularMatrix
+from ...stability.modes import lowest
 from .correction import BorderedMatrix, NotOnBranch, correct, fixed_arclength
 from .options import FollowOptions
 from .state import BranchMesh, BranchState

@@ -23,8 +23,6 @@ from ..certificate.cables import weak_cable
 from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..forces.pinching import standing_part
-from ..solvers.result import Callback, Result, Status
-from ..solvers.starts import low_start
 from ..surface import Surface
 from .homotopy import (
     Homotopy,
@@ -36,6 +34,8 @@ from .homotopy import (
     raise_loads,
     relax_tensions,
 )
+from .result import Callback, Result, Status
+from .starts import low_start
 
 FAILED = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 

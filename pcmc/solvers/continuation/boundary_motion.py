@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..base import validate
-from ..base.arrays import Floats
-from ..base.errors import OptionError
-from ..base.tolerances import ON
-from ..forces.functional import energy_and_gradient
-from ..surface import Surface
+from ...base import validate
+from ...base.arrays import Floats
+from ...base.errors import OptionError
+from ...base.tolerances import ON
+from ...forces.functional import energy_and_gradient
+from ...surface import Surface
 from .direction import ParameterLine
 
 DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ

@@ -11,15 +11,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ..base.errors import NoBranch, SurfaceError
-from ..base.interrupts import stop_requested
-from ..base.tolerances import EVENT_ACCURACY, START_RESIDUAL
-from ..forces.rooms import room_pressures
-from ..meshing.quality import redistribute, turns_over
-from ..meshing.remeshing import remesh
-from ..solvers import solve
-from ..solvers.result import Callback, Progress, Status
-from ..surface import Surface
+from ...base.errors import NoBranch, SurfaceError
+from ...base.interrupts import stop_requested
+from ...base.tolerances import EVENT_ACCURACY, START_RESIDUAL
+from ...forces.rooms import room_pressures
+from ...meshing.quality import redistribute, turns_over
+from ...meshing.remeshing import remesh
+from ...surface import Surface
+from ..methods import solve_once
+from ..result import Callback, Progress, Status
 from .branch_point import BranchPoint, Tangent, along_branch, branch_point
 from .correction import (
     Constraint,
@@ -206,7 +206,9 @@ class Tracer:
         tolerance, backend = self.options.tolerance, self.options.backend
         part = near.rest.part
         X = part.landed(near.X, near.mesh.reaches_plane(near.X))
-        result = solve(part.whole_at(X), "newton", target="stationary", tolerance=tolerance, backend=backend)
+        result = solve_once(
+            part.whole_at(X), "newton", target="stationary", tolerance=tolerance, backend=backend
+        )
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:

@@ -10,8 +10,8 @@ from tables import same
 from generators import spherical_cap, two_caps
 from pcmc import Direction, Parameter, certify, follow, solve
 from pcmc.base.errors import OptionError
-from pcmc.continuation import Ending
 from pcmc.plot import diagram
+from pcmc.solvers.continuation import Ending
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from ..certificate import certify
 from ..certificate.measures import Measurement
 from ..forces.parameters import gradient_by
 from ..surface import Surface
-from .edge import Margin, MarginEnd, margin
+from .margins import Margin, MarginEnd, margin
 from .varied import Varied
 
 

@@ -12,9 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..accuracy import check_mesh
-from ..accuracy.extrapolation import extrapolate
-from ..accuracy.mesh_check import with_bar
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PcmcError, SurfaceError
@@ -25,16 +22,18 @@ from ..certificate.balance import pressures_left_over
 from ..certificate.diagnosis import worst_face
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
-from ..continuation import Branch, Ending, follow
-from ..continuation.branch_point import ALONG
 from ..forces.cables import heavy_cable_pulls
 from ..forces.pinching import standing_part
 from ..forces.triangles import heavy_triangle_pulls
-from ..solvers import solve
+from ..solvers import solve_once
+from ..solvers.continuation import Branch, Ending, follow
+from ..solvers.continuation.branch_point import ALONG
 from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.lagrange import expect_flat
+from .extrapolation import extrapolate
+from .mesh_check import check_mesh, with_bar
 from .varied import Varied
 
 FIRST, LARGEST = 0.05, 0.15  # the first and the longest step along the branch, as of ``follow``
@@ -109,7 +108,7 @@ def find_end(
         factor, detail = float(branch.points.parameter.iloc[-1]), branch.detail
         # a solve a little beyond its last point tells what a branch that was lost ends by
         beyond = varied.direction.line(there).surface_at(there, factor + sense * BEYOND * max(factor, 1.0))
-        down = solve(beyond).certificate.verdict is Verdict.WALL_DOWN
+        down = solve_once(beyond).certificate.verdict is Verdict.WALL_DOWN
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
             worst = there.faces[worst_face(there, ~there.roof)[0]]  # of walls, triangles may vanish
@@ -270,7 +269,7 @@ def margin(
     >>> disc = Surface([[0, 0, 0.3], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
     ...                [Patch("cap", 0.8)], fixed=range(1, 13))
     >>> from pcmc.meshing.refinement import refine
-    >>> found = margin(solve(refine(disc)), "pressure")
+    >>> found = margin(solve_once(refine(disc)), "pressure")
     >>> found.ends_by.name, found.where, bool(abs(found.factor - 1.6) <= found.bar)
     ('FOLD', 'the roof inflates', True)
     """

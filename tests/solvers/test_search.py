@@ -16,7 +16,7 @@ from pcmc.certificate.diagnosis import narrowest_neck
 from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
 from pcmc.io import native
 from pcmc.plan import Divider, Hole, Plan
-from pcmc.solvers import solve as one_start
+from pcmc.solvers import solve_once
 from pcmc.solvers.result import Status
 from pcmc.solvers.starts import low_start
 from pcmc.sweep import solve_case
@@ -79,7 +79,7 @@ def test_the_fold_tends_to_the_hemisphere_with_the_mesh():
 
 
 def test_where_the_first_start_converges_nothing_else_is_tried():
-    one, all_starts = one_start(paraboloid(0.3, 0.6)), solve(paraboloid(0.3, 0.6))
+    one, all_starts = solve_once(paraboloid(0.3, 0.6)), solve(paraboloid(0.3, 0.6))
     assert one.evaluations == all_starts.evaluations
     assert one.rows == all_starts.rows
     np.testing.assert_array_equal(one.surface.vertices, all_starts.surface.vertices)
@@ -92,12 +92,12 @@ def test_the_note_tells_which_start_led_there():
     assert history["iteration"].is_monotonic_increasing
     assert result.energy == history["energy"].iloc[-1]
     assert result.iterations == history["iteration"].iloc[-1]
-    assert result.evaluations > one_start(paraboloid(5.0, 0.6)).evaluations
+    assert result.evaluations > solve_once(paraboloid(5.0, 0.6)).evaluations
 
 
 def test_an_inflated_mesh_is_spread_anew():
     """Its plan is no plan any more: triangles lie on each other."""
-    inflated = one_start(paraboloid(5.0, 0.6))
+    inflated = solve_once(paraboloid(5.0, 0.6))
     assert inflated.status is Status.DIVERGED
     again = inflated.surface.retensioned({"cap": 0.7})
     assert solve(again).certificate.verdict is Verdict.STABLE
@@ -194,7 +194,7 @@ def test_half_a_film_with_its_neck_free_on_the_plane():
 
 
 def test_a_neck_that_pinches_off_without_proof_is_called_that():
-    pinched = one_start(film(0.8))
+    pinched = solve_once(film(0.8))
     assert pinched.status is Status.DEGENERATE
     found = pinched.certificate
     assert found.verdict is Verdict.RAN_AWAY
@@ -242,7 +242,7 @@ def test_a_bubble_has_no_stable_equilibrium_and_one_that_is_not():
     sought = solve(sphere(0.8), target="stationary")
     assert sought.converged
     assert sought.energy == pytest.approx(result.energy, rel=1e-12)
-    away = one_start(sphere(0.8)).certificate
+    away = solve_once(sphere(0.8)).certificate
     assert away.verdict is Verdict.RAN_AWAY
     assert "no equilibrium" not in str(away)
     limp = sphere(0.8).retensioned(None, {patch.name: 0.0 for patch in sphere(0.8).patches})
@@ -278,7 +278,7 @@ def test_a_way_that_crawls_ends_at_the_saddle_and_names_the_ends_that_slip():
 
 
 def test_stopped_in_the_search_the_first_result_is_the_best():
-    first = one_start(paraboloid(5.0, 0.3))
+    first = solve_once(paraboloid(5.0, 0.3))
     seen = []
 
     def callback(progress):

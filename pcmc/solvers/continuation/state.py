@@ -7,18 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats
-from ..forces.motion_space import MotionSpace
-from ..forces.pinching import standing_part
-from ..forces.rooms import with_room_pressures
-from ..forces.volume_below import volume_below_gradient, volumes_below
-from ..meshing.quality import worst_quality
-from ..solvers.smoother import HarmonicExtension
-from ..stability.equilibrium import Equilibrium
-from ..surface import Surface
-from ..surface.geometry import vertex_area_vectors
-from ..surface.supports import apply_supports, onto_circles
-from ..surface.topology import SHEET
+from ...base.arrays import Bools, Floats
+from ...forces.motion_space import MotionSpace
+from ...forces.pinching import standing_part
+from ...forces.rooms import with_room_pressures
+from ...forces.volume_below import volume_below_gradient, volumes_below
+from ...meshing.quality import worst_quality
+from ...stability.equilibrium import Equilibrium
+from ...surface import Surface
+from ...surface.geometry import vertex_area_vectors
+from ...surface.supports import apply_supports, onto_circles
+from ...surface.topology import SHEET
+from ..smoother import HarmonicExtension
 from .direction import ParameterLine
 
 LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
