@@ -200,6 +200,7 @@ def panel_net(
     ------
     SurfaceError : the surface is not certified, or is all walls.
     OptionError : the size is too large for a patch, or the pattern does not exist on one.
+    MissingExtra : shapely is not installed.
 
     >>> from generators import delaunay
     >>> print(len(panel_net(delaunay(exact=True), 0.5, anyway=True).panels))
@@ -237,12 +238,7 @@ def _sheet_net(
         text = f"size: panels of {size:g} are too large for patch {name!r}; choose at most {most:.2g}"
         raise OptionError(text, what="size", found=size, expected=most)
     if pattern == "planar-quads":
-        found = curvature_coordinates(sheet, size, name)
-        on_line = np.zeros(len(sheet.X), dtype=bool)
-        for curve in found.aligned:
-            on_line[curve.vertices] = True
-        turned = np.degrees(np.abs(found.turned))
-        return SheetNet(name, faces, sheet, found.at, found.umbilics, on_line, turned)
+        return SheetNet(name, faces, sheet, *curvature_coordinates(sheet, size, name))
     hexagons = pattern == "hexagons"
     angle = np.radians(direction)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
