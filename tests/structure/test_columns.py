@@ -44,7 +44,7 @@ def sail_on(*members):
 
 
 def test_a_mast_with_two_stays_has_the_forces_of_the_closed_form():
-    """Stays alike on both sides of the diagonal: T = H L/2 over their length in plan; the mast has the rest."""
+    """Stays alike on both sides of the diagonal: T = H L over their reach in plan; the mast has the rest."""
     model = sail_on(column([0, 0], [0, 0], strength=2.35e5), stay([0, 0], [-3, -1]), stay([0, 0], [-1, -3]))
     reaction = sail().certificate.reactions[model.bars[0].vertex]
     H, V = np.hypot(*reaction[:2]), reaction[2]
