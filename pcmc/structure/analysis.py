@@ -20,7 +20,14 @@ from .calculix import CalculixError, expect_program, run_as_far
 from .columns import column_table, column_text
 from .gas import balanced_pressure
 from .loads import Step
-from .member_forces import MemberForces, member_tables, members_in, sentences, supports_with_members
+from .member_forces import (
+    MemberForces,
+    member_tables,
+    members_in,
+    sentences,
+    supports_with_members,
+    weak_members,
+)
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
@@ -227,6 +234,7 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
+        lines += weak_members(self.model, ((case.name, case.members) for case in self.cases), units)
         if any(case.taut < case.share < 1.0 for case in self.cases):
             lines.append(MESH)
         if self.remedy:

@@ -145,6 +145,17 @@ def test_columns_and_stays_that_cannot_be_are_refused_in_a_line():
     assert len(model_of(inside, members=[column([4, 4], [4, 4])], anyway=True).bars) == 1
     with refused(OptionError, what="members", where="stay"):
         model_of(inside, members=[stay([4, 4], [0, 0])], anyway=True)
+    half = Plan(
+        [[0, 0], [5, 0], [5, 10], [0, 10]],
+        edge="cable",
+        cable=9.0,
+        supports=[[5, 0, 4], [0, 0], [0, 10], [5, 10, 4]],
+        mirrors=[[[5, 0], [5, 10]]],
+        tension=1.0,
+        pressure=0.0,
+    ).surface()
+    with refused(OptionError, what="members", where="mast"):
+        model_of(half, members=[column([5, 0], [5, 0])], cable_area=1e-4, anyway=True)
     for on in ([[0, 0]], [[0, 0], [1, "a"]], 3, [[0, 0], [1, np.nan]]):
         with refused(OptionError, what="Member.on"):
             Member(on, TUBE, STEEL)
