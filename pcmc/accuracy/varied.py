@@ -45,7 +45,7 @@ class Varied:
             varied = tuple(part for part, value in zip(parts, values, strict=True) if value)
             return cls(what, varied, values[values != 0.0], more)
         if not more:
-            raise OptionError(f"margin: the {what} is 0, and cannot become less", what="towards", found=0.0)
+            raise OptionError(f"the {what} is 0, and cannot become less", what="towards", found=0.0)
         usual = float(np.abs(surface.pressures).max()) or float(surface.tensions.max()) / surface.size
         if parts[0][0] == "cable_weight":  # per length
             usual *= surface.size

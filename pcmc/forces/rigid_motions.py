@@ -39,19 +39,30 @@ def rigid_motions(surface: Surface) -> Floats:
     return motions
 
 
-def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
-    """(N,k) orthonormal: the given rigid motions as they appear in the motion space at X.
+def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> tuple[Floats, Floats]:
+    """(N,k) orthonormal: rigid motions as they appear in the motion space at X; and (k,2,3) these motions.
 
-    Those that only slide the surface along itself, like a sphere's rotations, drop out.
+    Of the given motions those drop out that only slide the surface along itself, like a sphere's rotations.
     """
     if not len(motions):
-        return np.zeros((space.size, 0))
-    arm = X - X.mean(axis=0)
-    fields = [translation + np.cross(rotation, arm) for translation, rotation in motions]
-    lengths = [float(np.linalg.norm(f)) or 1.0 for f in fields]  # 0 where all lies on the axis of rotation
+        return np.zeros((space.size, 0)), motions
+    fields = [rigid_field(motion, X) for motion in motions]
+    lengths = np.array([float(np.linalg.norm(f)) or 1.0 for f in fields])  # 0: all on the axis of rotation
     parts = np.stack([space.to_coordinates(f) / k for f, k in zip(fields, lengths, strict=True)], axis=1)
-    u, s, _ = np.linalg.svd(parts, full_matrices=False)
-    return u[:, s > ONLY_SLIDES]
+    u, s, vt = np.linalg.svd(parts, full_matrices=False)
+    some = s > ONLY_SLIDES
+    return u[:, some], np.tensordot(vt[some] / s[some, None] / lengths, motions, axes=1)
+
+
+def rigid_field(motion: Floats, X: Floats) -> Floats:
+    """(n,3) how a rigid motion (2,3) moves points X (n,3)."""
+    return np.asarray(motion[0] + np.cross(motion[1], X - X.mean(axis=0)))
+
+
+def net_forces(motions: Floats, X: Floats, forces: Floats) -> Floats:
+    """(k,) the forces (n,3) at X (n,3) along rigid motions (k,2,3): how they change E together."""
+    moment = np.cross(X - X.mean(axis=0), forces).sum(axis=0)
+    return np.asarray(motions[:, 0] @ forces.sum(axis=0) + motions[:, 1] @ moment)
 
 
 def _row(arm: Floats, axis: Floats) -> Floats:

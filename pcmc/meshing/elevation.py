@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
@@ -47,21 +47,34 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
         message = "order: a wall rests on the plane, and only flat triangles have contact; give order=1"
         raise SurfaceError(message, what="order", found=order, expected=1)
     fine = refine(surface, order.bit_length() - 1, project).rebuilt(order=order)
-    return fine.moved(_blended(fine)) if order > 2 else fine
+    return fine.moved(blended(fine, fine.vertices, np.ones(fine.n, dtype=bool)))
 
 
-def _blended(surface: Surface) -> Floats:
-    """(n,3) the vertices with the insides of all elements blended from their edges."""
-    p, X, nodes = surface.order, surface.vertices, surface.nodes
+def flat_places(surface: Surface, X: Floats) -> Floats:
+    """(n,3) where the nodes would be if the elements were flat, with the same corners."""
+    place = X.copy()
+    place[surface.nodes] = np.einsum(
+        "ic,ecd->eid", lattice(surface.order).nodes / surface.order, X[surface.nodes[:, :3]]
+    )
+    return place
+
+
+def blended(surface: Surface, X: Floats, on_curve: Bools) -> Floats:
+    """X (n,3) with the nodes of elements on their flat triangles, but for those ``on_curve`` (n,).
+
+    Inside an element the distances that nodes ``on_curve`` on its sides have from there are blended.
+    """
+    p, nodes, flat = surface.order, surface.nodes, flat_places(surface, X)
     share = lattice(p).nodes / p
-    flat = np.einsum("ic,ecd->eid", share, X[nodes[:, :3]])
-    inside, away, moved = np.flatnonzero(share.min(axis=1) > 0.0), X[nodes] - flat, X.copy()
-    place = flat[:, inside]
+    inside, moved = np.flatnonzero(share.min(axis=1) > 0.0), X.copy()
+    away = np.where(on_curve[nodes, None], (X - flat)[nodes], 0.0)
+    away[:, inside] = 0.0
+    place = flat[nodes] + away
     for c in range(3):
         a, b = share[:, (c + 1) % 3], share[:, (c + 2) % 3]
         edge = np.flatnonzero((share[:, c] == 0.0) & (a * b > 0.0))
         known, wanted = (np.vander((b - a)[some], p - 1) for some in (edge, inside))
         weights = (a * b)[inside, None] * (wanted @ np.linalg.inv(known)) / (a * b)[edge]
-        place += np.einsum("ij,ejd->eid", weights, away[:, edge])
-    moved[nodes[:, inside]] = place
+        place[:, inside] += np.einsum("ij,ejd->eid", weights, away[:, edge])
+    moved[nodes[:, 3:]] = place[:, 3:]
     return moved

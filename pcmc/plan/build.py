@@ -22,6 +22,7 @@ from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
 from ..surface.pieces import Piece, to_space
+from ..surface.values import BELOW
 from .draft import Draft, Roof, drafted, rooms_of, upright_planes, walls_of
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
 from .lines import EXACT, SNAP, Kind, PlanLine
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from .plan import Plan
 
 RISE = 0.3  # of the radius of the largest circle without supports: a shallow dome
-BELOW = " below"  # behind the name of a patch: that of a cushion's sheet below it
 FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper at its edge
 SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room

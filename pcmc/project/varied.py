@@ -24,7 +24,6 @@ from ..base.units import Units
 from ..certificate.quantities import dimension_of
 from ..forces.rooms import refuse_varied_pressure
 from ..plan import Curve, Divider, Hole, Plan
-from ..plan.build import BELOW
 from ..surface import Plane, Surface
 from ..surface.surface import FIELDS
 from ..surface.values import KINDS, all_values
@@ -172,18 +171,9 @@ class _Source(NamedTuple):
 
 
 def with_loads(surface: Surface, given: Mapping[str, Mapping[str, float]]) -> Surface:
-    """The surface with other values by kind and name; OptionError for a pressure that is a result.
-
-    The two sheets of a cushion have one pressure: that given for one of them alone is that of both.
-    """
-    pressures = dict(given.get("pressures", {}))
-    refuse_varied_pressure(surface, map(surface.patch_index, pressures))
-    present = {patch.name: patch.pressure for patch in surface.patches}
-    for name, value in given.get("pressures", {}).items():
-        other = name.removesuffix(BELOW) if name.endswith(BELOW) else f"{name}{BELOW}"
-        if present.get(other) == present[name]:
-            pressures.setdefault(other, value)
-    return surface.retensioned(**{**given, "pressures": pressures})
+    """The surface with other values by kind and name; OptionError for a pressure that is a result."""
+    refuse_varied_pressure(surface, map(surface.patch_index, given.get("pressures", {})))
+    return surface.retensioned(**given)
 
 
 def numbers_by_name(data: Mapping[str, Any]) -> dict[str, KeyPath]:

@@ -72,7 +72,8 @@ def verdict_sentences(
             f" {small(certificate.curvature_error)} of it."
         )
         share = f"{100.0 * certificate.load_ratio:.0f} %"
-        sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
+        if share != "0 %":  # as in a cushion, whose sheets are pushed apart
+            sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
     if len(certificate.supports):
         sentences.append(sentence(balance_sentence(certificate.balance, certificate.symmetric_in)))
     if check is not None:

@@ -21,12 +21,14 @@ from ..forces.pinching import (
 )
 from ..forces.pull import pull_directions
 from ..forces.rooms import closing_volumes, volume_gradients_at, volumes_at, with_room_pressures
-from ..meshing.quality import compare, redistribute, worst_quality
+from ..meshing.elevation import blended, flat_places
+from ..meshing.quality import compare, edge_lengths, redistribute, worst_quality
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
-from ..surface.supports import onto_circles
+from ..surface.supports import apply_supports, onto_circles
+from ..surface.topology import CURVE, SHEET
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time
@@ -34,6 +36,7 @@ DAMPING = 0.25  # factor on both, each time that the vertex is lifted again
 RETRY = 2 / 3  # of the quality aimed at: below this redistribution is tried again after it has failed
 REDISTRIBUTIONS = 60  # the most of them
 VOLUME_STEPS = 4  # the most corrections of the volumes after a move
+BLENDED = 1e-4  # of an edge: the insides of curved elements follow their edges to this
 RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 
 
@@ -161,7 +164,12 @@ class SolverState:
         return turned or after < 0.7 * min(before, self.min_quality)
 
     def maintain_mesh(self) -> bool:
-        """Redistribute the vertices along the shape while triangles are poor; True if they moved."""
+        """Redistribute the vertices along the shape while triangles are poor; True if they moved.
+
+        Of curved elements the insides follow the edges: where junctions bend, their maps stay smooth.
+        """
+        if self.at.surface.order > 1:
+            return self._blend_elements()
         start, residual = self.quality, self.at.residual
         due = start < self._poor_quality and 1e-7 <= residual < self._small_residual
         if not due or self._redistributions_left <= 0:
@@ -172,6 +180,21 @@ class SolverState:
             self._poor_quality, self._small_residual = RETRY * self.min_quality, 0.1 * residual
             return False
         self.go_to(X)
+        return True
+
+    def _blend_elements(self) -> bool:
+        surface, X, kind = self.at.surface, self.at.X, self.at.classes.kind
+        if surface.order == 2 or self.at.residual < 1e-7:
+            return False
+
+        def slide(d: Floats) -> Floats:
+            return apply_supports(surface, d - self.at.space.project(d), X)
+
+        even = X + slide(np.where((kind == CURVE)[:, None], flat_places(surface, X) - X, 0.0))
+        d = slide(blended(surface, even, (kind != SHEET) | (self.at.space.dimension == 0)) - X)
+        if np.abs(d).max() <= BLENDED * np.median(edge_lengths(self.at.shape)):
+            return False
+        self.go_to(X + d)
         return True
 
     def update_walls(self) -> bool:

@@ -237,7 +237,7 @@ class Stepper:
             z, residuals = solve_preconditioned(times, inverse, right, 1e-3, restart=12)
             steps = len(residuals)
             self.state.evaluations += steps
-        s = z[:size]
+        s = at.across_carried(z[:size])
         if second.stiffness == 0.0 and len(at.rigid_motions):
             s = self._limit_drift(s)
         return at.space.to_vectors(s), z[size:] * at.volume_units, steps
@@ -270,8 +270,9 @@ class Stepper:
         if state.at.norm < (1.0 - 0.3 * t) * norm:
             self._residual_raised = False
             return True
-        # where no support resists some rigid motion, every other step may raise the residual
-        if len(state.at.rigid_motions) and not self._residual_raised and state.at.norm < 2.0 * norm:
+        # where rigid motions are free and not carried, every other step may raise the residual
+        drifts = len(state.at.rigid_motions) > 0 and state.at.surface.order == 1
+        if drifts and not self._residual_raised and state.at.norm < 2.0 * norm:
             self._residual_raised = True
             return True
         return self.minimum and state.energy <= energy + 1e-2 * t * slope and slope < 0.0

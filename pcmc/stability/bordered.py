@@ -41,6 +41,23 @@ class BorderedFactor:
         return np.concatenate([s - self._behind @ multipliers, multipliers])
 
 
+class AcrossFactor:
+    """The inverse of A across columns Q (N,k): y with A y - b in their span, and Qᵀ y = 0."""
+
+    def __init__(self, inner: Inverse, columns: Floats) -> None:
+        self._inner, self._columns, self._behind = inner, columns, inner.solve(columns)
+
+    @classmethod
+    def of(cls, inner: Inverse, columns: Floats) -> Inverse:
+        """That inverse, or A's own where there are no columns."""
+        return cls(inner, columns) if columns.shape[1] else inner
+
+    def solve(self, right: Floats) -> Floats:
+        """y (N,) for b as given, or several of them (N,j)."""
+        y, Q = self._inner.solve(right), self._columns
+        return np.asarray(y - self._behind @ np.linalg.solve(Q.T @ self._behind, Q.T @ y))
+
+
 def solve_preconditioned(
     times: Callable[[Floats], Floats],
     inverse: Callable[[Floats], Floats],

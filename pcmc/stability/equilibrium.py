@@ -21,13 +21,13 @@ from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motio
 from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.pinching import StandingPart, standing_part
 from ..forces.pull import excess_pull
-from ..forces.rigid_motions import rigid_modes, rigid_motions
+from ..forces.rigid_motions import net_forces, rigid_field, rigid_modes, rigid_motions
 from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
 from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from ..surface.supports import apply_supports
-from .bordered import BorderedFactor
+from .bordered import AcrossFactor, BorderedFactor
 from .factorisation import Factor, Factoriser, Inverse, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
@@ -125,8 +125,9 @@ class Equilibrium:
 
     @cached_property
     def forces(self) -> Floats:
-        """r = Bᵀ∇E (N,), force."""
-        return self.space.to_coordinates(self.gradient)
+        """r = Bᵀ∇E (N,), force; along the motions ``carried`` theirs, not that of their part across."""
+        r, (modes, motions) = self.space.to_coordinates(self.gradient), self.carried
+        return r + modes @ (net_forces(motions, self.X, self.gradient) - modes.T @ r)
 
     @cached_property
     def unbalanced(self) -> Floats:
@@ -148,7 +149,10 @@ class Equilibrium:
     @cached_property
     def jacobian(self) -> Linearisation:
         """J, the derivative of r along motions of the vertices; B turns along with the surface."""
-        return linearise(self.surface, self.classes, self.space, self.X, self.gradient)
+        gradient = self.gradient
+        if len(self.carried[1]):
+            gradient = gradient - rigid_field(self._placing, self.X)
+        return linearise(self.surface, self.classes, self.space, self.X, gradient)
 
     # Rooms of prescribed volume
 
@@ -190,6 +194,9 @@ class Equilibrium:
         [ Cᵀ   0 ] [ μ ]        C = Bᵀ ∂V/∂X in units of force
         """
         change = self.jacobian.times(d)
+        if len(self.carried[1]):  # r = Bᵀ(∇E - the field of ``_placing``), whose arms move along
+            turned = self.space.to_coordinates(np.cross(self._placing[1], d))
+            change = self.across_carried(change - turned)
         if not self.surface.rooms:
             return change
         growth = self.volume_units * np.einsum("rnd,nd->r", self.volume_gradients, d)
@@ -255,9 +262,35 @@ class Equilibrium:
         return rigid_motions(self.surface)
 
     @cached_property
+    def _rigid(self) -> tuple[Floats, Floats]:
+        return rigid_modes(self.space, self.rigid_motions, self.X)
+
+    @property
     def rigid(self) -> Floats:
         """(N,k) the same in the motion space, orthonormal."""
-        return rigid_modes(self.space, self.rigid_motions, self.X)
+        return self._rigid[0]
+
+    @cached_property
+    def carried(self) -> tuple[Floats, Floats]:
+        """(N,k) and (k,2,3): free rigid motions by which curved elements move as they are.
+
+        The part of a rigid motion across the surface moves the vertices along the shape, too. Of flat
+        triangles E depends on their places by the square of the edge length, and comes to rest at one; of
+        curved ones so little that it may not, and the solver would carry the vertices far away.
+        """
+        if self.surface.order == 1:
+            return np.empty((self.space.size, 0)), np.empty((0, 2, 3))
+        return self._rigid
+
+    @cached_property
+    def _placing(self) -> Floats:
+        """(2,3) the motion carried whose field has the part of Bᵀ∇E that ``forces`` leaves out."""
+        modes, motions = self.carried
+        return np.tensordot(self.space.to_coordinates(self.gradient) @ modes, motions, axes=1)
+
+    def across_carried(self, r: Floats) -> Floats:
+        """r (N,) without its part along the motions ``carried``."""
+        return r - self.carried[0] @ (self.carried[0].T @ r)
 
     @cached_property
     def excluded(self) -> Floats:
@@ -333,22 +366,20 @@ class SecondVariation:
 
     @cached_property
     def bordered(self) -> Inverse:
-        """The inverse of ``Equilibrium.times``, with A in the place of J."""
+        """The inverse of ``Equilibrium.times``, with A in the place of J, across the motions carried."""
+        inner = AcrossFactor.of(self.factor, self.of.carried[0])
         if not self.of.surface.rooms:
-            return self.factor
+            return inner
         columns = self.of.volume_columns * self.of.volume_units
-        return BorderedFactor(self.factor, -columns, columns.T)
+        return BorderedFactor(inner, -columns, columns.T)
 
     @cached_property
-    def _behind(self) -> Floats:
-        return self.factor.solve(self.of.excluded)
+    def _across_excluded(self) -> Inverse:
+        return AcrossFactor.of(self.factor, self.of.excluded)
 
     def solve(self, right: Floats) -> Floats:
         """The inverse (N,) among the motions that count: with none of the excluded ones."""
-        y, Q = self.factor.solve(right), self.of.excluded
-        if Q.shape[1]:
-            y = y - self._behind @ np.linalg.solve(Q.T @ self._behind, Q.T @ y)
-        return y
+        return self._across_excluded.solve(right)
 
 
 def negatives_without(factor: Factor, columns: Floats) -> int:

@@ -1,7 +1,7 @@
 """The values of a surface by name: tensions, pressures, weights, snow, pulls of cables, volumes of rooms.
 
 Those of a wall follow from its neighbours': its pressure is the difference of its two rooms', its snow that
-of the snow over them, and its tension must balance theirs.
+of the snow over them, and its tension must balance theirs. The two sheets of a cushion have one pressure.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ KINDS = {
 """The kinds of values, as ``Surface.retensioned`` takes them."""
 POWERS = {"force": 0, "tension": -1, "pressure": -2, "volume": 3}  # of a length, beside one of a force
 PARTS = {"patches": "patch", "cables": "cable", "rooms": "room"}
+BELOW = " below"  # behind the name of a patch: that of a cushion's sheet below it
 SHARE = 0.3  # of the smaller tension: the wall's tension above the difference of its neighbours'
 
 
@@ -77,6 +78,7 @@ def with_values(
         validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
     of_patches = changes["patches"]
     of_patches["wall"] = dict.fromkeys(walls, True)
+    of_patches["pressure"] = of_both_sheets(surface, of_patches.get("pressure", {}))
     changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
     following: dict[str, dict[str, Any]] = {}
     for field in ("pressure", "snow"):
@@ -104,11 +106,23 @@ def _replaced(
 
 
 def rates_of(surface: Any, kind: str, by_name: Mapping[str, float]) -> Floats:
-    """The rates of change of the values of one kind, given by name; walls that are not named follow."""
+    """The rates of change of the values of one kind, given by name; what is not named follows."""
+    by_name = of_both_sheets(surface, by_name) if kind == "pressures" else by_name
     named = {part_index(surface, kind, name): rate for name, rate in by_name.items()}
     rates = np.zeros(len(getattr(surface, KINDS[kind][0])))
     rates[list(named)] = list(named.values())
     return rates + wall_changes(surface, rates, named) if kind in ("pressures", "snows") else rates
+
+
+def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, float]:
+    """Pressures, or their rates, by patch: what is given for one sheet of a cushion alone is that of both."""
+    present = {patch.name: patch.pressure for patch in surface.patches}
+    both = dict(pressures)
+    for name, value in pressures.items():
+        other = name.removesuffix(BELOW) if name.endswith(BELOW) else f"{name}{BELOW}"
+        if name in present and present.get(other) == present[name]:
+            both.setdefault(other, value)
+    return both
 
 
 def wall_changes(surface: Any, change: Floats, named: Collection[int] = ()) -> Floats:

@@ -166,6 +166,28 @@ def test_closed_forms_with_junctions_and_waves(make, exact, project):
     assert np.log2(errors[0] / errors[1]) > 3.6
 
 
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_a_double_bubble_that_nothing_holds_comes_to_rest_on_fine_meshes():
+    exact, flat, errors = double_bubble_exact().energy, double_bubble(1.0), []
+    for _ in range(3):
+        flat = refine(solve(flat, target="stationary").surface)
+        result = solve(elevate(flat, 2), target="stationary", iterations=6)
+        assert result.converged
+        errors.append(abs(result.energy - exact))
+    assert np.log2(errors[0] / errors[1]) > 4.5
+    assert np.log2(errors[1] / errors[2]) > 4.5
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_elements_follow_a_junction_that_bends():
+    flat, exact = solve(double_bubble(1.0), target="stationary").surface, double_bubble_exact().energy
+    errors = [
+        abs(solve(elevate(flat, order), target="stationary").energy / exact - 1.0) for order in (2, 4, 8)
+    ]
+    assert errors[1] < 1e-2 * errors[0]
+    assert errors[2] < 1e-12
+
+
 def test_the_variational_curvature_is_exact_at_rest():
     result = solve(elevate(solve(spherical_cap(0.25)).surface, 2, onto_rim))
     assert result.certificate.curvature_error < 1e-9

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from pcmc import Plane, Surface, Verdict, certify, solve
+from pcmc import Direction, Parameter, Plane, Surface, Target, Verdict, certify, follow, meet, solve
 from pcmc.base.errors import PlanError, PlanWarning
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.planar import triangulate
@@ -322,6 +322,19 @@ def test_a_cushion_is_two_caps():
         assert np.abs(plane.height(quarter.vertices[on])).max() < 1e-12
         assert (quarter.vertices[on, 2] < -1e-6).any()
     assert solve(quarter).converged
+
+
+def test_the_sheets_of_a_cushion_have_one_pressure_whichever_way_it_is_given():
+    circle = {"circle": {"centre": [0, 0], "radius": 3.0}}
+    roof = solve(Plan(circle, edge_length=0.8, tension=2.0, cushion=1.5).surface()).surface
+    upper, lower = (patch.name for patch in roof.patches)
+    assert roof.retensioned(pressures={lower: 0.9}).pressures.tolist() == [0.9, 0.9]
+    assert roof.retensioned(pressures={upper: 1.1, lower: 0.9}).pressures.tolist() == [1.1, 0.9]
+    end = follow(roof, Direction(pressures={upper: 1.0}), 1.1).last
+    assert end.pressures.tolist() == pytest.approx([1.1, 1.1])
+    wanted = end.vertices[:, 2].max()
+    met = meet(roof, Target("apex", upper, wanted), Parameter(upper, "pressure"))
+    assert met.surface.pressures.tolist() == pytest.approx([1.1, 1.1], rel=1e-4)
 
 
 @pytest.mark.parametrize(
