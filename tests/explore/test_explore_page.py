@@ -384,7 +384,8 @@ def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
         points[0].send_keys(Keys.ENTER)  # on the branch, at another pressure, and by the keyboard
         page.idle()
         there = float(points[0].get_attribute("aria-label").split()[1].strip(","))
-        assert float(page.number("Pressure p of cap").get_attribute("value")) == pytest.approx(there, rel=1e-3)
+        shown = page.number("Pressure p of cap").get_attribute("value")
+        assert float(shown) == pytest.approx(there, rel=1e-3)
         assert len(page.driver.find_elements("css selector", ".diagram [aria-current=true]")) == 1
         page.find("#undo").click()
         page.idle()
