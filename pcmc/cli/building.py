@@ -30,6 +30,8 @@ from ..project.writing import (
 )
 from ..structure import analyse
 from ..structure.calculix import expect_program
+from ..structure.columns import column_text, columns_at_rest
+from ..structure.member_forces import sentences
 from . import arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -303,7 +305,8 @@ def structure(
 
     A project is solved first; its [structure] has the values that no option gives. With --run each case and
     combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv,
-    NAME-members.csv, NAME-member-forces.csv, NAME-cases.png and NAME-member-forces.png come beside the model.
+    NAME-members.csv, NAME-member-forces.csv, NAME-columns.csv, NAME-cases.png and NAME-member-forces.png come
+    beside the model.
     A case that is not carried as a whole ends with the code 1.
 
     \b
@@ -338,6 +341,9 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
+        print(*sentences(model, model.units), sep="\n", end="\n" * bool(model.beams))
+        if model.bars:
+            print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
         return reports.ended(roof.good)
     print(analysis)

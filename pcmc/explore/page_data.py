@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from typing import Any
 from zlib import crc32
 
@@ -18,6 +19,8 @@ from ..certificate.forces import Forces
 from ..certificate.quantities import dimension_of
 from ..design import Parameter, Target
 from ..design.targets import MEASURES, NAMED
+from ..equilibria import Equilibria
+from ..equilibria.found import INCOMPLETE
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
@@ -200,6 +203,25 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     return {
         "targets": [{**vars(target), "label": target.label} for target in targets],
         "vary": [{"label": parameter.label, "parameter": vars(parameter)} for parameter in vary],
+    }
+
+
+def diagram(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
+    """The branches and equilibria of a search, each point with the number of its surface, and in words."""
+    numbers, branches = count(len(found)), []
+    (line,) = found.lines
+    for branch in found.branches[line.name]:
+        shown = branch.points.loc[sorted(branch.surfaces)]
+        columns = {name: shown[name].tolist() for name in ("parameter", "height", "index")}
+        branches.append(columns | {"number": [next(numbers) for _ in range(len(shown))]})
+    rows = found.table[["height", "index", "energy"]].to_dict(orient="records")
+    words = [text for text in found.text(units).splitlines() if text.startswith("barrier")]
+    return {
+        "parameter": line.name,
+        "value": line.value,
+        "branches": branches,
+        "equilibria": [row | {"number": k} for k, row in enumerate(rows)],
+        "words": [*words, *found.failed, INCOMPLETE],
     }
 
 

@@ -124,6 +124,9 @@ class Explorer:
                     return None
                 there = page_data.drawn(margin.surface).vertices - self.origin
                 return {"margin": margin.text(units)}, {"vertices": there}
+            case "equilibria":
+                found = session.equilibria(**given, gone=gone)
+                return None if found is None else (page_data.diagram(found, units), {})
             case "verify":
                 theorem = session.verify()
                 return {"badge": theorem.brief(units), "text": theorem.text(units)}, {}

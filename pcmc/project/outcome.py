@@ -273,8 +273,10 @@ class Outcome:
         """The structural model of what is shown."""
         plan = None if self.project is None else self.project.plan
         model = structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
-        if self.unfold and any(not line.wall for line in model.lines):
-            text = "a member along an edge is known for the part of the plan alone, not for its images"
+        if self.unfold and (model.bars or any(not line.wall for line in model.lines)):
+            text = (
+                "a member at an edge or a point is known for the part of the plan alone, not for its images"
+            )
             raise OptionError(f"{text}; leave out whole, or the member", what="whole")
         return model
 

@@ -25,6 +25,7 @@ from .results import StepResults
 COLUMNS = ("N", "V", "V_across", "T", "M", "M_across")  # as ``FrameForces.within`` has them
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
+HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of one that is too weak alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,14 @@ class MemberForces:
     @property
     def eccentricity(self) -> float:
         """max |M| / max |N|, length: how far the line is from one that does not bend."""
-        return self.largest["M"] / float(np.abs(self.within[:, 0]).max())
+        most = float(np.abs(self.within[:, 0]).max())
+        return self.largest["M"] / most if most > 0.0 else np.inf
+
+    @property
+    def pulled(self) -> float:
+        """The sum of the sizes of the pulls between its ends."""
+        inner = self.pulls if self.line.closed else self.pulls[1:-1]
+        return float(np.linalg.norm(inner, axis=1).sum())
 
     @property
     def balance(self) -> tuple[float, float]:
@@ -233,16 +241,32 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         N, share = beam.balance
         most = beam.largest
         far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
-        about = (
-            f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)},"
-        )
-        about += f" M/N = {beam.eccentricity:.2g}{length}; {beam.enough:.2g} times its E A and E I keep the"
+        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)}"
+        about += f", M/N = {beam.eccentricity:.2g}{length}" if np.isfinite(beam.eccentricity) else ""
+        about += f"; {beam.enough:.3g} times its E A and E I keep the"
         about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
         if beam.line.wall:
             about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
             cable = f"; wall = false, cable = {N:.3g} finds the shape that does not bend"
             about += cable if N > 0.0 else "; that is a thrust, which no cable has"
         lines.append(about)
+    return lines
+
+
+def weak_members(
+    model: StructuralModel, cases: Iterable[tuple[str, tuple[MemberForces, ...]]], units: Units
+) -> list[str]:
+    """A line for each beam that moves by more than a 300th of its span in a case, or would without the
+    sheets, which carry a good part in its place; with the stiffness that it would need to carry all alone."""
+    lines, listed = list[str](), list(cases)
+    for k, rest in enumerate(members_at_rest(model)):
+        case, worst = max(((name, beams[k]) for name, beams in listed), key=lambda one: one[1].deflection)
+        share = max(0.0, 1.0 - listed[0][1][k].pulled / rest.pulled)
+        if worst.enough > 1.0 or (rest.enough > 1.0 and share > HELPED):
+            text = f"{rest.line.name} is too weak: under {case} it moves {worst.deflection:.3g}"
+            text += f"{units.behind('length')}, span/{worst.span / worst.deflection:.0f}, and at rest the"
+            text += f" sheets carry {100.0 * share:.0f} % of what it should; without them it would need"
+            lines.append(f"{text} {max(rest.enough, worst.enough):.3g} times its E A and E I")
     return lines
 
 

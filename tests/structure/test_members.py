@@ -1,5 +1,6 @@
 """Beams, cables and rings of a structural model: what the sheets pull them with, and what CalculiX finds."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -270,6 +271,31 @@ def test_members_of_a_project_are_refused_in_a_line():
     hole = {"curve": circle([2, 1], 0.4), "edge": "free", "member": "arch"}
     with refused(OptionError, what="member"):
         members_of({"arch": good}, Plan(area, holes=[hole], tension=2.0))
+
+
+@needs_ccx
+def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
+    """A wire in the place of an arch moves beyond span/300; an edge so soft that the film spans in its place.
+    With the stiffness that the line names neither is told."""
+
+    def weak(analysis):
+        return [line for line in analysis.answers() if "too weak" in line]
+
+    def factor(line):
+        return float(line.split("it would need ")[1].split(" times")[0])
+
+    arch = Member("wall 1", Profile.tube(0.005, 0.0005), STEEL)
+    [told] = weak(analyse(hall_with(arch), remedy=False))
+    [rest] = members_at_rest(hall_with(arch))
+    assert told.startswith("wall 1 is too weak: under form pressure it moves 0.0")
+    assert factor(told) == pytest.approx(300.0 * rest.deflection / rest.span, rel=0.01)
+    assert weak(analyse(hall_with(replace(arch, profile=arch.profile.scaled(factor(told)))))) == []
+
+    edge = Member(polyline([[0, 1], [1, 1]]), Profile.tube(0.06, 0.005), Material(2.1e6), name="edge")
+    [told] = weak(analyse(model_of(square(8, tension=2.0), members=[edge], anyway=True)))
+    assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
+    stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
+    assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
 
 
 def test_a_cable_in_the_place_of_a_wall_finds_a_shape_that_does_not_bend():
