@@ -24,8 +24,8 @@ from ..study import Study
 from .structure import Row, rounded
 
 PLANAR = 1e-3  # distance of the diagonals over their length: a panel of glass bends so far
+LEFT = 1e-6  # of planarity, and degrees
 TRIANGLES = 5  # edges of triangles along the edge of a panel, about
-SQUARES = 8.0  # the length of Example 1
 DRAWN = ("Example 1", "two halls", "L-roof")
 HALLS = [[0, 0], [12, 0], [12, 8], [0, 8]]
 L_SHAPE = [[0, 0], [12, 0], [12, 6], [6, 6], [6, 10], [0, 10]]
@@ -76,6 +76,7 @@ def data(folder: Folder, short: bool) -> None:
 def _numbers(net: PanelNet) -> Row:
     table, whole = net.panels, net.panels[net.panels["kind"] == "whole"]
     inside = net.nodes.loc[net.nodes["kind"] == "inside", "distance"]
+    worst = [_few(float(one["planarity"].max())) for one in (table, whole)]
     kinds = table["kind"].value_counts()
     return {
         "panels": len(table),
@@ -83,24 +84,28 @@ def _numbers(net: PanelNet) -> Row:
         "umbilics": len(net.umbilics),
         "mean_size": float(np.sqrt(table["area"].sum() / len(table))),
         "not_planar": int((table["planarity"] > PLANAR).sum()),
-        "planarity": float(table["planarity"].max()),
-        "planarity_whole": float(whole["planarity"].max()),
-        "node_distance": float(inside.median()),
-        "node_distance_largest": float(inside.max()),
+        **dict(zip(("planarity", "planarity_whole"), worst, strict=True)),
+        "node_distance": float(inside.max()),
         "panel_distance": float(whole["distance"].median()),
         "panel_distance_largest": float(table["distance"].max()),
-        "turned": float(table["turned"].mean()),
-        "torsion": float(net.beams["torsion"].max()),
+        "turned": _few(float(table["turned"].mean())),
+        "torsion": _few(float(net.beams["torsion"].max())),
         "covered": net.covered,
     }
+
+
+def _few(value: float) -> float:
+    """A number that is 0 where it is what iterations leave."""
+    return value if value > LEFT else 0.0
 
 
 def _places(net: PanelNet) -> list[Row]:
     """The umbilics, and the panels that are not planar."""
     rows: list[Row] = [{"what": "umbilic", **_at(place)} for place in net.umbilics]
-    for panel in net.panels[net.panels["planarity"] > PLANAR].itertuples():
-        middle = net.points[net.polygons[int(panel.panel) - 1]].mean(axis=0)
-        rows.append({"what": f"{panel.kind} panel", **_at(middle), "planarity": float(panel.planarity)})
+    kind, planarity = net.panels["kind"].tolist(), net.panels["planarity"].to_numpy()
+    for k in np.flatnonzero(planarity > PLANAR).tolist():
+        middle = net.points[net.polygons[k]].mean(axis=0)
+        rows.append({"what": f"{kind[k]} panel", **_at(middle), "planarity": float(planarity[k])})
     return rows
 
 
@@ -114,14 +119,12 @@ def table(folder: Folder) -> dict[str, float]:
     measured: dict[str, float] = {}
     for name, given in records.groupby("shape", sort=False):
         key = str(name).lower().replace(" ", "_").replace("-", "_")
-        row: Row = {"shape": str(name)}
-        for column in ("panel_distance", "node_distance"):
-            row[column] = round(slope(given["mean_size"].to_numpy(), given[column].to_numpy()).order, 2)
-            measured[f"order_{column}_{key}"] = row[column]
-        rows.append(row)
-        finest = given.iloc[-1]
-        measured |= {f"not_planar_{key}": float(finest["not_planar"] / finest["panels"])}
-        measured |= {f"{column}_{key}": float(finest[column]) for column in ("planarity", "planarity_whole")}
+        mean_size, finest = given["mean_size"].to_numpy(), given.iloc[-1]
+        columns = ("panel_distance", "node_distance")
+        orders = {column: round(slope(mean_size, given[column].to_numpy()).order, 2) for column in columns}
+        rows.append({"shape": str(name), **orders})
+        measured |= {f"order_{column}_{key}": order for column, order in orders.items()}
+        measured |= {f"{column}_{key}": float(finest[column]) for column in ("not_planar", "planarity")}
     folder.write_table("orders", pd.DataFrame(rows))
     return measured
 
