@@ -62,13 +62,14 @@ def data(folder: Folder, short: bool) -> None:
         for size in sizes[: 1 if short else None]:
             surface = build(size)
             net = panel_net(surface, size, anyway=True)
-            records.append({"shape": name, "size": size, "triangles": surface.m} | _numbers(net))
+            row: Row = {"shape": name, "size": size, "triangles": surface.m, **_numbers(net)}
             if name in DRAWN:
                 grid = panel_net(surface, size, "quads", anyway=True).panels
-                records[-1] |= {"grid_planarity": float(grid["planarity"].median())}
-        places += [{"shape": name} | place for place in _places(net)]
+                row["grid_planarity"] = float(grid["planarity"].median())
+            records.append(row)
+        places += [{"shape": name, **place} for place in _places(net)]
         if name in DRAWN:
-            folder.write_mesh(name.lower().replace(" ", "-"), {f"size {size:g}": surface})
+            folder.write_mesh(_key(name), {f"size {size:g}": surface})
     folder.write_table("records", rounded(records))
     folder.write_table("places", rounded(places))
 
@@ -92,6 +93,10 @@ def _numbers(net: PanelNet) -> Row:
         "torsion": _few(float(net.beams["torsion"].max())),
         "covered": net.covered,
     }
+
+
+def _key(name: str) -> str:
+    return name.lower().replace(" ", "_").replace("-", "_")
 
 
 def _few(value: float) -> float:
@@ -118,7 +123,7 @@ def table(folder: Folder) -> dict[str, float]:
     records, rows = folder.read_table("records"), []
     measured: dict[str, float] = {}
     for name, given in records.groupby("shape", sort=False):
-        key = str(name).lower().replace(" ", "_").replace("-", "_")
+        key = _key(str(name))
         mean_size, finest = given["mean_size"].to_numpy(), given.iloc[-1]
         columns = ("panel_distance", "node_distance")
         orders = {column: round(slope(mean_size, given[column].to_numpy()).order, 2) for column in columns}
@@ -134,19 +139,17 @@ def figure(folder: Folder) -> None:
     from pcmc.plot import lines, panel
 
     records = folder.read_table("records")
-    curves = {
-        str(name): (
-            given["mean_size"] / given["mean_size"].iloc[0],
-            given["panel_distance"] / given["mean_size"],
-        )
-        for name, given in records.groupby("shape", sort=False)
-    }
+    curves: dict[str, Any] = {}
+    for name, given in records.groupby("shape", sort=False):
+        sizes, away = (given[column].to_numpy() for column in ("mean_size", "panel_distance"))
+        curves[str(name)] = sizes / sizes[0], away / sizes
     ends = np.array([0.4, 1.0])
     curves["order 2 of the distance"] = ends, 0.05 * ends
     look: dict[str, Any] = {"xscale": "log", "yscale": "log", "markers": True}
     look |= {"x": "mean size of panels, over the first", "y": "distance over size"}
     lines(curves, folder.figure("distances"), title="Whole panels from the surface, in the median", **look)
-    stages = [next(iter(folder.read_mesh(path.stem).items())) for path in folder.meshes()]
+    drawn = [name for name in DRAWN if (folder.path / f"{_key(name)}.pcmc").exists()]
+    stages = [next(iter(folder.read_mesh(_key(name)).items())) for name in drawn]
     nets = [panel_net(surface, float(title.split()[1]), anyway=True) for title, surface in stages]
     percent = [100.0 * net.panels["planarity"].to_numpy()[net.mesh.patch_of_face] for net in nets]
     panel(
@@ -154,7 +157,7 @@ def figure(folder: Folder) -> None:
         folder.figure("nets"),
         views="plan",
         scalars=percent,
-        titles=[path.stem.replace("-", " ") for path in folder.meshes()],
+        titles=drawn,
         label="distance of the diagonals over their length, %",
         limits=(0.0, 1.0),
         edges=False,
