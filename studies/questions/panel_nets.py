@@ -24,7 +24,7 @@ from ..study import Study
 from .structure import Row, rounded
 
 PLANAR = 1e-3  # distance of the diagonals over their length: a panel of glass bends so far
-LEFT = 1e-6  # of planarity, and degrees
+LEFT = 1e-4  # of planarity, and degrees: below it numbers are 0
 TRIANGLES = 5  # edges of triangles along the edge of a panel, about
 DRAWN = ("Example 1", "two halls", "L-roof")
 HALLS = [[0, 0], [12, 0], [12, 8], [0, 8]]
