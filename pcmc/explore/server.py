@@ -17,7 +17,7 @@ from typing import Any
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
 from ..project import load
-from ..project.members import members_left_out
+from ..project.members import has_members
 from ..project.writing import certified_files
 from ..surface import Surface
 from . import page_data
@@ -26,6 +26,7 @@ from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, chec
 from .roof import ShownRoof, Watch, save, signature
 from .session import Session, SessionState, solved_start
 
+LEFT_OUT = "members are left out"
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 POLL = 0.1  # seconds after which the server sees that it shall end
@@ -148,7 +149,7 @@ class Explorer:
             "title": roof.title,
             "name": roof.name,
             "units": page_data.unit_texts(roof.outcome.units),
-            "note": "; ".join(filter(None, (roof.note, members_left_out(roof.outcome)))),
+            "note": "; ".join(filter(None, (roof.note, LEFT_OUT * has_members(roof.outcome)))),
             "note_met": roof.outcome.result is not None and roof.outcome.good,
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",

@@ -232,10 +232,11 @@ class Outcome:
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
         from ..drawings import drawing_set
-        from .members import warn_of_members
+        from .members import members_drawn, warn_of_members
 
-        warn_of_members(self, "drawings")
+        warn_of_members(self, "drawings", held=True)
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
+        options["members"] = members_drawn(self)
         return drawing_set(self.shown.surface, self.units, **self._about(output, anyway), **options)
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:

@@ -43,7 +43,7 @@ def test_the_page_says_that_it_leaves_out_members(tmp_path):
     (tmp_path / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
     explorer = explore.start(read_roof(tmp_path / "hall.toml"))
     try:
-        assert Client(explorer).ask("/api/open")[0]["note"].startswith("members are left out (wall 1)")
+        assert Client(explorer).ask("/api/open")[0]["note"].startswith("members are left out")
     finally:
         explorer.close()
 
