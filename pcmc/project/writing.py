@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from .. import io
 from ..base.arrays import Floats
@@ -27,7 +28,7 @@ from .checking import in_file
 from .file import Project
 from .members import members_drawn, warn_of_members
 from .outcome import OnStep, Outcome, ignore
-from .settings import check_picture, schedule_paths
+from .settings import check_picture, cost_paths, schedule_paths
 
 FileJob = tuple[Path, Callable[[Path], Any]]  # a file with the function that writes it
 FileJobs = list[FileJob]
@@ -158,6 +159,18 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
     tables = (schedule.panels, schedule.families, schedule.edges)
     paths = schedule_paths(path)
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
+
+
+def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
+    """The table and the picture of ``FewerFamilies.costs``, with the functions that write them."""
+    from ..plot import lines  # needs the extra plot
+
+    best = costs[costs["cheapest"]]
+    curves = {"surfaces on the way": costs, "the cheapest": best}
+    pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
+    look: dict[str, Any] = {"x": "change of shape, length", "y": "cost", "markers": True}
+    draw = partial(lines, pairs, **look)
+    return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), draw), strict=True))
 
 
 def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:
