@@ -41,8 +41,7 @@ class DrawnMember:
     def texts(self, units: Units) -> dict[str, str]:
         """What it is, in words and numbers with units, by key.
 
-        >>> from .material import Material
-        >>> from .profile import Profile
+        >>> from pcmc import Material, Profile
         >>> mast = Member([[0, 0, 3], [0, 0, 0]], Profile.circle(0.1), Material(2.1e8), name="mast")
         >>> drawn = DrawnMember("mast", "column", mast, np.array(mast.on), forces=(-9.0, -9.0))
         >>> [drawn.texts(Units("m", "kN"))[key] for key in ("section", "N at rest")]
@@ -62,7 +61,16 @@ class DrawnMember:
 
 
 def drawn_members(model: StructuralModel) -> tuple[DrawnMember, ...]:
-    """All members of a model but its surface's own cables; with forces where the surface is certified."""
+    """All members of a model but its surface's own cables; with forces where the surface is certified.
+
+    >>> from pcmc import Material, Profile
+    >>> from pcmc.plan import Plan
+    >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
+    >>> arch = Member("wall 1", Profile.tube(0.1, 0.005), Material(2.1e8))
+    >>> model = StructuralModel(hall.surface(), Material(5e5), 1e-3, members=[arch], anyway=True)
+    >>> [(one.name, one.kind, one.wall, one.forces) for one in drawn_members(model)]
+    [('wall 1', 'beam', 'wall 1', None)]
+    """
     X, drawn, known = model.standing.vertices, list[DrawnMember](), model.certified
     found = {beam.line.name: beam.within[:, 0] for beam in members_at_rest(model)} if known else {}
     for cable in model.standing.cables if known else ():
