@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..base.errors import LostWarning, OptionError
@@ -10,16 +11,22 @@ from ..structure.drawn import DrawnMember, drawn_members
 from ..structure.member_keys import members_of
 
 if TYPE_CHECKING:
+    from ..certificate import Certificate
+    from ..surface import Surface
     from .outcome import Outcome
 
 
-def members_drawn(outcome: Outcome) -> tuple[DrawnMember, ...]:
-    """The members on what is shown; none where one cannot be there, as in a mirror plane."""
+def members_drawn(
+    outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
+) -> tuple[DrawnMember, ...]:
+    """The members on what is shown, or on another surface of the project; none where one cannot be there, as
+    in a mirror plane."""
     project = outcome.project
     if project is None or project.structure is None or not has_members(outcome):
         return ()
+    make = partial(project.structure.model, surface, True, certificate, outcome.units, project.plan)
     try:
-        return drawn_members(outcome.model(project.structure, anyway=True))
+        return drawn_members(outcome.model(project.structure, anyway=True) if surface is None else make())
     except OptionError:
         return ()
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from asking import Client
 from browsing import until
+from scipy.spatial import cKDTree
 from small_project import HALL_WITH_ARCH
 
 import pcmc
@@ -39,11 +40,28 @@ def apex(surface, name):
     return measure(surface, Target("apex", name)).value
 
 
-def test_the_page_says_that_it_leaves_out_members(tmp_path):
+def test_the_page_has_the_members_with_their_forces_at_every_state(tmp_path):
+    """Their pieces lie on the surface, and follow it; of a part of a roof they are left out."""
     (tmp_path / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
     explorer = explore.start(read_roof(tmp_path / "hall.toml"))
+
+    def force(header):
+        rows = [r for r in header["figures"] if r["owner"] == "member"]
+        assert [(r["quantity"], r["of"]) for r in rows] == [("least N", "wall 1"), ("largest N", "wall 1")]
+        return rows[1]["value"]
+
     try:
-        assert Client(explorer).ask("/api/open")[0]["note"].startswith("members are left out")
+        client = Client(explorer)
+        header, arrays = client.ask("/api/open")
+        assert "members" not in header["note"]
+        ends = arrays["member_ends"].reshape(-1, 3)
+        away, _ = cKDTree(arrays["vertices"].reshape(-1, 3)).query(ends)
+        assert away.max() < 1e-6
+        assert len(ends) == 10
+        name = header["session"]
+        higher, moved = client.ask(f"/api/{name}/settle", {"pressures": {"west": 0.36, "east": 0.36}})
+        assert moved["member_ends"].reshape(-1, 3)[5, 2] > ends[5, 2]
+        assert force(higher) != pytest.approx(force(header), rel=0.01)
     finally:
         explorer.close()
 
