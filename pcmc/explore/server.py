@@ -117,10 +117,10 @@ class Explorer:
         units = self.roof.outcome.units
         match act:
             case "check":
-                check = session.check_mesh(gone)
+                check = session.check_mesh(gone, self.roof.project)
                 return None if check is None else ({"check": page_data.mesh_findings(check, units)}, {})
             case "margin":
-                margin = session.margin(**given, gone=gone)
+                margin = session.margin(**given, gone=gone, project=self.roof.project)
                 if margin is None:
                     return None
                 there = page_data.drawn(margin.surface).vertices - self.origin
