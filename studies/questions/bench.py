@@ -123,8 +123,11 @@ def surface_evolver(surface: Surface) -> End:
         X = evolver.numbers(out, "X", 3) + np.array(surface.plane.point)
     except evolver.EvolverError as error:
         return End(np.nan, None, str(error))
-    said = "; ".join(dict.fromkeys(re.findall(r"^(?:WARNING|NOTE|ERROR).*$", out, re.M)))
-    return End(float(evolver.numbers(out, "T", 1)[0, 0]), ended(surface, X), said)
+    said = "; ".join(dict.fromkeys(re.findall(r"^(?:WARNING|ERROR).*$", out, re.M)))
+    end = ended(surface, X)
+    if end is None:
+        said = said or "nothing, though its surface has run away"
+    return End(float(evolver.numbers(out, "T", 1)[0, 0]), end, said)
 
 
 def jax_fdm(surface: Surface) -> End:
