@@ -176,12 +176,9 @@ def report(results: Path) -> str:
             "",
             given_sentence(comparison),
         ],
-        "Statements": [
-            fill(THRESHOLDS, thresholds(comparison)),
-            "",
-            *table(HEADS["sentence"], comparison_cells(comparison, "sentence")),
-        ],
+        "Statements": [fill(THRESHOLDS, thresholds(comparison)), ""],
     }
+    sections["Statements"] += table(HEADS["sentence"], comparison_cells(comparison, "sentence"))
     if (results / "solvers" / "summary.csv").is_file():
         words = {"saddles": _saddles(results)}
         sections["Solvers"] = [fill(SOLVERS, measured, words), "", *solver_table(results)]
