@@ -128,8 +128,8 @@ The study `nets` lays planar quads along lines of curvature, smaller and smaller
 surfaces all are planar, and whole panels leave the surface with the size to the power
 {nets.order_panel_distance_nodoid:.1f} to {nets.order_panel_distance_unduloid:.1f}, on Example 1
 {nets.order_panel_distance_example_1:.1f}. There {nets.not_planar_example_1:.0f} panels of the finest net
-stay warped, by up to {nets.planarity_example_1:.1%} of their diagonals, at the ends of the ridge. On two halls
-with a wall between them the power is {nets.order_panel_distance_two_halls:.1f}, and
+stay warped, by up to {nets.planarity_example_1:.1%} of their diagonals, at the ends of the ridge.
+On two halls with a wall between them the power is {nets.order_panel_distance_two_halls:.1f}, and
 {nets.not_planar_two_halls:.0f} panels beside the ridge stay warped; on an L-shaped roof it is
 {nets.order_panel_distance_l_roof:.1f}, and none.
 `nets/places.csv` has the umbilics and the warped panels."""
