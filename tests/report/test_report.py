@@ -119,10 +119,8 @@ def test_the_verdict_in_words():
     _, *sentences = words.verdict_sentences(certificate)
     assert sentences[:2] == ["In detail: a reason.", "The forces left are 3e-12 of the forces in the roof."]
     of_curvature, of_load, balance = sentences[2:]
-    found = re.fullmatch(
-        r"Each patch has the mean curvature that .* ask for, up to (\S+) of it\.", of_curvature
-    )
-    assert found[1] == tables.small(certificate.curvature_error)
+    assert of_curvature.startswith("Each patch has the mean curvature")
+    assert of_curvature.endswith(f" up to {tables.small(certificate.curvature_error)} of it.")
     assert f" {100.0 * certificate.load_ratio:.0f} % of the most" in of_load
     assert balance.startswith("The supports carry")
     assert [tables.small(x) for x in (0.0, 0.0012, np.inf, np.nan)] == ["0", "1e-03", "–", "–"]

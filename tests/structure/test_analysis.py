@@ -245,11 +245,8 @@ def test_each_triangle_of_cloth_is_written_with_its_own_warp(tmp_path):
     pcmc.write_structure(tmp_path / "strip.inp", model)
     text, warp = (tmp_path / "strip.inp").read_text(), {}
     for name, row in re.findall(r"^\*ORIENTATION, NAME=(\w+), .*\n(.*)$", text, re.M):
-        for element in (
-            re.search(rf"^\*ELSET, ELSET={name}\n([^*]*)", text, re.M)[1].replace("\n", ",").split(",")
-        ):
-            if element:
-                warp[int(element)] = [float(x) for x in row.split(",")]
+        elements = re.findall(r"\d+", re.search(rf"^\*ELSET, ELSET={name}\n([^*]*)", text, re.M)[1])
+        warp |= {int(element): [float(x) for x in row.split(",")] for element in elements}
     wanted = model.warps(0).reshape(-1, 6)
     assert len(np.unique(wanted.round(9), axis=0)) > 1
     np.testing.assert_allclose([warp[k + 1] for k in model.faces], wanted, atol=1e-9)
