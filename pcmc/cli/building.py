@@ -31,7 +31,7 @@ from ..project.writing import (
 from ..structure import analyse
 from ..structure.calculix import expect_program
 from ..structure.columns import column_text, columns_at_rest
-from ..structure.member_forces import sentences
+from ..structure.member_forces import cable_offers, sentences
 from . import arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -341,7 +341,7 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
-        print(*sentences(model, model.units), sep="\n", end="\n" * bool(model.beams))
+        print(*sentences(model, model.units), *cable_offers(model), sep="\n", end="\n" * bool(model.beams))
         if model.bars:
             print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import count
 from typing import Any
 from zlib import crc32
@@ -25,6 +26,7 @@ from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import changeable_values
+from ..structure import DrawnMember
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
@@ -172,6 +174,22 @@ def fields(state: SessionState, origin: Floats) -> Arrays:
         away = difference(surface, state.variants[state.compared].surface)
         arrays["difference"] = away if whole is None else away[whole.vertex]
     return arrays
+
+
+def member_figures(members: Sequence[DrawnMember]) -> list[dict[str, Any]]:
+    """The least and the largest normal force of each member at rest, as rows of the key figures."""
+    row = {"owner": "member", "dimension": "force"}
+    return [
+        {"quantity": f"{which} N", "of": one.name, "value": value, **row}
+        for one in members
+        for which, value in zip(("least", "largest"), one.forces or (), strict=False)
+    ]
+
+
+def member_ends(members: Sequence[DrawnMember], origin: Floats) -> Arrays:
+    """The straight pieces of members: their ends (k,3), two by two, relative to the origin."""
+    pieces = [np.repeat(one.path - origin, 2, axis=0)[1:-1] for one in members]
+    return {"member_ends": np.concatenate(pieces)} if pieces else {}
 
 
 def families_drawn(state: SessionState) -> Floats:

@@ -22,12 +22,11 @@ from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import Analysis, StructuralModel, write_structure
-from ..structure.members import MemberLine
+from ..structure import Analysis, DrawnMember, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
 from .file import Project
-from .members import member_lines, warn_of_members
+from .members import members_drawn, warn_of_members
 from .outcome import OnStep, Outcome, ignore
 from .settings import check_picture, cost_paths, schedule_paths
 
@@ -82,12 +81,13 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     Scalars of a surface that was not solved are those of its file. LostWarning where files do not hold the
     members of the project.
     """
-    paths, lines = [*map(Path, files)], member_lines(outcome)
-    for holds, held in ((True, lines), (False, ())):
-        if some := [path.name for path in paths if _holds_members(path) == holds]:
+    paths = [*map(Path, files)]
+    members = members_drawn(outcome) if any(map(_holds_members, paths)) else ()
+    for held in (True, False):
+        if some := [path.name for path in paths if _holds_members(path) == held]:
             warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
-        return certified_files(*outcome.shown, paths, outcome.units, colour, lines)
+        return certified_files(*outcome.shown, paths, outcome.units, colour, members)
     data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
@@ -97,7 +97,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         about |= {"scalars": carried, "certificate": None}
     writes = {path: partial(io.write, surface=outcome.shown.surface, **about) for path in paths}
     return [
-        (path, partial(write, members=lines) if _holds_members(path) else write)
+        (path, partial(write, members=members) if _holds_members(path) else write)
         for path, write in writes.items()
     ]
 
@@ -112,10 +112,10 @@ def certified_files(
     files: Iterable[PathLike],
     units: Units,
     colour: str = "",
-    members: Sequence[MemberLine] = (),
+    members: Sequence[DrawnMember] = (),
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, size of the reactions at supports (force), and lines of members."""
+    relative curvature error, size of the reactions at supports (force), and members."""
     scalars: dict[str, Floats] = {
         "mean curvature": mean_curvature(surface),
         "error": curvature_error(surface),

@@ -22,6 +22,7 @@ from .gas import balanced_pressure
 from .loads import Step
 from .member_forces import (
     MemberForces,
+    cable_offers,
     member_tables,
     members_in,
     sentences,
@@ -259,7 +260,8 @@ class Analysis:
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
         members = [self.members.to_string(index=False, float_format="{:.4g}".format)]
-        members = [*members, *sentences(self.model, self.model.units)] if len(self.members) else []
+        about = [*sentences(self.model, self.model.units), *cable_offers(self.model)]
+        members = [*members, *about] if len(self.members) else []
         bars = [column_text(self.model, self.columns, self.model.units)] if len(self.columns) else []
         return "\n".join([*units, numbers, *members, *bars, *self.answers()])
 

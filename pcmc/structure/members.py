@@ -20,7 +20,6 @@ from ..surface import Surface
 from ..surface.curves import Curve
 from ..surface.geometry import segment_lengths
 from ..surface.pieces import point_text, to_space
-from .frames import bar_axes
 from .material import Material
 from .profile import Profile
 
@@ -141,10 +140,6 @@ class MemberLine:
         """(b,2) the ends of its edges, in order."""
         order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
         return np.stack([order[:-1], order[1:]], axis=1)
-
-    def bars(self, surface: Surface) -> tuple[Floats, Floats]:
-        """(b,3,3) rows along each of its edges, across, and upright; (b,) their lengths."""
-        return bar_axes(surface.vertices, self.pairs, np.array(surface.plane.normal))
 
     @property
     def carried(self) -> Ints:

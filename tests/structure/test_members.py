@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 from refusals import refused
+from small_project import HALL_WITH_ARCH
 from starts import spherical_cap
 from structures import FABRIC, model_of, square
 
 import pcmc
 from generators import joined_caps
-from pcmc import Material, SelfWeight, Snow, StructuralModel
+from pcmc import Material, SelfWeight, Snow, StructuralModel, cli
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
@@ -22,6 +23,7 @@ from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, members_at_rest
 from pcmc.structure.member_keys import members_of
+from pcmc.structure.pulls import balancing_force, turns
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 STEEL = Material(2.1e8, density=7.85)
@@ -312,6 +314,46 @@ def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
     assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
     stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
     assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
+
+
+def test_the_lines_that_the_command_offers_give_a_shape_that_does_not_bend(tmp_path, capsys):
+    """What N leaves of the sheets' pull falls below a twentieth: by the project, its lines, and again."""
+
+    def bending(model):
+        if model.beams:
+            return members_at_rest(model)[0].balance[1]
+        [cable], [pulls] = model.standing.cables, [forces_on_members(model, model.steps[0])]
+        [curve] = model.standing.topology.chains(cable.edges, np.zeros(model.surface.n, bool))
+        P = model.standing.vertices[curve.vertices]
+        return balancing_force(P, pulls[curve.vertices] - cable.tension * turns(P, False), False)[1]
+
+    path, shares = tmp_path / "hall.toml", []
+    text = HALL_WITH_ARCH.split("[output]")[0]
+    for _ in range(2):
+        path.write_text(text, encoding="utf-8")
+        assert cli.main(["structure", str(path), "-o", str(tmp_path / "hall.inp")]) == 0
+        printed = capsys.readouterr().out.splitlines()
+        outcome = pcmc.project.designed(path)
+        shares.append(bending(outcome.model(outcome.project.structure)))
+        offered = [line for line in printed if re.match("(wall|cable|name) = ", line)]
+        text = text.replace("wall = 0.6", ", ".join(offered) or "wall = 0.6")
+    assert offered == []  # the second time
+    assert shares[0] > 0.1
+    assert shares[1] < 0.05 * shares[0]
+
+
+def test_a_wall_with_a_tension_that_is_free_along_it_balances_a_line_that_does_not_bend():
+    """On the circle where two spheres meet N κ is the wall's own tension; elsewhere it is another one."""
+    off = []
+    for edge in (1.0, 0.5):
+        caps = joined_caps(edge, exact=True)
+        [beam] = members_at_rest(model_of(caps, members=[Member("wall", TUBE, STEEL)], anyway=True))
+        off.append(np.nanmean(np.abs(beam.wall_tensions - 3.0), axis=0))
+    assert (off[1] < 0.5 * off[0]).all()
+    [beam] = members_at_rest(hall_with())
+    pull, unbent = beam.wall_tensions[1:-1].T
+    assert pull[2:-2] == pytest.approx(0.6, rel=0.05)
+    assert np.ptp(unbent) > 0.1
 
 
 def test_a_cable_in_the_place_of_a_wall_finds_a_shape_that_does_not_bend():

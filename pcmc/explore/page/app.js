@@ -217,6 +217,7 @@ class Page {
     if (!this.swaying || !arrays.mode) {
       this.sway(false);
       this.viewer?.setVertices(arrays.vertices);
+      this.viewer?.setMembers(arrays.member_ends ?? []);
     }
     this.tools?.show(header.values.shown.points);
     if (header.compared !== this.compared) {
