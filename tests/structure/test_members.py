@@ -280,7 +280,7 @@ def test_members_of_a_project_are_refused_in_a_line():
         members({"diameter": 0.1})
     with refused(OptionError, what="area"):
         members({"young": 2.1e8, "area": 0.0, "upright": 1.0})
-    with refused(OptionError, found="depth"):
+    with refused(OptionError, where="depth"):
         members({"young": 2.1e8, "depth": 1.0})
     with refused(OptionError, what="member", found="truss"):
         members(good, member="truss")
