@@ -15,6 +15,7 @@ from .gallery import surfaces
 from .questions import (
     accuracy,
     cloth,
+    curved,
     equilibria_atlas,
     existence,
     margins,
@@ -42,6 +43,7 @@ MODULES = (
     ends,
     stability,
     refinement,
+    curved,
     solvers,
     existence,
     mesh_check,
