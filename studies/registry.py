@@ -14,6 +14,7 @@ from .forces import checks
 from .gallery import surfaces
 from .questions import (
     accuracy,
+    bench,
     cloth,
     curved,
     equilibria_atlas,
@@ -57,6 +58,7 @@ MODULES = (
     checks,
     structure,
     programs,
+    bench,
     verify,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}

@@ -12,6 +12,7 @@ import pandas as pd
 from .examples.flow import NOISE, NOISE_RESIDUAL
 from .folder import Folder, write_bytes
 from .paper import CONDITIONAL, HOLDS, NEAR, NOT, OWN, REPRODUCED, compare, paper, read_measured
+from .questions import bench
 from .words import fill, listed
 
 HEADS = {
@@ -142,6 +143,12 @@ Surface Evolver solves the same mesh of Example 1, and the same cap, in the same
 benchmark` writes this table, and `benchmark/scaling.csv` and `scaling.png`, which show how time and
 memory grow with the number of triangles. Unlike all others here, they differ from run to run."""
 
+BENCH = """\
+The study `bench` takes the same surfaces from the same start to rest through other programs, each asked in
+its own way (see the first lines of `studies/questions/bench.py`). A program not at rest within {limit:.0f} s,
+to a relative residual of {rest:g}, was not asked for finer meshes. `bench/bench.png` shows the times; they
+differ from run to run. What could not run here is left out: Kratos' form finding."""
+
 FAIR_PAIRS = {  # rows of the benchmark: theirs, ours
     "step": ("Newton step, evolver", "Newton step, pardiso"),
     "plain": ("evolver, linear", "height of one mesh"),
@@ -171,8 +178,7 @@ def write_report(results: Path) -> None:
 
 def report(results: Path) -> str:
     """The text of ``REPORT.md``; a section is left out if its study has not run."""
-    comparison = Folder(results).read_table("comparison")
-    figures = Folder(results).read_table("figures")
+    comparison, figures = (Folder(results).read_table(name) for name in ("comparison", "figures"))
     measured = read_measured(results)
     near = {f"near_{claim.ours}": claim.near for claim in paper()[0]}
     header = fill(HEADER, near, {"headline": headline(comparison, figures)})
@@ -185,12 +191,9 @@ def report(results: Path) -> str:
             "",
             given_sentence(comparison),
         ],
-        "Statements": [
-            fill(THRESHOLDS, thresholds(comparison)),
-            "",
-            *table(HEADS["sentence"], comparison_cells(comparison, "sentence")),
-        ],
+        "Statements": [fill(THRESHOLDS, thresholds(comparison)), ""],
     }
+    sections["Statements"] += table(HEADS["sentence"], comparison_cells(comparison, "sentence"))
     if (results / "solvers" / "summary.csv").is_file():
         words = {"saddles": _saddles(results)}
         sections["Solvers"] = [fill(SOLVERS, measured, words), "", *solver_table(results)]
@@ -210,6 +213,9 @@ def report(results: Path) -> str:
         sections["Curved elements"] = fill(CURVED, measured, _ahead(results)).split("\n")
     if (results / "benchmark" / "full.csv").is_file():
         sections["Speed"] = [SPEED, "", *fair_pairs(results), *speed_table(results)]
+    if (results / "bench" / "runs_times.csv").is_file():
+        about = BENCH.format(limit=bench.LIMIT, rest=bench.REST)
+        sections["Beside other programs"] = [about, "", *bench_table(results)]
     parts = ["\n".join([f"## {title}", "", *lines]) for title, lines in sections.items()]
     return "\n\n".join(map(wrapped, "\n\n".join([header, *parts]).split("\n\n"))) + "\n"
 
@@ -400,6 +406,17 @@ def speed_table(results: Path) -> list[str]:
         for line, median in zip(text.itertuples(), rows["median"], strict=True)
     ]
     return table(["What", "Median", "Asked", "Met", ""], cells)
+
+
+def bench_table(results: Path) -> list[str]:
+    """How each program of the bench ended."""
+    runs = Folder(results / "bench").read_table("runs_times").fillna({"said": ""})
+    cells = [
+        [run.case, f"{run.triangles:,}", run.program, f"{run.seconds:.3g}", f"{run.residual:.1e}", run.said]
+        for run in runs.itertuples()
+        if not str(run.said).startswith("not asked")
+    ]
+    return table(["Surface", "Triangles", "Program", "s", "Residual", "It says"], cells)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:

@@ -19,10 +19,19 @@ from ..io import FORMATS, write
 from ..panelling import panel_net
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
-from ..project.settings import Output, Structure, schedule_paths
-from ..project.writing import analysis_jobs, check_outputs, model_job, schedule_jobs, write_all
+from ..project.settings import Output, Structure, cost_paths, schedule_paths
+from ..project.writing import (
+    analysis_jobs,
+    check_outputs,
+    cost_jobs,
+    model_job,
+    schedule_jobs,
+    write_all,
+)
 from ..structure import analyse
 from ..structure.calculix import expect_program
+from ..structure.columns import column_text, columns_at_rest
+from ..structure.member_forces import cable_offers, sentences
 from . import arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -45,12 +54,14 @@ CSV = ".csv"
 FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
+COST = "Cost of a family, as of its mould, and of a panel; adds NAME-costs.csv and .svg. Needs --change."
 PICTURE = "Picture to draw, coloured by family."
 MIRRORED = "alike: of one family; or apart."
 TOLERANCE = (
     "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 )
 HEIGHT = "Section at this height; may be repeated."
+TWO = "two numbers FAMILY,PANEL, 0 or more"
 LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
 TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
@@ -76,6 +87,7 @@ def panels_(
     units: FileUnits = "",
     sheet: SheetFormat = None,
     change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
+    cost: Annotated[str | None, option("FAMILY,PANEL", COST)] = None,
     mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
     walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
@@ -96,7 +108,7 @@ def panels_(
     """
     seen, files = arguments.parsed_view(view), output or []
     if pattern is not None or size is not None:
-        triangles = {"tolerance": tolerance, "change": change, "walls": walls or None}
+        triangles = {"tolerance": tolerance, "change": change, "cost": cost, "walls": walls or None}
         for name in (name for name, value in triangles.items() if value is not None):
             text = f"--{name}: belongs to panels of triangles; leave it out, or --pattern and --size"
             raise OptionError(text, what=f"--{name}")
@@ -110,12 +122,16 @@ def panels_(
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
+    prices = None if cost is None else arguments.numbers(cost, "--cost", TWO)
+    if prices is not None and (len(prices) != 2 or min(prices) < 0.0 or change is None):
+        validate.refuse("--cost", cost, TWO, hint="; it needs --change" if change is None else "")
     outputs = Output(picture=picture, view=seen).paths
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
         outputs += schedule_paths(path) if suffix == CSV else [path]
+        outputs += cost_paths(path) if suffix == CSV and prices is not None else []
     check_outputs(outputs, inputs=files_of(file))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
@@ -136,12 +152,17 @@ def panels_(
         for path in files:
             is_table = path.suffix.lower() == CSV
             works += schedule_jobs(path, schedule) if is_table else [(path, writing)]
+            works += cost_jobs(path, fewer.costs(*prices)) if is_table and prices is not None else []
         if picture is not None:
             works.append((picture, partial(families, schedule, view=seen)))
         written = write_all(works, progress)
     print(schedule.text(roof.units))
     if change is not None:
         print(f"\n{fewer}")
+    if prices is not None:
+        table = fewer.costs(*prices)
+        marked = table.assign(cheapest=table["cheapest"].map({True: "cheapest", False: ""}))
+        print(f"\n{marked.rename(columns={'cheapest': ''}).to_string(index=False, float_format='%.6g')}")
     return reports.ended(schedule.certificate.certified and roof.good, written)
 
 
@@ -284,7 +305,8 @@ def structure(
 
     A project is solved first; its [structure] has the values that no option gives. With --run each case and
     combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv,
-    NAME-members.csv, NAME-member-forces.csv, NAME-cases.png and NAME-member-forces.png come beside the model.
+    NAME-members.csv, NAME-member-forces.csv, NAME-columns.csv, NAME-cases.png and NAME-member-forces.png come
+    beside the model.
     A case that is not carried as a whole ends with the code 1.
 
     \b
@@ -319,6 +341,9 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
+        print(*sentences(model, model.units), *cable_offers(model), sep="\n", end="\n" * bool(model.beams))
+        if model.bars:
+            print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
         return reports.ended(roof.good)
     print(analysis)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from ..surface import Surface, expect_surface
 from . import dxf, views
 from .panel_sheets import flat_panels, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sheet import FORMATS, Sheet, SheetLine, add_frames, table_sheets
+from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, table_sheets
 from .sheet import write_pdf as write_pages
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
@@ -40,13 +40,14 @@ class DrawingSet:
     surface: Surface
     units: str  # of its lengths
     certificate: Certificate  # of the surface
-    curves: Sequence[SheetLine]  # ridges, rims, wall lines and cables
+    curves: Sequence[SheetLine]  # ridges, rims, wall lines, cables and members
     sections: Sequence[SheetLine]  # in which each plane cuts the roof
     points: pd.DataFrame  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable)
     marks: Sequence[tuple[str, Floats]]  # name and place (3,) of each mast or other support of one point
     schedule: Panels | None  # the panels, if a tolerance was given
     flat: Sheet | None  # all panels at true size, mm, where sheets of panels are asked for
     sheets: Sequence[Sheet]  # of paper, in order
+    members: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # section, force, … by name
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
@@ -93,6 +94,7 @@ def drawing_set(
     anyway: bool = False,
     certificate: Certificate | None = None,
     schedule: Panels | None = None,
+    members: Sequence[Any] = (),
 ) -> DrawingSet:
     """Draw a roof: plan, elevations, sections, setting-out points, cables, supports, panels at true size.
 
@@ -114,6 +116,8 @@ def drawing_set(
     name : of the roof, in the title strips.
     anyway : draw a surface that is not certified; every sheet is marked.
     certificate, schedule : of the surface, where they are known; otherwise computed.
+    members : of its structural model, ``structure.drawn_members(model)``: lines in the place of their walls,
+        and a table.
 
     Raises
     ------
@@ -150,14 +154,16 @@ def drawing_set(
     if tolerance is not None and schedule is None:
         options: dict[str, Any] = {"anyway": anyway, "certificate": certificate}
         schedule = panels(surface, tolerance, mirror_images=mirror_images, **options)
-    curves = views.model_curves(surface)
+    replaced = {member.wall for member in members}
+    curves = views.model_curves(surface, replaced)
+    curves += [SheetLine(member.points, MEMBERS, member.closed, member.name) for member in members]
     points = _setting_out(curves)
     at_points = certificate.supports[certificate.supports["kind"] == "point"]
     marks = list(zip(at_points["support"], at_points[[*"xyz"]].to_numpy(), strict=True))
     named = [(at, name, "PCMC-SUPPORT") for name, at in marks]
     setting_out = zip(points["point"], points[[*"xyz"]].to_numpy(), strict=True)
     named += [(at, name, "PCMC-POINT") for name, at in setting_out]
-    levels, profiles = _levels(surface, heights), _profiles(surface, lines)
+    levels, profiles = _levels(surface, heights, replaced), _profiles(surface, lines, replaced)
     drawn: dict[str, list[views.DrawnView]] = {
         "Plan": [views.plan_view(surface, curves, named)],
         "Elevations": views.elevations(surface, curves),
@@ -170,6 +176,9 @@ def drawing_set(
     if len(certificate.cables):
         cables = certificate.cables[["cable", "tension", "length"]]
         tables["Cables"] = cables.rename(columns={"tension": "force"})
+    about = [member.texts(units) for member in members]
+    if about:
+        tables["Members"] = pd.DataFrame(about).fillna("")
     if len(certificate.supports):
         tables["Supports"] = certificate.supports[SUPPORT]
     if schedule is not None:
@@ -186,13 +195,14 @@ def drawing_set(
     part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
     add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
-    return DrawingSet(surface, length, certificate, curves, cut, points, marks, schedule, flat, sheets)
+    listed = (curves, cut, points, marks, schedule, flat, sheets)
+    return DrawingSet(surface, length, certificate, *listed, {texts["member"]: texts for texts in about})
 
 
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
     rows: dict[int, list[Any]] = {}
-    open_ended = [c for c in curves if not (c.closed or c.layer == "PCMC-CABLE")]
+    open_ended = [c for c in curves if not (c.closed or c.layer in ("PCMC-CABLE", MEMBERS))]
     ends = [(c, k) for c in open_ended for k in (0, -1)]
     along = [(c, k) for c in curves for k in range(len(c.vertices))]
     for c, k in [*ends, *along]:
@@ -201,12 +211,17 @@ def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:
     return pd.DataFrame(rows.values(), columns=["point", *"xyz", "on"])
 
 
-def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[SheetLine]]]:
+def _levels(
+    surface: Surface, heights: Sequence[float] | None, without: Collection[str]
+) -> list[tuple[float, list[SheetLine]]]:
     """Each height with the lines of its section."""
     low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
     given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
     chosen = [validate.number("heights", height) for height in given]
-    cuts = [(h, views.cut_lines(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
+    cuts = [
+        (h, views.cut_lines(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]), without))
+        for h in chosen
+    ]
     for h, found in cuts:
         if not found and heights is not None:
             text = f"heights: z = {h:g} misses the roof, which lies between {low:g} and {high:g}"
@@ -215,7 +230,7 @@ def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[flo
 
 
 def _profiles(
-    surface: Surface, lines: Sequence[Ends] | None
+    surface: Surface, lines: Sequence[Ends] | None, without: Collection[str]
 ) -> list[tuple[views.DrawnView, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
     if lines is None:
@@ -230,7 +245,9 @@ def _profiles(
         if not (np.isfinite(ends).all() and length > 0.0):
             validate.refuse("lines", line, "two different points (x, y)")
         along /= length
-        found = views.cut_lines(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
+        found = views.cut_lines(
+            surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]), without
+        )
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
         if not found:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)

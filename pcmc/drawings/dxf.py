@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.libraries import load_library
 from ..base.units import TABLE, length_factor
-from .sheet import LAYERS, SMALL, Sheet
+from .sheet import LAYERS, MEMBERS, SMALL, Sheet
 
 VERSION = "R2018"
 MODEL_TEXT = 0.004  # height of letters in the model, in its size
@@ -23,8 +23,8 @@ def document(drawings: Any) -> Any:
     """The model of a ``DrawingSet``, in its unit, and a layout per sheet, in mm, with its title as name.
 
     The model has ridges, rims, wall lines, cables and sections as polylines with the names of their patches
-    or cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports of one point; beside the
-    roof the panels flat at true size.
+    or cable (XDATA of "PCMC"), members on layers of their own, with section and force, panels as 3D faces,
+    setting-out points and supports of one point; beside the roof the panels flat at true size.
     """
     doc = load_library("ezdxf", "cad").new(VERSION)
     units = drawings.units
@@ -55,11 +55,20 @@ def layout_name(title: str, taken: set[str]) -> str:
     >>> [layout_name(title, taken) for title in ("Plan", "Panels 1 to 9 at true size, outside up", "Plan")]
     ['Plan', 'Panels 1 to 9', 'Plan 2']
     """
-    short = re.sub(r'[<>/\\":;?*|,=`\']', " ", re.split(" at true size|:", title)[0])[:200].strip()
+    short = layer_name(re.split(" at true size|:", title)[0])
     names = (short if k == 1 else f"{short} {k}" for k in range(1, len(taken) + 2))
     name = next(name for name in names if name.lower() not in taken)
     taken.add(name.lower())
     return name
+
+
+def layer_name(text: str) -> str:
+    """The text without the signs that names in a DXF file cannot have.
+
+    >>> layer_name("wall: 1/2")
+    'wall  1 2'
+    """
+    return re.sub(r'[<>/\\":;?*|,=`\']', " ", text)[:200].strip()
 
 
 def _add_model(space: Any, model: Any) -> None:
@@ -68,9 +77,14 @@ def _add_model(space: Any, model: Any) -> None:
     for corners in surface.vertices[surface.faces[roof]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
     for line in (*model.curves, *model.sections):
-        look = {"layer": line.layer}
-        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs=look)
-        entity.set_xdata("PCMC", [(1000, line.name[:250])])
+        layer, about = line.layer, model.members.get(line.name, {}) if line.layer == MEMBERS else {}
+        if about:  # a layer of its own, like that of all members
+            layer = layer_name(f"{MEMBERS}-{line.name}")
+            if layer not in space.doc.layers:
+                space.doc.layers.add(layer, color=LAYERS[MEMBERS].color, lineweight=LAYERS[MEMBERS].weight)
+        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs={"layer": layer})
+        texts = [line.name, *(f"{key}: {text}" for key, text in about.items() if key != "member")]
+        entity.set_xdata("PCMC", [(1000, text[:250]) for text in texts])
     height = MODEL_TEXT * surface.size
     rows = model.points[["point", *"xyz"]].to_numpy().tolist()
     labels = [(name, at, "PCMC-POINT") for name, *at in rows]

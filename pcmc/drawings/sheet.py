@@ -36,11 +36,13 @@ class SheetLayer(NamedTuple):
     about: str  # what it holds
 
 
+MEMBERS = "PCMC-MEMBER"
 LAYERS = {
     "PCMC-RIDGE": SheetLayer(1, 50, "junctions of the roof: ridges and valleys"),
     "PCMC-RIM": SheetLayer(7, 50, "rims of the roof"),
     "PCMC-WALL": SheetLayer(3, 35, "bottoms and ends of walls"),
     "PCMC-CABLE": SheetLayer(6, 70, "cables"),
+    MEMBERS: SheetLayer(30, 70, "members of the structural model"),
     "PCMC-PANEL": SheetLayer(8, 13, "edges of panels"),
     "PCMC-SECTION": SheetLayer(5, 50, "sections of the roof"),
     "PCMC-SECTION-WALL": SheetLayer(3, 35, "sections of walls"),
@@ -242,7 +244,7 @@ def table_sheets(
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 CAPITAL = 0.73  # height of a capital in the size of its font
-COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 8: "#909090"}
+COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 8: "#909090", 30: "#E07000"}
 
 
 def register_fonts() -> None:

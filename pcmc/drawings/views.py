@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -16,6 +16,7 @@ from ..surface.geometry import area_vectors
 from ..surface.sections import curves_by_kind, section
 from .sheet import (
     FORMATS,
+    MEMBERS,
     SCALES,
     SMALL,
     TINY,
@@ -60,12 +61,13 @@ class DrawnView:
         return every.min(axis=0), every.max(axis=0)
 
 
-def model_curves(surface: Surface) -> list[SheetLine]:
-    """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone; cables."""
+def model_curves(surface: Surface, without: Collection[str] = ()) -> list[SheetLine]:
+    """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone, but for those
+    ``without``; cables."""
     names = [patch.name for patch in surface.patches]
     found = [
         (f"PCMC-{kind}", curve, " | ".join(dict.fromkeys(names[k] for k in curve.sheets)))
-        for kind, curve in curves_by_kind(surface)
+        for kind, curve in curves_by_kind(surface, without)
     ]
     nowhere = np.zeros(surface.n, dtype=bool)
     for cable in surface.cables:
@@ -92,12 +94,15 @@ def outline_places(curves: Lines, axis: Sequence[float]) -> Floats:
     return np.concatenate(places) if places else np.empty(0)
 
 
-def cut_lines(surface: Surface, point: Floats, normal: Floats) -> list[SheetLine]:
-    """The lines in which a plane cuts the roof and its walls."""
+def cut_lines(
+    surface: Surface, point: Floats, normal: Floats, without: Collection[str] = ()
+) -> list[SheetLine]:
+    """The lines in which a plane cuts the roof and its walls, but for those ``without``."""
     layers = ["PCMC-SECTION" if roof else "PCMC-SECTION-WALL" for roof in surface.roof]
     return [
         SheetLine(one.points, layers[one.patch], one.closed, surface.patches[one.patch].name)
         for one in section(surface, point, normal)
+        if surface.patches[one.patch].name not in without
     ]
 
 
@@ -109,12 +114,12 @@ def _seen(title: str, surface: Surface, curves: Lines, axes: Floats, faces: Bool
 
 
 def plan_view(surface: Surface, curves: Lines, points: Sequence[tuple[Floats, str, str]]) -> DrawnView:
-    """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
+    """From above: panels, curves with names of cables and members, points, places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
     middle = 0.5 * np.sum(view.box, axis=0)
     for curve in curves:
-        if curve.layer == "PCMC-CABLE":
+        if curve.layer in ("PCMC-CABLE", MEMBERS):
             at = curve.points[len(curve.points) // 2, :2]
             away = at - middle
             view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))

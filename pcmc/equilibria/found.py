@@ -103,6 +103,13 @@ class Equilibria:
     def __len__(self) -> int:
         return len(self.found)
 
+    @cached_property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """All that can be shown: the equilibria by number, then the points of the branches in turn."""
+        branches = (branch for line in self.lines for branch in self.branches[line.name])
+        on_branches = (branch.surfaces[row] for branch in branches for row in sorted(branch.surfaces))
+        return (*(one.surface for one in self.found), *on_branches)
+
     def __getitem__(self, number: int) -> FoundEquilibrium:
         """The equilibrium of a number, from 1."""
         validate.integer("number", number, least=1, most=len(self.found))

@@ -293,19 +293,23 @@ class _Search:
     def descend(self, number: int) -> None:
         """The ways down from a saddle, on both sides of each unstable mode that is known."""
         one = self.found[number]
+        ends = list[str]()
         for mode in one.certificate.modes[: one.index]:
             self.tell(f"going down from equilibrium {number + 1}")
             for side in (mode, -mode):
                 surface, status = way_down(one.surface, side)
                 if status is Status.STOPPED:
                     raise KeyboardInterrupt
-                rests = status is Status.CONVERGED
-                to = (
-                    self.add(with_good_triangles(surface), "on the way down from a saddle") if rests else None
-                )
+                to = None
+                if status is Status.CONVERGED:
+                    to = self.add(with_good_triangles(surface), "on the way down from a saddle")
+                end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
+                ends.append(end)
                 if one.index == 1:
-                    end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
                     self.ways.append(WayDown(number, to, end))
+        if one.index > 1 and any(ends):
+            lost = ", ".join(f"{end} ({ends.count(end)})" for end in sorted({*ends} - {""}))
+            self.failed.append(f"The {len(ends)} ways down from a saddle of index {one.index}: {lost}.")
 
     def deflate(self, number: int) -> None:
         """Deflated Newton from starts around an equilibrium."""

@@ -346,6 +346,7 @@ ACTS: dict[str, dict[str, Check]] = {
     "keep": {"name": variant_name},
     "forget": NUMBER,
     "recall": NUMBER,
+    "visit": NUMBER,
     "compare": {"number?": or_null(whole)},
     **{act: {} for act in ("stabilise", "remesh", "undo", "redo", "reset", "stop", "state")},
 }
@@ -353,6 +354,7 @@ ACTS: dict[str, dict[str, Check]] = {
 REQUESTS: dict[str, dict[str, Check]] = ACTS | {
     "open": {"session?": or_null(name)},
     "margin": {"what": name},
+    "equilibria": {"what": name},
     "save": {"name": name, "replace?": truth},
     **{act: {} for act in ("check", "verify", "families", "news")},
 }

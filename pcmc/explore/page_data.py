@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import count
 from typing import Any
 from zlib import crc32
 
@@ -18,10 +20,13 @@ from ..certificate.forces import Forces
 from ..certificate.quantities import dimension_of
 from ..design import Parameter, Target
 from ..design.targets import MEASURES, NAMED
+from ..equilibria import Equilibria
+from ..equilibria.found import INCOMPLETE
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import changeable_values
+from ..structure import DrawnMember
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
@@ -171,6 +176,22 @@ def fields(state: SessionState, origin: Floats) -> Arrays:
     return arrays
 
 
+def member_figures(members: Sequence[DrawnMember]) -> list[dict[str, Any]]:
+    """The least and the largest normal force of each member at rest, as rows of the key figures."""
+    row = {"owner": "member", "dimension": "force"}
+    return [
+        {"quantity": f"{which} N", "of": one.name, "value": value, **row}
+        for one in members
+        for which, value in zip(("least", "largest"), one.forces or (), strict=False)
+    ]
+
+
+def member_ends(members: Sequence[DrawnMember], origin: Floats) -> Arrays:
+    """The straight pieces of members: their ends (k,3), two by two, relative to the origin."""
+    pieces = [np.repeat(one.path - origin, 2, axis=0)[1:-1] for one in members]
+    return {"member_ends": np.concatenate(pieces)} if pieces else {}
+
+
 def families_drawn(state: SessionState) -> Floats:
     """``family_of_face`` of the surface that is drawn. It takes longer than an answer to a slider."""
     return family_of_face(drawn(state.surface))
@@ -200,6 +221,25 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     return {
         "targets": [{**vars(target), "label": target.label} for target in targets],
         "vary": [{"label": parameter.label, "parameter": vars(parameter)} for parameter in vary],
+    }
+
+
+def diagram(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
+    """The branches and equilibria of a search, each point with the number of its surface, and in words."""
+    numbers, branches = count(len(found)), []
+    (line,) = found.lines
+    for branch in found.branches[line.name]:
+        shown = branch.points.loc[sorted(branch.surfaces)]
+        columns = {name: shown[name].tolist() for name in ("parameter", "height", "index")}
+        branches.append(columns | {"number": [next(numbers) for _ in range(len(shown))]})
+    rows = found.table[["height", "index", "energy"]].to_dict(orient="records")
+    words = [text for text in found.text(units).splitlines() if text.startswith("barrier")]
+    return {
+        "parameter": line.name,
+        "value": line.value,
+        "branches": branches,
+        "equilibria": [row | {"number": k} for k, row in enumerate(rows)],
+        "words": [*words, *found.failed, INCOMPLETE],
     }
 
 

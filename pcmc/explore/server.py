@@ -17,7 +17,7 @@ from typing import Any
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
 from ..project import load
-from ..project.members import members_left_out
+from ..project.members import has_members, members_drawn
 from ..project.writing import certified_files
 from ..surface import Surface
 from . import page_data
@@ -26,6 +26,7 @@ from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, chec
 from .roof import ShownRoof, Watch, save, signature
 from .session import Session, SessionState, solved_start
 
+LEFT_OUT = "members are left out: they are known for a part of the roof alone"
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 POLL = 0.1  # seconds after which the server sees that it shall end
@@ -108,22 +109,25 @@ class Explorer:
         state = getattr(session, act)(*values, **options)
         if state.superseded:  # newer values have arrived meanwhile
             return pack({"superseded": True})
-        about = page_data.state_data(state, self.origin, moving=act == "follow")
-        return pack({"superseded": False, **about}, page_data.fields(state, self.origin))
+        about, arrays = self._shown(state, moving=act == "follow")
+        return pack({"superseded": False, **about}, arrays)
 
     def _question(self, session: Session, act: str, given: dict[str, Any], gone: Stop) -> Answer | None:
         """What is asked about the surface shown; None if the page shows another one before it is found."""
         units = self.roof.outcome.units
         match act:
             case "check":
-                check = session.check_mesh(gone)
+                check = session.check_mesh(gone, self.roof.project)
                 return None if check is None else ({"check": page_data.mesh_findings(check, units)}, {})
             case "margin":
-                margin = session.margin(**given, gone=gone)
+                margin = session.margin(**given, gone=gone, project=self.roof.project)
                 if margin is None:
                     return None
                 there = page_data.drawn(margin.surface).vertices - self.origin
                 return {"margin": margin.text(units)}, {"vertices": there}
+            case "equilibria":
+                found = session.equilibria(**given, gone=gone)
+                return None if found is None else (page_data.diagram(found, units), {})
             case "verify":
                 theorem = session.verify()
                 return {"badge": theorem.brief(units), "text": theorem.text(units)}, {}
@@ -139,13 +143,15 @@ class Explorer:
         """A state with what the page learns once: the mesh, the file and what may be asked."""
         roof, origin = self.roof, self.origin
         about, arrays = page_data.outline(state.surface, origin)
+        header, fields = self._shown(state)
+        left_out = LEFT_OUT if has_members(roof.outcome) and "member_ends" not in fields else ""
         once = {
             "session": name,
             "formats": list(FORMATS),
             "title": roof.title,
             "name": roof.name,
             "units": page_data.unit_texts(roof.outcome.units),
-            "note": "; ".join(filter(None, (roof.note, members_left_out(roof.outcome)))),
+            "note": "; ".join(filter(None, (roof.note, left_out))),
             "note_met": roof.outcome.result is not None and roof.outcome.good,
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",
@@ -155,7 +161,17 @@ class Explorer:
             "version": self.version,
             "superseded": False,
         }
-        return about | once | page_data.state_data(state, origin), arrays | page_data.fields(state, origin)
+        return about | once | header, arrays | fields
+
+    def _shown(self, state: SessionState, moving: bool = False) -> Answer:
+        """A state, with the members of the project where its values do not move."""
+        about, arrays = page_data.state_data(state, self.origin, moving), page_data.fields(state, self.origin)
+        outcome = self.roof.outcome
+        if not moving and has_members(outcome) and page_data.whole_of(state.surface) is None:
+            members = members_drawn(outcome, state.surface, state.certificate)
+            about["figures"] += page_data.member_figures(members)
+            arrays |= page_data.member_ends(members, self.origin)
+        return about, arrays
 
     def save(self, session: Session, name: str, replace: bool = False) -> dict[str, Any]:
         """Save the surface of a session as a project beside the file that was opened."""

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial, wraps
+from functools import cached_property, partial
 from itertools import count
 from typing import Any, TypeVar
 
@@ -22,12 +22,15 @@ from ..certificate import Certificate, certify
 from ..certificate.quantities import figures
 from ..certificate.theorem import Theorem, verify
 from ..design import Parameter, Target, meet
+from ..equilibria import Equilibria, find_equilibria
 from ..meshing.remeshing import remesh
+from ..project.file import Project
+from ..project.outcome import plan_corners
 from ..project.values import changeable_values
 from ..solvers import solve, solve_once
-from ..solvers.result import Callback, Progress
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from .acts import act
 from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
@@ -39,6 +42,7 @@ MOST_BYTES = 64_000_000  # of vertices in these steps
 MOST_VARIANTS = 20
 
 Found = TypeVar("Found")
+Check = Callable[[object], None]  # raises StopIteration once the page shows another surface
 Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
@@ -127,45 +131,6 @@ class SessionState:
         return self.variants[number]
 
 
-def act(
-    moves: bool = False, ends: bool = False
-) -> Callable[[Callable[..., SessionState]], Callable[..., SessionState]]:
-    """A method that makes a state of the present one, done after the acts before it.
-
-    One that ``moves``, or ``ends`` moves, ends those before it: their ``stop`` becomes true.
-    """
-
-    def made(method: Callable[..., SessionState]) -> Callable[..., SessionState]:
-        @wraps(method)
-        def run(self: Session, *given: Any, **named: Any) -> SessionState:
-            with self.order:
-                mine = self.arrived
-                self.arrived += 1
-                if moves or ends:
-                    self.newest = mine
-                self.order.wait_for(lambda: self.served == mine)
-
-            def late() -> bool:
-                return moves and self.newest > mine
-
-            try:
-                with self.turn if moves else nullcontext():
-                    fresh: dict[str, Any] = {"message": "", "met": False, "note": "", "superseded": False}
-                    before = replace(self.now, number=self.now.number + 1, **fresh)
-                    self.now = before if late() else method(self, before, late, *given, **named)
-                    if late():
-                        self.now = replace(self.now, wanted=before.wanted, superseded=True)
-                    return self.now
-            finally:
-                with self.order:
-                    self.served += 1
-                    self.order.notify_all()
-
-        return run
-
-    return made
-
-
 def solved_start(surface: Surface) -> SessionState:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
     certificate = certify(surface)
@@ -194,7 +159,8 @@ class Session:
     units: Units = NO_UNITS
     fallback: ProjectFallback = field(default_factory=ProjectFallback)  # of the project behind the surface
     checks: AbstractContextManager[Any] = field(default_factory=nullcontext)  # held by each mesh check
-    progress: str = ""  # of the search for targets
+    progress: str = ""  # of the search for targets or equilibria
+    found: Equilibria | None = None  # by the last search
 
     def __post_init__(self) -> None:
         self.order = threading.Condition()
@@ -315,6 +281,14 @@ class Session:
         """Show a variant again, as a new step."""
         return state.showing(state.variant(number).surface).stepped()
 
+    @act(ends=True)
+    def visit(self, state: SessionState, stop: Stop, number: int) -> SessionState:
+        """Show one of the surfaces of the last search, at its own values, as a new step."""
+        surfaces = self.found.surfaces if self.found is not None else ()
+        if not 0 <= number < len(surfaces):
+            raise OptionError(f"no search has found a surface {number + 1}", what="number", found=number)
+        return state.showing(surfaces[number]).stepped()
+
     @act()
     def compare(self, state: SessionState, stop: Stop, number: int | None = None) -> SessionState:
         """Compare the surface shown with a variant, or with none."""
@@ -357,23 +331,48 @@ class Session:
         """Return to the start, as a new step."""
         return state.showing(self.start.surface).stepped()
 
-    def check_mesh(self, gone: Stop = lambda: False) -> MeshCheck | None:
-        """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
-        return self._look(lambda shown, check: check_mesh(shown, callback=check), gone)
+    def check_mesh(self, gone: Stop = lambda: False, project: Project | None = None) -> MeshCheck | None:
+        """The mesh check of the surface shown, with the corners of a project's plan; None if the page shows
+        another one, or is closed, before."""
 
-    def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
-        """How far the surface shown is from the edge; None as for ``check_mesh``."""
-        return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
+        def look(shown: Surface, check: Check) -> MeshCheck:
+            return check_mesh(shown, corners=plan_corners(project, shown), callback=check)
+
+        return self._look(look, gone)
+
+    def margin(self, what: str, gone: Stop = lambda: False, project: Project | None = None) -> Margin | None:
+        """How far the surface shown is from the edge; None and corners as for ``check_mesh``."""
+
+        def look(shown: Surface, check: Check) -> Margin:
+            return margin(shown, what, corners=plan_corners(project, shown), callback=check)
+
+        return self._look(look, gone)
+
+    def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
+        """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
+
+        def search(shown: Surface, check: Check) -> Equilibria:
+            def tell(step: str) -> None:
+                self.progress = step
+                check(step)
+
+            return find_equilibria(shown, what, callback=tell)
+
+        found = self._look(search, gone)
+        if found is None or found.stopped:
+            return None
+        self.found = found
+        return found
 
     def verify(self) -> Theorem:
         """What is proved of the surface shown."""
         with self.checks:
             return verify(self.surface)
 
-    def _look(self, at: Callable[[Surface, Callback], Found], gone: Stop) -> Found | None:
+    def _look(self, at: Callable[[Surface, Check], Found], gone: Stop) -> Found | None:
         shown = self.surface
 
-        def check(_: Progress) -> None:
+        def check(_: object) -> None:
             if self.surface is not shown or gone():
                 raise StopIteration
 
@@ -382,3 +381,5 @@ class Session:
                 return at(shown, check)
             except KeyboardInterrupt:
                 return None
+            finally:
+                self.progress = ""

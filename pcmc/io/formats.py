@@ -59,7 +59,7 @@ class Content:
     walls: str | None  # the text of ``encode_walls``
     units: Units
     bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
-    members: Sequence[Any]  # the lines of members, as ``StructuralModel.lines`` has them
+    members: Sequence[Any]  # as ``structure.drawn_members`` has them
 
 
 PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"
@@ -103,7 +103,7 @@ FORMATS = {
     ".glb": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
     ".gltf": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
     ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False, loses=("order",)),
-    ".3dm": Format("rhino", separate=True, own=("cables",), loses=("order",)),
+    ".3dm": Format("rhino", separate=True, members=True, own=("cables",), loses=("order",)),
     ".ifc": Format("ifc", certificate=True, separate=True, members=True, loses=("order",)),
 }
 """The formats by suffix."""

@@ -2,7 +2,8 @@
 
 The parts of an IfcRoof are an IfcSlab of type ROOF for each patch and an IfcWall for each wall, as
 IfcTriangulatedFaceSet, and an IfcTendon for each cable. Members of a structural model are an IfcMember in the
-place of a wall, which is an IfcVirtualElement then, and an IfcBeam along an edge, with profile and material.
+place of a wall, which is an IfcVirtualElement then, an IfcBeam along an edge, an IfcColumn, or an IfcTendon
+where they are cables and stays, with profile and material.
 pcmc reads ``Pcmc_Surface`` back. The same surface gives the same bytes: the content makes the identifiers,
 and the time stamp is always the same.
 """
@@ -77,7 +78,7 @@ class _Model:
         import ifcopenshell
 
         self.surface, self.units = surface, units
-        self.replaced = {line.wall for line in content.members}
+        self.replaced = {member.wall for member in content.members}
         self.file: Any = ifcopenshell.file(schema="IFC4")
         self.add = self.file.create_entity
         digest = hashlib.sha256(content.metadata.encode())
@@ -167,7 +168,7 @@ class _Model:
     def add_cable(self, cable: Cable, place: Any) -> Any:
         """The tendon of a cable: its axis as polylines, and its force."""
         chains = self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool))
-        lines = [self.polyline(chain.vertices, chain.closed) for chain in chains]
+        lines = [self.polyline(self.surface.vertices[c.vertices], c.closed) for c in chains]
         pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
         about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
         shape = self.axis, "Curve3D", lines
@@ -179,7 +180,7 @@ class _Model:
     def add_member(self, line: Any, place: Any) -> Any:
         """A member: a disk swept along its line, or a rectangle along each edge; its profile and material."""
         member, profile, sizes = line.member, line.member.profile, line.member.profile.sizes
-        axis = self.polyline(line.vertices, line.closed)
+        axis = self.polyline(line.points, line.closed)
         about = {"ProfileType": "AREA", "ProfileName": profile.label}
         if profile.shape == "rectangle":
             section = self.add("IfcRectangleProfileDef", XDim=sizes[0], YDim=sizes[1], **about)
@@ -194,7 +195,9 @@ class _Model:
             shape = self.body, "AdvancedSweptSolid", [swept]
         else:  # an area and second moments alone have no shape
             section, shape = self.add("IfcProfileDef", **about), (self.axis, "Curve3D", [axis])
-        kind, use = ("IfcMember", "MEMBER") if line.wall else ("IfcBeam", "BEAM")
+        kind = {"column": "IfcColumn", "stay": "IfcTendon", "cable": "IfcTendon"}.get(line.kind, "IfcBeam")
+        kind = "IfcMember" if line.wall and kind == "IfcBeam" else kind
+        use = "NOTDEFINED" if kind == "IfcTendon" else kind.removeprefix("Ifc").upper()
         element = self.element(kind, f"member {line.name}", line.name, place, shape, PredefinedType=use)
         material = self.add("IfcMaterial", Name=f"material of {line.name}")
         of_profile = self.add("IfcMaterialProfile", Name=line.name, Material=material, Profile=section)
@@ -204,7 +207,7 @@ class _Model:
         self.rooted("IfcRelAssociatesMaterial", f"member {line.name} material", **ends)
         stress = "IfcPlanarForceMeasure" if self.units.force else "IfcReal"
         values = {
-            "Kind": ("IfcLabel", member.kind),
+            "Kind": ("IfcLabel", line.kind),
             "Area": ("IfcAreaMeasure", profile.area * length_factor(self.units.length, "m") ** 2),
             "SecondMomentUpright": ("IfcReal", profile.moments[0]),
             "SecondMomentAcross": ("IfcReal", profile.moments[1]),
@@ -212,14 +215,18 @@ class _Model:
             "PoissonsRatio": ("IfcReal", member.material.poisson),
             "MassDensity": ("IfcReal", member.material.density),
         }
+        for key, value in zip(("LeastForceAtRest", "LargestForceAtRest"), line.forces or (), strict=False):
+            values[key] = "IfcForceMeasure" if self.units.force else "IfcReal", value
         self.add_properties("Pcmc_Member", element, values, line.name)
         return element
 
     def extruded(self, line: Any, section: Any) -> list[Any]:
         """A section along each edge of a line, its width across, its height in the upright plane."""
         solids = []
-        for start, (along, across, _), length in zip(line.pairs[:, 0], *line.bars(self.surface), strict=True):
-            position = self.axes(self.surface.vertices[start] - self.middle)
+        for start, (along, across, _), length in zip(
+            *line.segments(np.array(self.surface.plane.normal)), strict=True
+        ):
+            position = self.axes(start - self.middle)
             for name, direction in (("Axis", along), ("RefDirection", across)):
                 setattr(position, name, self.add("IfcDirection", DirectionRatios=direction.tolist()))
             up = self.add("IfcDirection", DirectionRatios=(0.0, 0.0, 1.0))
@@ -227,9 +234,9 @@ class _Model:
             solids.append(self.add("IfcExtrudedAreaSolid", SweptArea=section, **about))
         return solids
 
-    def polyline(self, vertices: Ints, closed: bool) -> Any:
-        """A line through vertices of the surface."""
-        points = (self.surface.vertices[vertices] - self.middle).tolist()
+    def polyline(self, places: Floats, closed: bool) -> Any:
+        """A line through points (k,3)."""
+        points = (places - self.middle).tolist()
         entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
         return self.add("IfcPolyline", Points=entities + entities[:1] * closed)
 

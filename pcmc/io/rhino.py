@@ -1,12 +1,15 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
 Metadata are the layers' user text; supports are point clouds on the layers "fixed" and "sliding". Each cable
-is polylines on a layer "cable NAME". Ridges, rims and wall lines are curves, which reading leaves out.
+is polylines on a layer "cable NAME", each member of a structural model on one "member NAME", with section
+and force as user text; the layer of a wall in whose place it is, is hidden. Ridges, rims and wall lines are
+curves. Reading leaves out these curves and the members.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -28,11 +31,12 @@ from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_
 from .metadata import WALLS, Metadata, parse_metadata, patch_meshes
 from .polygons import cut_polygons
 
-KEY, CABLE, NAME = "pcmc", "pcmc cable", "pcmc name"
+KEY, CABLE, NAME, MEMBER = "pcmc", "pcmc cable", "pcmc name", "pcmc member"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
 CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL": (0, 128, 0, 255)}
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255), "cable": (128, 0, 128, 255)}
+ORANGE = (224, 112, 0, 255)  # of members
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
@@ -40,9 +44,11 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
     model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[content.units.length or UNIT].rhino)
+    replaced = {member.wall for member in content.members}
     for k, color, used, faces in patch_meshes(surface):
         rgba = (*(round(255 * float(c)) for c in color), 255)
         attributes = _layer(rhino, model, surface.patches[k].name, rgba, content.metadata)
+        model.Layers[attributes.LayerIndex].Visible = surface.patches[k].name not in replaced
         mesh = rhino.Mesh()
         mesh.Vertices.UseDoublePrecisionVertices = True
         for point in surface.vertices[used].tolist():  # the library takes them one by one
@@ -61,15 +67,22 @@ def write(path: Path, surface: Surface, content: Content) -> None:
             for point in held.tolist():
                 cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], content.metadata))
-    _add_curves(rhino, model, surface)
+    _add_curves(rhino, model, surface, replaced)
+    for member in content.members:
+        attributes = _layer(rhino, model, f"member {member.name}", ORANGE)
+        model.Layers[attributes.LayerIndex].SetUserString(MEMBER, member.kind)
+        for key, text in member.texts(content.units).items():
+            attributes.SetUserString(key, text)
+        _add_line(rhino, model, member.points, member.closed, attributes)
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
 
 
-def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
-    """Ridges, rims, wall lines and cables as polylines, each kind and each cable on its layer."""
+def _add_curves(rhino: Any, model: Any, surface: Surface, replaced: Collection[str]) -> None:
+    """Ridges, rims, wall lines and cables as polylines, each kind and each cable on its layer; none of walls
+    that are ``replaced``."""
     layers: dict[str, Any] = {}
-    curves = [(f"PCMC-{kind}", curve, "") for kind, curve in curves_by_kind(surface)]
+    curves = [(f"PCMC-{kind}", curve, "") for kind, curve in curves_by_kind(surface, replaced)]
     free = np.zeros(surface.n, dtype=bool)
     for cable in surface.cables:
         named, weight = f"cable {cable.name}", [cable.weight] * bool(cable.weight)
@@ -78,11 +91,15 @@ def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
     for name, curve, cable_text in curves:
         if name not in layers:
             layers[name] = _layer(rhino, model, name, CURVES.get(name, COLORS["cable"]), "", cable_text)
-        points = surface.vertices[curve.vertices].tolist()
-        line = rhino.Polyline(len(points) + 1)
-        for point in points + points[:1] * curve.closed:
-            line.Add(*point)
-        model.Objects.AddPolyline(line, layers[name])
+        _add_line(rhino, model, surface.vertices[curve.vertices], curve.closed, layers[name])
+
+
+def _add_line(rhino: Any, model: Any, points: Floats, closed: bool, attributes: Any) -> None:
+    """A polyline through points (k,3)."""
+    line = rhino.Polyline(len(points) + 1)
+    for point in points.tolist() + points[:1].tolist() * closed:
+        line.Add(*point)
+    model.Objects.AddPolyline(line, attributes)
 
 
 def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str = "", cable: str = "") -> Any:
@@ -130,7 +147,7 @@ def read(path: Path) -> MeshData:
             held[HELD[name]].append(item["points"])
         elif "line" in item and CABLE in texts:
             cables.setdefault(texts[CABLE], []).extend(pairwise(item["line"].tolist()))
-        elif name not in CURVES:
+        elif name not in CURVES and MEMBER not in texts:
             others += 1
     if not X:
         text = f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino"

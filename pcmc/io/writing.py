@@ -49,7 +49,7 @@ def write(
     units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units``; the file names them.
         To .glb and .gltf, which are in metres, the surface is converted (scalars are not). Without a unit the
         numbers stay, and .3dm, .ifc and .usda files are in metres.
-    members : the lines of members of its structural model, ``StructuralModel.lines``, for .ifc.
+    members : of its structural model, ``structure.drawn_members(model)``, for .ifc and .3dm.
 
     Warns
     -----

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csr_array, eye_array
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
-from ..surface.geometry import area_vectors
+from ..surface.geometry import area_vectors, vertex_sums
 
 LEAST_POINTS = 18  # around a vertex, to fit the nine coefficients of a cubic
 MOST_RINGS = 4  # of neighbours that are taken together
@@ -70,10 +70,7 @@ def shape_operators(X: Floats, F: Ints) -> Floats:
         if few.any():
             pick = csr_array((few.astype(float), (np.arange(n), np.arange(n))), shape=(n, n))
             rings = csr_array(rings + pick @ rings @ near)
-    normal = np.zeros_like(X)
-    areas = area_vectors(X[F])
-    for k in range(3):
-        np.add.at(normal, F[:, k], areas)
+    normal = vertex_sums(area_vectors(X[F]), F, n)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     return np.asarray(_fitted(X, normal, rings.indptr.astype(np.int64), rings.indices.astype(np.int64)))
 

@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
@@ -49,11 +50,30 @@ class FewerFamilies:
     change: float  # the largest distance of a panel's corner from the shape before, length
     moved: float  # the largest motion of a panel's corner, along the shape for the most part, length
     rounds: int  # how many were made
+    steps: (
+        pd.DataFrame
+    )  # on the way, the ``families`` and ``change`` that no other had both fewer and less of
 
     @property
     def surface(self) -> Surface:
         """The surface after."""
         return self.after.surface
+
+    def costs(self, family: float, panel: float = 0.0) -> pd.DataFrame:
+        """The ``steps`` with their ``cost``, from that of a family, as of its mould, and of a panel.
+
+        ``cheapest`` is True in one row. With the ``change`` of a row as its limit the search keeps to it.
+
+        >>> from generators import two_squares
+        >>> from pcmc.solvers import solve
+        >>> fewer = fewer_families(solve(two_squares(4, alpha_aux=1.0)).surface, 0.02, change=0.05)
+        >>> table = fewer.costs(100.0, 20.0)
+        >>> bool((table["cost"] == 100 * table["families"] + 20 * len(fewer.after.panels)).all())
+        True
+        """
+        family, panel = (validate.number(*one, least=0.0) for one in (("family", family), ("panel", panel)))
+        cost = family * self.steps["families"] + panel * len(self.after.panels)
+        return self.steps.assign(cost=cost, cheapest=cost.index == cost.idxmin())
 
     def __str__(self) -> str:
         old, new = self.before.certificate, self.after.certificate
@@ -113,7 +133,11 @@ def fewer_families(
         after = panels(search.best, tolerance, anyway=True, **options)
     corners = np.unique(search.faces)
     motion = np.linalg.norm(after.surface.vertices - surface.vertices, axis=1)[corners]
-    return FewerFamilies(before, after, search.leaves(after.surface.vertices), float(motion.max()), made)
+    steps = pd.DataFrame(search.steps, columns=["families", "change"])
+    least = steps["change"].iloc[::-1].cummin().iloc[::-1].shift(-1, fill_value=np.inf)  # with fewer families
+    steps = steps[steps["change"] < least].reset_index(drop=True)
+    left = search.leaves(after.surface.vertices)
+    return FewerFamilies(before, after, left, float(motion.max()), made, steps)
 
 
 class _Search:
@@ -126,6 +150,7 @@ class _Search:
         self.tolerance, self.change, self.at_rest = before.tolerance, change, at_rest
         self.apart = before.mirror_images == "apart"
         self.count = before.count
+        self.steps = [(before.count, 0.0)]
         self.certified = before.certificate.certified
         self.quality = QUALITY * worst_quality(self.start.vertices, self.faces)
 
@@ -142,6 +167,7 @@ class _Search:
                 count = int(families(lengths, self.tolerance, self.apart).family.max()) + 1
             if surface is not None and count < self.count:
                 self.best, self.count, misses = surface, count, 0
+                self.steps.append((count, self.leaves(surface.vertices)))
             else:
                 current, misses = (current + 1) % len(settings), misses + 1
             if callback is not None:

@@ -1,46 +1,89 @@
-"""The net of lines u = 0, ±1, …, v = 0, ±1, … of a sheet, and the panels between them.
+"""The panels between the lines of a net: a roof's triangles are cut along the lines, and pieces joined.
 
-The coordinates are linear on each triangle and may jump across edges by z → ±z + c with whole c: lines go on
-there. They are followed from triangle to triangle. Hexagons are what is left of the quads if every other edge
-along the lines of u is left out.
+Each triangle has coordinates u, v. Lines are u = 0, ±1, …, v = 0, ±1, … or the sides of hexagons. Across
+edges the coordinates may jump by z → ±z + c with whole c: lines go on there. A panel is what edges of
+triangles join of the pieces. It has a node where three panels or two and a rim meet, and at corners of rims.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
+from ..base.errors import OptionError
+from ..base.libraries import load_library
+from ..surface import Surface
 from ..surface.geometry import cross_2d
+from ..surface.topology import components
+from .planar import before
 from .sheet import SheetMesh
 
+SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])  # corners of the panels from their place
+HEXAGON = np.array(
+    [[0, 1 / 6], [1, -1 / 6], [2, 1 / 6], [2, 5 / 6], [1, 7 / 6], [0, 5 / 6]]
+)  # and i + j even
 NUDGE = 1e-6  # of a step: a vertex is at least so far from every line
-SAME = 1e-6  # of an edge: two lines that end so near to each other end at one node
-LATTICE, LOST = -2, -1  # what a line ended at
+GRID = 1e-10  # of a step: cuts lie on a grid so fine
+SAME = 1e-8  # of the size: points that are so near are one
+ROUNDING = 1e-6  # of barycentric coordinates
+INSIDE, EDGE, CORNER = 0, 1, 2
+
+
+class SheetNet(NamedTuple):
+    """A sheet with the coordinates of its net."""
+
+    name: str
+    faces: Ints  # in the surface
+    sheet: SheetMesh
+    at: Floats  # (m,3,2)
+    umbilics: Ints  # vertices of the sheet
+    on_line: Bools  # (n,) vertices on boundary curves that are lines of the net
+    turned: Floats  # (m,) degrees from the principal directions, NaN if the net does not follow them
 
 
 class Net(NamedTuple):
-    """Nodes on the triangles of a sheet, and polygons of nodes, counter-clockwise from outside."""
+    """Nodes and panels, counter-clockwise from outside. Nodes on ridges are shared."""
 
-    face: Ints  # (k,) the triangle that each node lies on
-    weights: Floats  # (k,3) of its corners
-    side: Ints  # (k,) 3 f + the corner opposite of the boundary edge that the node lies on, or -1
-    place: Floats  # (k,) where on that edge, 0..1 as the triangle runs along it
-    towards: Ints  # (k,) the node at the other end of the only edge along u, for hexagons, or -1
-    start: Ints  # (p+1,) of each polygon in ``corner``
-    corner: Ints  # nodes of the polygons, one after the other
-    whole: bool  # whether the polygons fill the sheet, none with a hole
+    points: Floats  # (n,3)
+    normals: Floats  # (n,3)
+    kind: Ints  # (n,) INSIDE, EDGE or CORNER
+    start: Ints  # (p+1,) of each panel in ``corner``
+    corner: Ints  # nodes of the panels, one after the other
+    sheet: Ints  # (p,)
+    cut: Bools  # (p,) by a rim that is no line of the net
+    turned: Floats  # (p,)
+
+    @property
+    def beams(self) -> Ints:
+        """(e,2) the nodes of each edge."""
+        return np.unique(self.sides, axis=0)
+
+    @property
+    def sides(self) -> Ints:
+        """(k,2) the nodes of each side of each panel, ascending."""
+        return np.sort(np.stack([self.corner, self.corner[before(self.start)]], axis=1), axis=1)
+
+    def of_panels(self, kept: Bools) -> Net:
+        """The net of the panels in a mask (p,)."""
+        count = np.diff(self.start)
+        corner, start = self.corner[np.repeat(kept, count)], np.append(0, np.cumsum(count[kept]))
+        rest = {name: getattr(self, name)[kept] for name in ("sheet", "cut", "turned")}
+        return self._replace(start=start, corner=corner, **rest)
 
 
-class Ends(NamedTuple):
-    """Where lines end at the boundary."""
+def counted(count: Ints) -> tuple[Ints, Ints]:
+    """Each number k as often as ``count[k]`` says, and which time it is, from 0.
 
-    side: Ints
-    place: Floats
-    axis: Ints  # 0 for a line u = number, 1 for v
-    number: Ints
+    >>> [found.tolist() for found in counted(np.array([2, 0, 3]))]
+    [[0, 0, 2, 2, 2], [0, 1, 0, 1, 2]]
+    """
+    number = np.repeat(np.arange(len(count)), count)
+    return number, np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
@@ -58,264 +101,135 @@ def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
     return np.where(np.abs(values - line) < NUDGE, away, values)[place]
 
 
-def line_ends(sheet: SheetMesh, at: Floats, hexagons: bool = False) -> Ends:
-    """The ends of all lines on the boundary; for hexagons but those of the edges left out."""
-    topo = sheet.topology
-    rim = np.flatnonzero(topo.boundary_edge[topo.edge_of_face.ravel()])
-    parts = []
-    for axis in range(2):
-        start, end = (at[rim // 3, (rim % 3 + step) % 3, axis] for step in (1, 2))
-        first, last = np.ceil(np.minimum(start, end)), np.floor(np.maximum(start, end))
-        count = np.maximum(last - first + 1, 0).astype(np.int64)
-        rows = np.repeat(np.arange(len(rim)), count)
-        number = first[rows] + np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
-        place = (number - start[rows]) / (end - start)[rows]
-        if hexagons and axis == 0:
-            low, high = (at[rim // 3, (rim % 3 + step) % 3, 1][rows] for step in (1, 2))
-            kept = (number + np.floor(low + place * (high - low))) % 2 == 0
-            rows, number, place = rows[kept], number[kept], place[kept]
-        parts.append((rim[rows], place, np.full(len(rows), axis), number.astype(np.int64)))
-    return Ends(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def net(sheet: SheetMesh, at: Floats, ends: Ends, more: tuple[Ints, Floats], hexagons: bool = False) -> Net:
-    """The net of a sheet with coordinates ``at`` (m,3,2).
-
-    ``more`` are sides and places of further nodes on the boundary, as of the sheets beyond it. Hexagons need
-    coordinates that do not jump.
-    """
-    topo, m = sheet.topology, len(sheet.F)
-    opposite, flip, shift = _transitions(sheet, at)
-    node_face, node_at, node_start = _lattice(at, opposite, flip, shift)
-    count = len(node_face)
-    # the boundary's nodes, in order along its loops
-    corner = sheet.boundary()[1]
-    rim = np.flatnonzero(topo.boundary_edge[topo.edge_of_face.ravel()])
-    first = sheet.F.ravel()[3 * (rim // 3) + (rim % 3 + 1) % 3]
-    at_corner = rim[corner[first]]
-    side = np.concatenate([at_corner, ends.side, more[0]])
-    place = np.concatenate([np.zeros(len(at_corner)), ends.place, more[1]])
-    line = np.concatenate([np.full(len(at_corner), -1), np.arange(len(ends.side)), np.full(len(more[0]), -1)])
-    order = np.lexsort((-line, place, side))
-    side, place, line = side[order], place[order], line[order]
-    beside = np.append(False, (side[1:] == side[:-1]) & (place[1:] - place[:-1] < SAME))
-    beside = beside[: len(side)] & (line < 0)  # a node is already there
-    side, place, line = side[~beside], place[~beside], line[~beside]
-    rim_count = len(side)
-    after = _next_on_rim(sheet, rim, side)
-    # half-edges: four of each inner node, one along the boundary and one inwards of each of its nodes
-    lines = (ends.side, ends.axis, ends.number, _inwards(at, ends), ends.place)
-    target, kind, number = _follow(at, opposite, flip, shift, node_face, node_at, node_start, *lines)
-    node_of_line = np.full(len(ends.side) + 1, -1)  # the last one for lines that are lost
-    node_of_line[line[line >= 0]] = np.flatnonzero(line >= 0)
-    reached = node_of_line[_places(_key(ends.side, ends.axis, ends.number), _key(target, kind, number))]
-    along, inwards = 4 * count, 4 * count + rim_count
-    slots = np.ones((count, 4), dtype=bool)  # the edges of each inner node that there are
-    if hexagons:
-        even = node_at.sum(axis=1) % 2 == 0
-        slots[:, 1], slots[:, 3] = even, ~even
-    there = np.append(slots.ravel(), np.ones(len(ends.side), dtype=bool))
-    turn = 4 * target + (number - 1) % 4
-    inner = kind == LATTICE
-    turn[inner] -= ~there[turn[inner]]  # two edges along v follow one another
-    onward = np.where(there, np.where(inner, turn, along + reached), -1)
-    lost = bool((there & ~inner & (reached < 0)).any())
-    follow = np.full(inwards + rim_count, -1)
-    follow[:along] = onward[:along]
-    follow[along:inwards] = np.where(line[after] >= 0, inwards, along) + after
-    follow[inwards + node_of_line[:-1]] = onward[along:]
-    nodes = count + np.arange(rim_count)
-    origin = np.concatenate([np.repeat(np.arange(count), 4), nodes, nodes])
-    start, loop = _cycles(follow)
-    edges = int(there.sum()) // 2 + rim_count
-    euler = len(sheet.X) - len(topo.edges) + m
-    whole = not lost and count + rim_count - edges + len(start) - 1 == euler
-    towards = np.full(count + rim_count, -1)
-    if hexagons:
-        towards[:count] = np.where(inner, target, count + reached)[
-            4 * np.arange(count) + np.where(even, 1, 3)
-        ]
-    weights = np.zeros((count + rim_count, 3))
-    weights[:count] = _barycentric(at[node_face], node_at)
-    weights[nodes, (side % 3 + 1) % 3], weights[nodes, (side % 3 + 2) % 3] = 1.0 - place, place
+def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool = False) -> Net:
+    """The net of a roof's sheets; OptionError where a panel is no polygon, as one with a hole."""
+    topo, faces = surface.topology, np.concatenate([part.faces for part in parts])
+    row, piece, weights = _pieces(np.concatenate([part.at for part in parts]), hexagons)
+    sheet = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[row]
+    F = surface.faces[faces[row]]
+    points = np.einsum("kc,kci->ki", weights, surface.vertices[F])
+    vertex = components(cKDTree(points).query_pairs(SAME * size, output_type="ndarray"), len(points))
+    panel, ends, rim = _outlines(row, piece, sheet, vertex)
+    # on ridges and rims a side of a panel is split where panels beyond it end
+    opposite = weights[ends].sum(axis=1).argmin(axis=1)
+    edge = topo.edge_of_face[faces[row[ends[:, 0]]], opposite]
+    first, last = surface.vertices[topo.edges[edge]].transpose(1, 0, 2)
+    place = np.einsum("kei,ki->ke", points[ends] - first[:, None], last - first)
+    edge[~rim], place[~rim] = len(topo.edges) + np.flatnonzero(~rim), [0.0, 1.0]
+    side, tail, head, share = _split(edge, vertex[ends], place)
+    start, loop, bad = _loops(panel[ends[side, 0]], tail, head)
+    if len(bad):
+        name = parts[sheet[np.flatnonzero(panel == bad[0])[0]]].name
+        text = f"size: no net of panels of {size:g} fits patch {name!r}"
+        raise OptionError(f"{text}; choose a smaller size, or a finer mesh", what="size", found=size)
+    # nodes are the corners, and where three sides meet
+    is_corner = np.concatenate([part.sheet.boundary()[1][part.sheet.F] for part in parts])[row]
+    kind = np.zeros(int(vertex.max()) + 1, dtype=np.int64)
+    kind[tail[rim[side]]] = EDGE
+    kind[vertex[(is_corner & (weights > 1.0 - ROUNDING)).any(axis=1)]] = CORNER
+    sides = np.unique(np.sort(np.stack([tail, head], axis=1), axis=1), axis=0)
+    is_node = (kind == CORNER) | (np.bincount(sides.ravel(), minlength=len(kind)) > 2)
+    order, owner = side[loop], np.repeat(np.arange(len(start) - 1), np.diff(start))
+    (a, b), t = ends[order].T, share[loop, None]
+    on_line = np.concatenate([part.on_line[part.sheet.F] for part in parts])[row[a]]
+    on_line[np.arange(len(a)), opposite[order]] = True
+    turned = np.bincount(panel, np.concatenate([part.turned for part in parts])[row]) / np.bincount(panel)
+    normals = np.concatenate([part.sheet.normals[part.sheet.F] for part in parts])[row[a]]
+    normal = np.einsum("kc,kci->ki", weights[a] + t * (weights[b] - weights[a]), normals)
+    kept = np.flatnonzero(is_node[tail[loop]])
+    used, corner = np.unique(tail[loop[kept]], return_inverse=True)
+    once = np.unique(np.stack([corner, sheet[a[kept]]]), axis=1, return_index=True)[1]
+    mean = np.zeros((len(used), 3))
+    np.add.at(mean, corner[once], normal[kept[once]])
     return Net(
-        np.concatenate([node_face, side // 3]),
-        weights,
-        np.append(np.full(count, -1), side),
-        np.append(np.zeros(count), place),
-        towards,
-        start,
-        origin[loop],
-        whole,
+        points[np.unique(vertex, return_index=True)[1][used]],
+        mean / np.linalg.norm(mean, axis=1)[:, None],
+        kind[used],
+        np.searchsorted(owner[kept], np.arange(len(start))),
+        corner,
+        sheet[a[start[:-1]]],
+        np.bincount(owner, rim[order] & ~on_line.all(axis=1)) > 0,
+        turned[panel[a[start[:-1]]]],
     )
 
 
-def _transitions(sheet: SheetMesh, at: Floats) -> tuple[Ints, Floats, Floats]:
-    """For each side the side beyond it or -1, and z → flip z + shift to the coordinates there."""
-    one, other = sheet.inner_sides
-    opposite, flip, shift = np.full(sheet.F.size, -1), np.ones(sheet.F.size), np.zeros((sheet.F.size, 2))
-    start, end = (at[one // 3, (one % 3 + step) % 3] for step in (1, 2))
-    end_too, start_too = (at[other // 3, (other % 3 + step) % 3] for step in (1, 2))
-    same = np.einsum("ij,ij->i", end - start, end_too - start_too) > 0.0
-    s = np.where(same, 1.0, -1.0)
-    c = np.rint(start_too - s[:, None] * start)
-    opposite[one], opposite[other] = other, one
-    flip[one] = flip[other] = s
-    shift[one], shift[other] = c, -s[:, None] * c
-    return opposite, flip, shift
+def _pieces(at: Floats, hexagons: bool) -> tuple[Ints, Ints, Floats]:
+    """The pieces of triangles with coordinates ``at`` (m,3,2) between lines, counter-clockwise.
 
-
-def _next_on_rim(sheet: SheetMesh, rim: Ints, side: Ints) -> Ints:
-    """(k,) the node that follows each node of the boundary; they are ordered by side, then along it."""
-    corner = sheet.F.ravel()
-    begins = np.full(len(sheet.X), -1)
-    begins[corner[3 * (rim // 3) + (rim % 3 + 1) % 3]] = rim
-    low = np.searchsorted(side, np.arange(corner.size))
-    high = np.searchsorted(side, np.arange(corner.size), side="right")
-    after = np.arange(len(side)) + 1
-    for k in np.flatnonzero(side != np.append(side[1:], -1)):
-        at = int(side[k])
-        while True:
-            at = int(begins[corner[3 * (at // 3) + (at % 3 + 2) % 3]])
-            if high[at] > low[at]:
-                after[k] = low[at]
-                break
-    return after
-
-
-def _inwards(at: Floats, ends: Ends) -> Ints:
-    """(k,) ±1: which way along its line each end goes inwards."""
-    f, k = ends.side // 3, ends.side % 3
-    step = at[f, (k + 2) % 3] - at[f, (k + 1) % 3]
-    return np.where(np.where(ends.axis == 0, step[:, 0] > 0.0, step[:, 1] < 0.0), 1, -1)
-
-
-def _key(side: Ints, axis: Ints, number: Ints) -> Ints:
-    """(k,) one number for each end of a line."""
-    return np.asarray((2 * side + axis) * 2**24 + number + 2**23)
-
-
-def _places(keys: Ints, wanted: Ints) -> Ints:
-    """(k,) where each wanted key is among the keys; -1 for none."""
-    if not len(keys):
-        return np.full(len(wanted), -1)
-    order = np.argsort(keys, kind="stable")
-    place = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-    return np.where(keys[place] == wanted, place, -1)
-
-
-def _barycentric(corners: Floats, point: Floats) -> Floats:
-    a, b, c = corners.transpose(1, 0, 2)
-    double = cross_2d(b - a, c - a)
-    first, second = cross_2d(c - b, point - b) / double, cross_2d(a - c, point - c) / double
-    return np.stack([first, second, 1.0 - first - second], axis=1)
-
-
-@compiled
-def _lattice(at: Floats, opposite: Ints, flip: Floats, shift: Floats) -> tuple[Ints, Floats, Ints]:
-    """The points with whole coordinates: triangle, coordinates, and the first of each triangle (m+1,)."""
-    face, points = [0], [(0.0, 0.0)]
-    start = np.zeros(len(at) + 1, dtype=np.int64)
-    for f in range(len(at)):
-        a, b, c = at[f, 0], at[f, 1], at[f, 2]
-        if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0:
-            for i in range(int(np.ceil(at[f, :, 0].min())), int(np.floor(at[f, :, 0].max())) + 1):
-                for j in range(int(np.ceil(at[f, :, 1].min())), int(np.floor(at[f, :, 1].max())) + 1):
-                    inside = True
-                    for k in range(3):
-                        inside = inside and _is_left(at, opposite, flip, shift, 3 * f + k, i, j)
-                    if inside:
-                        face.append(f)
-                        points.append((float(i), float(j)))
-        start[f + 1] = len(face) - 1
-    return np.array(face)[1:], np.array(points)[1:], start
-
-
-@compiled
-def _is_left(at: Floats, opposite: Ints, flip: Floats, shift: Floats, side: int, i: float, j: float) -> bool:
-    """Whether a point is on the triangle's side of its side: decided in the first of the two triangles."""
-    other = opposite[side]
-    mine = other < 0 or side < other
-    if not mine:
-        i, j = flip[side] * i + shift[side, 0], flip[side] * j + shift[side, 1]
-        side = other
-    f, k = side // 3, side % 3
-    a, b = at[f, (k + 1) % 3], at[f, (k + 2) % 3]
-    left = (b[0] - a[0]) * (j - a[1]) - (b[1] - a[1]) * (i - a[0]) >= 0.0
-    return left if mine else not left
-
-
-@compiled
-def _follow(
-    at: Floats,
-    opposite: Ints,
-    flip: Floats,
-    shift: Floats,
-    node_face: Ints,
-    node_at: Floats,
-    node_start: Ints,
-    end_side: Ints,
-    end_axis: Ints,
-    end_number: Ints,
-    end_way: Ints,
-    end_place: Floats,
-) -> tuple[Ints, Ints, Ints]:
-    """Where the line ends that leaves each node in each direction, and then each end of a line inwards.
-
-    (target, kind, number): a node, LATTICE, and the direction 0..3 (u, v, -u, -v) back from there; or a side
-    of the boundary, the axis of the line, and its number.
+    (k,) the triangle of each corner of a piece; (k,) its piece, ascending; (k,3) its place in the triangle.
     """
-    nodes = len(node_face)
-    total = 4 * nodes + len(end_side)
-    target, kind, number = (
-        np.zeros(total, np.int64),
-        np.full(total, LOST, np.int64),
-        np.zeros(total, np.int64),
-    )
-    for h in range(total):
-        if h < 4 * nodes:
-            f, entry = node_face[h // 4], -1
-            axis = 1 - (h % 4) % 2  # along u the line is one of v
-            way = 1 if h % 4 < 2 else -1
-            line, goal = node_at[h // 4, axis], node_at[h // 4, 1 - axis] + way
-        else:
-            e = h - 4 * nodes
-            f, entry, axis, way = end_side[e] // 3, end_side[e] % 3, end_axis[e], end_way[e]
-            line = float(end_number[e])
-            a, b = at[f, (entry + 1) % 3, 1 - axis], at[f, (entry + 2) % 3, 1 - axis]
-            goal = np.floor(a + end_place[e] * (b - a)) + (1.0 if way > 0 else 0.0)
-        for _ in range(3 * len(at)):
-            for k in range(node_start[f], node_start[f + 1]):
-                if node_at[k, axis] == line and node_at[k, 1 - axis] == goal:
-                    target[h], kind[h] = k, LATTICE
-                    back = (1 if way < 0 else 3) if axis == 0 else (0 if way < 0 else 2)
-                    number[h] = back
-            if kind[h] == LATTICE:
-                break
-            out, far = -1, -np.inf
-            for k in range(3):
-                a, b = at[f, (k + 1) % 3], at[f, (k + 2) % 3]
-                if k != entry and (a[axis] > line) != (b[axis] > line):
-                    share = (line - a[axis]) / (b[axis] - a[axis])
-                    reach = way * (a[1 - axis] + share * (b[1 - axis] - a[1 - axis]))
-                    if reach > far:
-                        out, far = k, reach
-            if out < 0:
-                break
-            side = 3 * f + out
-            if opposite[side] < 0:
-                target[h], kind[h], number[h] = side, axis, int(line)
-                break
-            line, goal = flip[side] * line + shift[side, axis], flip[side] * goal + shift[side, 1 - axis]
-            way = int(flip[side]) * way
-            f, entry = opposite[side] // 3, opposite[side] % 3
-    return target, kind, number
+    shapely = load_library("shapely", "plan")
+    shape = HEXAGON if hexagons else SQUARE
+    low = np.floor(at.min(axis=1)) - hexagons
+    size = (np.ceil(at.max(axis=1)) + hexagons - low).astype(np.int64)
+    row, k = counted(size.prod(axis=1))
+    place = low[row] + np.stack([k % size[row, 0], k // size[row, 0]], axis=1)
+    if hexagons:
+        row, place = (values[place.sum(axis=1) % 2 == 0] for values in (row, place))
+    tiles = shapely.polygons(place[:, None] + shape)
+    cut = shapely.intersection(shapely.polygons(at)[row], tiles, grid_size=GRID)
+    found = np.flatnonzero(shapely.area(cut) > 0.0)
+    double = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+    cut = shapely.orient_polygons(cut[found], exterior_cw=double[row[found]] < 0.0)  # where lines fold
+    points, piece = shapely.get_coordinates(cut, return_index=True)
+    row, open_ = row[found][piece], np.append(piece[1:] == piece[:-1], False)  # a ring ends where it starts
+    row, piece, points = row[open_], piece[open_], points[open_]
+    a, b, c = at[row].transpose(1, 0, 2)
+    first, second = cross_2d(c - b, points - b) / double[row], cross_2d(a - c, points - c) / double[row]
+    return row, piece, np.stack([first, second, 1.0 - first - second], axis=1)
+
+
+def _outlines(row: Ints, piece: Ints, sheet: Ints, vertex: Ints) -> tuple[Ints, Ints, Bools]:
+    """From corners of pieces (k,): (k,) the panel of each; (s,2) those at the ends of the sides of panels,
+    counter-clockwise; and (s,) whether these are on a rim of their sheet."""
+    start = np.append(np.flatnonzero(np.diff(piece, prepend=-1)), len(piece))
+    ends = np.stack([before(start), np.arange(len(piece))], axis=1)
+    ends = ends[vertex[ends[:, 0]] != vertex[ends[:, 1]]]
+    sides = np.column_stack([sheet[ends[:, 0]], np.sort(vertex[ends], axis=1)])
+    order = np.lexsort(sides.T)
+    twin = np.flatnonzero((np.diff(sides[order], axis=0) == 0).all(axis=1))
+    pair = order[np.stack([twin, twin + 1], axis=1)]
+    inner = np.ptp(row[ends[pair, 0]], axis=1) > 0  # else between two panels, on a line in a triangle
+    panel = components(piece[ends[pair[inner], 0]], int(piece[-1]) + 1)[piece]
+    rim, outer = np.ones((2, len(ends)), dtype=bool)
+    rim[pair] = False
+    outer[pair[(panel[ends[pair, 0]] == panel[ends[pair[:, ::-1], 0]]).all(axis=1)]] = False
+    return panel, ends[outer], rim[outer]
+
+
+def _split(edge: Ints, ends: Ints, place: Floats) -> tuple[Ints, Ints, Ints, Floats]:
+    """Sides of panels from vertex to vertex of all that have ``ends`` (s,2) on their edge, at ``place``.
+
+    (k,) the side that each is a part of, its two vertices, and where on the side it starts, 0 to 1.
+    """
+    spots = np.stack([np.repeat(edge, 2), ends.ravel()], axis=1)
+    spots, index, number = np.unique(spots, axis=0, return_index=True, return_inverse=True)
+    place = place.ravel()[index]
+    order = np.lexsort((place, spots[:, 0]))
+    start, end = np.argsort(order)[number.ravel()].reshape(-1, 2).T
+    side, k = counted(np.abs(end - start))
+    way = np.sign(end - start)[side]
+    tail, head = order[start[side] + way * k], order[start[side] + way * (k + 1)]
+    first, last = place[order[start]][side], place[order[end]][side]
+    return side, spots[tail, 1], spots[head, 1], (place[tail] - first) / (last - first)
+
+
+def _loops(panel: Ints, tail: Ints, head: Ints) -> tuple[Ints, Ints, Ints]:
+    """The sides of each panel in turn: where each starts (p+1,), the sides; panels that are no polygon."""
+    width = int(max(tail.max(), head.max())) + 1
+    begins = panel * width + tail
+    order = np.argsort(begins)
+    after = order[np.searchsorted(begins, panel * width + head, sorter=order) % len(order)]
+    start, loop = _cycles(after)
+    loops = np.bincount(panel[loop[start[:-1]]], minlength=panel.max() + 1)
+    torn = np.bincount(panel, (panel[after] != panel) | (tail[after] != head)) > 0
+    return start, loop, np.flatnonzero(torn | (loops != 1))
 
 
 @compiled
 def _cycles(follow: Ints) -> tuple[Ints, Ints]:
-    """The cycles of half-edges: the first place of each (p+1,), and the half-edges in order."""
-    seen = follow < 0
+    """The cycles of a permutation: the first place of each (p+1,), and all in order."""
+    seen = np.zeros(len(follow), dtype=np.bool_)
     start, loop = [0], [0]
     for h in range(len(follow)):
         at = h

@@ -22,8 +22,8 @@ from ..surface.geometry import cross_2d, face_areas
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .isothermic import curvature_coordinates
-from .net import line_ends, net, nudged
-from .net_tables import SheetNet, joined_nets, net_tables, shared_ends, without_flat
+from .net import INSIDE, SheetNet, net, nudged
+from .net_tables import net_tables, tidied, without_flat
 from .planar import before, planarised, torsion_free_axes
 from .sheet import SheetMesh, sheets_of
 
@@ -200,6 +200,7 @@ def panel_net(
     ------
     SurfaceError : the surface is not certified, or is all walls.
     OptionError : the size is too large for a patch, or the pattern does not exist on one.
+    MissingExtra : shapely is not installed.
 
     >>> from generators import delaunay
     >>> print(len(panel_net(delaunay(exact=True), 0.5, anyway=True).panels))
@@ -216,33 +217,15 @@ def panel_net(
         text = "surface: no panels: every patch is a wall"
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
     parts = [_sheet_net(surface, *one, size, pattern, direction) for one in sheets]
-    nets = []
-    for part, more in zip(parts, shared_ends(surface, parts), strict=True):
-        nets.append(net(part.sheet, part.at, part.ends, more, pattern == "hexagons"))
-        if not nets[-1].whole:
-            text = f"size: no net of panels of {size:g} fits patch {part.name!r}"
-            raise OptionError(f"{text}; choose a smaller size, or a finer mesh", what="size", found=size)
-    joined = joined_nets(surface, parts, nets, size)
-    points = joined.points
+    found = tidied(net(surface, parts, size, pattern == "hexagons"), size)
     if pattern != "quads":
-        points = planarised(points, joined.start, joined.corner, joined.kind == 0)
-        joined, points = without_flat(joined, points, size)
-    axes = torsion_free_axes(points, joined.beams, joined.normals)
-    tables = net_tables(surface, joined, points, axes)
+        P = planarised(found.points, found.start, found.corner, found.kind == INSIDE)
+        found = without_flat(found._replace(points=P), size)
+    axes = torsion_free_axes(found.points, found.beams, found.normals)
+    tables = net_tables(surface, parts, found, axes)
     umbilics = np.concatenate([part.sheet.X[part.umbilics] for part in parts])
-    return PanelNet(
-        surface,
-        pattern,
-        size,
-        certificate,
-        points,
-        joined.start,
-        joined.corner,
-        axes,
-        joined.normals,
-        *tables,
-        umbilics,
-    )
+    polygons = found.points, found.start, found.corner
+    return PanelNet(surface, pattern, size, certificate, *polygons, axes, found.normals, *tables, umbilics)
 
 
 def _sheet_net(
@@ -255,14 +238,7 @@ def _sheet_net(
         text = f"size: panels of {size:g} are too large for patch {name!r}; choose at most {most:.2g}"
         raise OptionError(text, what="size", found=size, expected=most)
     if pattern == "planar-quads":
-        found = curvature_coordinates(sheet, size, name)
-        on_line = np.zeros(len(sheet.X), dtype=bool)
-        for curve in found.aligned:
-            on_line[curve.vertices] = True
-        turned = np.degrees(np.abs(found.turned))
-        return SheetNet(
-            name, faces, sheet, found.at, line_ends(sheet, found.at), found.umbilics, on_line, turned
-        )
+        return SheetNet(name, faces, sheet, *curvature_coordinates(sheet, size, name))
     hexagons = pattern == "hexagons"
     angle = np.radians(direction)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -276,5 +252,4 @@ def _sheet_net(
         text = f"pattern: patch {name!r} is upright or overhangs at {place}, where a grid in plan folds"
         raise OptionError(f"{text}; choose 'planar-quads'", what="pattern", found=pattern)
     none = np.zeros(len(sheet.X), dtype=bool)
-    ends = line_ends(sheet, at, hexagons)
-    return SheetNet(name, faces, sheet, at, ends, np.flatnonzero(none), none, np.full(len(faces), np.nan))
+    return SheetNet(name, faces, sheet, at, np.flatnonzero(none), none, np.full(len(faces), np.nan))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
+from ..surface.geometry import area_vectors, vertex_sums
 from ..surface.topology import POINT, EdgeCurve, Topology, components, topology
 
 KINK = np.cos(np.radians(35.0))  # a boundary that turns by more has a corner
@@ -27,6 +28,12 @@ class SheetMesh:
     def topology(self) -> Topology:
         """Edges of the sheet."""
         return topology(self.F, np.zeros(len(self.F), dtype=np.int64), len(self.X))
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(n,3) unit normals at the vertices."""
+        total = vertex_sums(area_vectors(self.X[self.F]), self.F, len(self.X))
+        return np.asarray(total / np.linalg.norm(total, axis=1)[:, None])
 
     @property
     def inner_sides(self) -> tuple[Ints, Ints]:

@@ -63,6 +63,7 @@ KINDS: dict[str, Schema] = {
     "a name or a list": _any_of(_NAME, _LIST),
     "a name or a list of names": _any_of(_NAME, _list_of(_NAME)),
     "a list of points": _list_of(_LIST),
+    "a list of pairs of points": _list_of(_LIST),
     "a list of lines": _list_of(_LIST),
     "a number or a table": _any_of(_NUMBER, TABLE),
     "two numbers or a table": _any_of(_list_of(_NUMBER) | {"minItems": 2, "maxItems": 2}, TABLE),

@@ -1,44 +1,50 @@
-"""The members of a project in the files of its surface, and which of them files leave out."""
+"""The members of a project in the files of its surface, and which files leave them out."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..base.errors import LostWarning, OptionError
+from ..structure.drawn import DrawnMember, drawn_members
 from ..structure.member_keys import members_of
-from ..structure.members import Member, MemberLine, lines_on
 
 if TYPE_CHECKING:
+    from ..certificate import Certificate
+    from ..surface import Surface
     from .outcome import Outcome
 
 
-def members_named(outcome: Outcome) -> tuple[Member, ...]:
-    """The members that a project names."""
-    if (project := outcome.project) is None or project.structure is None:
+def members_drawn(
+    outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
+) -> tuple[DrawnMember, ...]:
+    """The members on what is shown, or on another surface of the project; none where one cannot be there, as
+    in a mirror plane."""
+    project = outcome.project
+    if project is None or project.structure is None or not has_members(outcome):
         return ()
-    return members_of(project.structure.members, project.plan)
-
-
-def member_lines(outcome: Outcome) -> tuple[MemberLine, ...]:
-    """The lines of members on what is shown; none where one cannot be there, as in a mirror plane."""
+    make = partial(project.structure.model, surface, True, certificate, outcome.units, project.plan)
     try:
-        lines = lines_on(outcome.shown.surface, members_named(outcome))
+        return drawn_members(outcome.model(project.structure, anyway=True) if surface is None else make())
     except OptionError:
         return ()
-    return () if outcome.unfold and any(not line.wall for line in lines) else lines
 
 
-def members_left_out(outcome: Outcome, held: Sequence[MemberLine] = ()) -> str:
-    """That a file has no members but those ``held``; empty if it has all."""
-    kept = [line.member for line in held]
-    labels = dict.fromkeys(member.label for member in members_named(outcome) if member not in kept)
-    text = f"members are left out ({', '.join(labels)}); a wall in whose place one stands is drawn"
-    return text if labels else ""
+def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:
+    """LostWarning that files leave out the members of the structural model; files that could have ``held``
+    them, where they cannot be on what is shown."""
+    if has_members(outcome) and not (held and members_drawn(outcome)):
+        why = (
+            "they are known for a part of the roof alone"
+            if held
+            else "a wall in whose place one stands is drawn"
+        )
+        warnings.warn(f"{what}: members are left out; {why}", LostWarning, stacklevel=3)
 
 
-def warn_of_members(outcome: Outcome, what: str, held: Sequence[MemberLine] = ()) -> None:
-    """LostWarning that surface files or drawings leave out members of the structural model."""
-    if text := members_left_out(outcome, held):
-        warnings.warn(f"{what}: {text}", LostWarning, stacklevel=3)
+def has_members(outcome: Outcome) -> bool:
+    """Whether a project has members."""
+    project = outcome.project
+    structure = None if project is None else project.structure
+    return project is not None and structure is not None and bool(members_of(structure.members, project.plan))

@@ -232,10 +232,11 @@ class Outcome:
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
         from ..drawings import drawing_set
-        from .members import warn_of_members
+        from .members import members_drawn, warn_of_members
 
-        warn_of_members(self, "drawings")
+        warn_of_members(self, "drawings", held=True)
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
+        options["members"] = members_drawn(self)
         return drawing_set(self.shown.surface, self.units, **self._about(output, anyway), **options)
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
@@ -273,8 +274,10 @@ class Outcome:
         """The structural model of what is shown."""
         plan = None if self.project is None else self.project.plan
         model = structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
-        if self.unfold and any(not line.wall for line in model.lines):
-            text = "a member along an edge is known for the part of the plan alone, not for its images"
+        if self.unfold and (model.bars or any(not line.wall for line in model.lines)):
+            text = (
+                "a member at an edge or a point is known for the part of the plan alone, not for its images"
+            )
             raise OptionError(f"{text}; leave out whole, or the member", what="whole")
         return model
 
@@ -363,16 +366,21 @@ class Outcome:
     @property
     def corners(self) -> Ints:
         """(k,) the vertices of what is shown at the corners of the project's plan."""
-        from scipy.spatial import cKDTree
-
-        plan = None if self.project is None else self.project.plan
-        if plan is None or not len(plan.corners):
-            return np.empty(0, dtype=np.int64)
-        away, nearest = cKDTree(self.surface.vertices).query(plan.corners)
-        corners: Ints = np.asarray(nearest)[np.asarray(away) <= SAME * self.surface.size]
+        corners = plan_corners(self.project, self.surface)
         if not self.unfold:
             return corners
         return np.flatnonzero(np.isin(unfolded(self.surface).vertex, corners))
+
+
+def plan_corners(project: Project | None, surface: Surface) -> Ints:
+    """(k,) the vertices of a surface at the corners of a project's plan."""
+    from scipy.spatial import cKDTree
+
+    plan = None if project is None else project.plan
+    if plan is None or not len(plan.corners):
+        return np.empty(0, dtype=np.int64)
+    away, nearest = cKDTree(surface.vertices).query(plan.corners)
+    return np.asarray(nearest)[np.asarray(away) <= SAME * surface.size]
 
 
 def _reporter(what: str, progress: OnStep | None) -> Callable[[Progress], None]:

@@ -286,6 +286,11 @@ def schedule_paths(path: Path) -> list[Path]:
     return [path, *(path.with_name(f"{path.stem}-{name}{path.suffix}") for name in ("families", "edges"))]
 
 
+def cost_paths(path: Path) -> list[Path]:
+    """The table and the picture of the costs beside a schedule of panels."""
+    return [path.with_name(f"{path.stem}-costs{suffix}") for suffix in (path.suffix, ".svg")]
+
+
 def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
     """Refuse empty file names, and those whose suffix is no format of surfaces, or of pictures."""
     for file in files:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from .. import io
 from ..base.arrays import Floats
@@ -21,14 +22,13 @@ from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import Analysis, StructuralModel, write_structure
-from ..structure.members import MemberLine
+from ..structure import Analysis, DrawnMember, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
 from .file import Project
-from .members import member_lines, warn_of_members
+from .members import members_drawn, warn_of_members
 from .outcome import OnStep, Outcome, ignore
-from .settings import check_picture, schedule_paths
+from .settings import check_picture, cost_paths, schedule_paths
 
 FileJob = tuple[Path, Callable[[Path], Any]]  # a file with the function that writes it
 FileJobs = list[FileJob]
@@ -81,12 +81,13 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     Scalars of a surface that was not solved are those of its file. LostWarning where files do not hold the
     members of the project.
     """
-    paths, lines = [*map(Path, files)], member_lines(outcome)
-    for holds, held in ((True, lines), (False, ())):
-        if some := [path.name for path in paths if _holds_members(path) == holds]:
+    paths = [*map(Path, files)]
+    members = members_drawn(outcome) if any(map(_holds_members, paths)) else ()
+    for held in (True, False):
+        if some := [path.name for path in paths if _holds_members(path) == held]:
             warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
-        return certified_files(*outcome.shown, paths, outcome.units, colour, lines)
+        return certified_files(*outcome.shown, paths, outcome.units, colour, members)
     data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
@@ -96,7 +97,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         about |= {"scalars": carried, "certificate": None}
     writes = {path: partial(io.write, surface=outcome.shown.surface, **about) for path in paths}
     return [
-        (path, partial(write, members=lines) if _holds_members(path) else write)
+        (path, partial(write, members=members) if _holds_members(path) else write)
         for path, write in writes.items()
     ]
 
@@ -111,10 +112,10 @@ def certified_files(
     files: Iterable[PathLike],
     units: Units,
     colour: str = "",
-    members: Sequence[MemberLine] = (),
+    members: Sequence[DrawnMember] = (),
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, size of the reactions at supports (force), and lines of members."""
+    relative curvature error, size of the reactions at supports (force), and members."""
     scalars: dict[str, Floats] = {
         "mean curvature": mean_curvature(surface),
         "error": curvature_error(surface),
@@ -158,6 +159,18 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
     tables = (schedule.panels, schedule.families, schedule.edges)
     paths = schedule_paths(path)
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
+
+
+def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
+    """The table and the picture of ``FewerFamilies.costs``, with the functions that write them."""
+    from ..plot import lines  # needs the extra plot
+
+    best = costs[costs["cheapest"]]
+    curves = {"surfaces on the way": costs, "the cheapest": best}
+    pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
+    look: dict[str, Any] = {"x": "change of shape, length", "y": "cost", "markers": True}
+    draw = partial(lines, pairs, **look)
+    return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), draw), strict=True))
 
 
 def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..base.units import Units
 from ..plot import member_forces, under_load
 from ..plot.figure import png
+from ..structure.columns import column_answers
 from ..structure.member_forces import sentences
 from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
 
@@ -25,6 +27,11 @@ ABOUT = (
 SIGNS = (
     "N is above 0 in tension. V and M are the largest shear force and moment, in whichever direction. The "
     "pull of the sheets is the load, in the deformed shape. Buckling is not checked."
+)
+
+ABOUT_COLUMNS = (
+    "They follow from the forces of the supports by statics; N is above 0 in tension. Euler's load is that "
+    "of a column with hinged ends. Their own weight is left out."
 )
 
 
@@ -59,6 +66,24 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
         yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)
     if len(analysis.members):
         yield from _members(analysis, units)
+    if len(analysis.columns):
+        yield from _columns(analysis, units)
+
+
+def _columns(analysis: Analysis, units: Units) -> Iterator[Block]:
+    """The forces of columns and stays, and what they leave to others."""
+    table, sections = analysis.columns, {bar.name: bar.member.profile.label for bar in analysis.model.bars}
+    words: Columns = {"case": table["case"], "member": table["member"], "kind": table["kind"]}
+    words[f"section, {units.length}"] = [sections[name] for name in table["member"]]
+    columns: Columns = columns_in(table, ["length"], units.length)
+    columns |= columns_in(table, ["N", "euler"], units.force or "force")
+    columns |= columns_in(table, ["stress"], units.pressure)
+    for key, title in (("utilisation", "of its strength, %"), ("euler_over", "Euler over thrust")):
+        values = table[key] * (100.0 if key == "utilisation" else 1.0)
+        columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
+    yield text_table("Forces of columns and stays", words, columns)
+    yield ABOUT_COLUMNS
+    yield from (f"{line}." for line in column_answers(analysis.model, table, units))
 
 
 def _members(analysis: Analysis, units: Units) -> Iterator[Block]:

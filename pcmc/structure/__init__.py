@@ -1,6 +1,7 @@
 """Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer."""
 
 from .analysis import Analysis, Case, analyse
+from .drawn import DrawnMember, drawn_members
 from .gas import Gas
 from .inp import write_structure
 from .loads import SelfWeight, Snow, Step, Wind
@@ -13,6 +14,7 @@ from .results import StepResults, read_results
 __all__ = [
     "Analysis",
     "Case",
+    "DrawnMember",
     "Gas",
     "Material",
     "Member",
@@ -24,6 +26,7 @@ __all__ = [
     "StructuralModel",
     "Wind",
     "analyse",
+    "drawn_members",
     "read_results",
     "write_structure",
 ]

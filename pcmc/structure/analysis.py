@@ -17,9 +17,18 @@ from ..base.units import Units
 from ..certificate.supports import FORCE
 from ..surface.geometry import face_areas
 from .calculix import CalculixError, expect_program, run_as_far
+from .columns import column_table, column_text
 from .gas import balanced_pressure
 from .loads import Step
-from .member_forces import MemberForces, member_tables, members_in, sentences, supports_with_members
+from .member_forces import (
+    MemberForces,
+    cable_offers,
+    member_tables,
+    members_in,
+    sentences,
+    supports_with_members,
+    weak_members,
+)
 from .model import StructuralModel, expect_model
 from .results import StepResults
 
@@ -174,11 +183,17 @@ class Analysis:
         """A row per case and point of a beam; see ``member_tables``."""
         return member_tables((case.name, case.members) for case in self.cases)[1]
 
+    @cached_property
+    def columns(self) -> pd.DataFrame:
+        """A row per case and column or stay; see ``column_table``."""
+        return column_table(self.model, [(case.name, case.results.reactions) for case in self.cases])
+
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
-        """All tables by name; those of cables and members only if there are any."""
+        """All tables by name; those of cables, members and columns only if there are any."""
         tables = {"cases": self.table, "patches": self.patches, "supports": self.supports}
         others = {"cables": self.cables, "members": self.members, "member-forces": self.member_forces}
+        others["columns"] = self.columns
         return tables | {name: table for name, table in others.items() if len(table)}
 
     def place_of_least(self, case: Case) -> Floats:
@@ -220,6 +235,7 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
+        lines += weak_members(self.model, ((case.name, case.members) for case in self.cases), units)
         if any(case.taut < case.share < 1.0 for case in self.cases):
             lines.append(MESH)
         if self.remedy:
@@ -244,8 +260,10 @@ class Analysis:
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
         members = [self.members.to_string(index=False, float_format="{:.4g}".format)]
-        members = [*members, *sentences(self.model, self.model.units)] if len(self.members) else []
-        return "\n".join([*units, numbers, *members, *self.answers()])
+        about = [*sentences(self.model, self.model.units), *cable_offers(self.model)]
+        members = [*members, *about] if len(self.members) else []
+        bars = [column_text(self.model, self.columns, self.model.units)] if len(self.columns) else []
+        return "\n".join([*units, numbers, *members, *bars, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:

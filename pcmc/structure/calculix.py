@@ -46,9 +46,7 @@ def expect_program() -> None:
         raise CalculixError(MISSING, what=PROGRAM)
 
 
-def run(
-    model: StructuralModel, timeout: float | None = None, suffix: str = ".dat"
-) -> tuple[StepResults, ...]:
+def run(model: StructuralModel, timeout: float | None = None) -> tuple[StepResults, ...]:
     """The results of each step of a structural model, all in one analysis; an error where it stops.
 
     ``pcmc.analyse`` answers what is overloaded, too.
@@ -56,7 +54,7 @@ def run(
     with folder_for_input() as path:
         write_structure(path, model)
         run_file(path, timeout)
-        return read_results(path.with_suffix(suffix), model)
+        return read_results(path.with_suffix(".dat"), model)
 
 
 def run_as_far(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -19,12 +20,14 @@ from .frames import BarFrame
 from .loads import Step
 from .members import MemberLine
 from .model import StructuralModel
-from .pulls import at_vertices, balancing_force, corner_forces
+from .pulls import at_vertices, balancing_force, corner_forces, turns
 from .results import StepResults
 
 COLUMNS = ("N", "V", "V_across", "T", "M", "M_across")  # as ``FrameForces.within`` has them
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
+STRAIGHT = 0.01  # share of a member's pull that bends it: below it needs no other line
+HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of one that is too weak alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +68,33 @@ class MemberForces:
     @property
     def eccentricity(self) -> float:
         """max |M| / max |N|, length: how far the line is from one that does not bend."""
-        return self.largest["M"] / float(np.abs(self.within[:, 0]).max())
+        most = float(np.abs(self.within[:, 0]).max())
+        return self.largest["M"] / most if most > 0.0 else np.inf
+
+    @property
+    def pulled(self) -> float:
+        """The sum of the sizes of the pulls between its ends."""
+        inner = self.pulls if self.line.closed else self.pulls[1:-1]
+        return float(np.linalg.norm(inner, axis=1).sum())
 
     @property
     def balance(self) -> tuple[float, float]:
         """The one force N along it that balances its pulls best, and the share of these that is left."""
         return balancing_force(self.points, self.pulls, self.line.closed)
+
+    @property
+    def wall_tensions(self) -> Floats:
+        """(k,2) force/length: the pull of the sheets, which a wall balances by its tension; and what it
+        would balance, free along a line that does not bend: N κ, N of ``balance``. NaN at ends."""
+        P, closed = self.points, self.line.closed
+        edges = np.linalg.norm(np.diff(P, axis=0, append=P[:1]), axis=1)
+        size = np.linalg.norm(self.pulls, axis=1)
+        along = self.pulls / np.where(size > 0.0, size, 1.0)[:, None]
+        needed = -self.balance[0] * (turns(P, closed) * along).sum(axis=1)
+        found = np.stack([size, needed], axis=1) / (0.5 * (edges + np.roll(edges, 1)))[:, None]
+        if not closed:
+            found[[0, -1]] = np.nan
+        return found
 
     @property
     def enough(self) -> float:
@@ -211,7 +235,8 @@ def supports_with_members(model: StructuralModel, reactions: Floats) -> pd.DataF
 def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
-    over it. And a row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``.
+    over it. And a row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``;
+    ``pull`` and ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``.
     """
     rows, along = list[dict[str, object]](), list[pd.DataFrame]()
     for case, beams in cases:
@@ -222,6 +247,7 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
             rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
             columns = about | {"s": beam.along} | dict(zip("xyz", beam.points.T, strict=True))
             columns |= dict(zip(COLUMNS, beam.within.T, strict=True))
+            columns |= dict(zip(("pull", "pull_unbent"), beam.wall_tensions.T, strict=True))
             along.append(pd.DataFrame(columns | {"moved": moved}))
     return pd.DataFrame(rows), pd.concat(along, ignore_index=True) if along else pd.DataFrame()
 
@@ -233,16 +259,50 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         N, share = beam.balance
         most = beam.largest
         far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
-        about = (
-            f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)},"
-        )
-        about += f" M/N = {beam.eccentricity:.2g}{length}; {beam.enough:.2g} times its E A and E I keep the"
+        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)}"
+        about += f", M/N = {beam.eccentricity:.2g}{length}" if np.isfinite(beam.eccentricity) else ""
+        about += f"; {beam.enough:.3g} times its E A and E I keep the"
         about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
         if beam.line.wall:
             about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
-            cable = f"; wall = false, cable = {N:.3g} finds the shape that does not bend"
-            about += cable if N > 0.0 else "; that is a thrust, which no cable has"
+            low, high = np.nanmin(beam.wall_tensions[:, 1]), np.nanmax(beam.wall_tensions[:, 1])
+            about += (
+                f"; without bending a wall would pull with {low:.3g} to {high:.3g}{units.behind('tension')}"
+            )
+            if N <= 0.0:
+                about += "; N is a thrust, which no cable has"
         lines.append(about)
+    return lines
+
+
+def cable_offers(model: StructuralModel) -> list[str]:
+    """The lines of a project with which a cable takes the place of a wall whose member bends, and finds the
+    shape that does not; none for a thrust, and for a divider with several walls."""
+    lines, beams = list[str](), members_at_rest(model)
+    for beam in beams:
+        (N, share), on = beam.balance, beam.line.member.on
+        alone = sum(other.line.member is beam.line.member for other in beams) == 1
+        if beam.line.wall and alone and N > 0.0 and share > STRAIGHT:
+            text = f"{on}: with these lines of its divider a cable finds the shape that does not bend:"
+            lines += [text, "wall = false", f"cable = {N:.4g}"]
+            lines += [f'name = "{on}"'] if re.fullmatch(r"wall \d+", str(on)) else []
+    return lines
+
+
+def weak_members(
+    model: StructuralModel, cases: Iterable[tuple[str, tuple[MemberForces, ...]]], units: Units
+) -> list[str]:
+    """A line for each beam that moves by more than a 300th of its span in a case, or would without the
+    sheets, which carry a good part in its place; with the stiffness that it would need to carry all alone."""
+    lines, listed = list[str](), list(cases)
+    for k, rest in enumerate(members_at_rest(model)):
+        case, worst = max(((name, beams[k]) for name, beams in listed), key=lambda one: one[1].deflection)
+        share = max(0.0, 1.0 - listed[0][1][k].pulled / rest.pulled)
+        if worst.enough > 1.0 or (rest.enough > 1.0 and share > HELPED):
+            text = f"{rest.line.name} is too weak: under {case} it moves {worst.deflection:.3g}"
+            text += f"{units.behind('length')}, span/{worst.span / worst.deflection:.0f}, and at rest the"
+            text += f" sheets carry {100.0 * share:.0f} % of what it should; without them it would need"
+            lines.append(f"{text} {max(rest.enough, worst.enough):.3g} times its E A and E I")
     return lines
 
 

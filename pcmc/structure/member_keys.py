@@ -45,6 +45,9 @@ class MemberSection:
     on : names of walls and cables that it takes the place of, besides those of dividers that name it.
     along : curves on edges of the outline or of a hole that it carries, from end to end of each.
     propped : whether columns or a wall carry it upright, all along such an edge.
+    bars : columns, or stays where the kind is cable: pairs of points, the support point of the roof, by its
+        name in [plan.points] or [x, y], and the foot or anchor, [x, y, z] or [x, y] on Π.
+    strength : stress that a column or a stay may have, force per area.
     """
 
     young: float | None = None
@@ -62,6 +65,8 @@ class MemberSection:
     on: Sequence[str] = ()
     along: Sequence[Any] = field(default=(), metadata={"kind": "a list of curves or tables"})
     propped: bool = False
+    bars: Sequence[Any] = field(default=(), metadata={"kind": "a list of pairs of points"})
+    strength: float = 0.0
 
     def profile(self, name: str) -> Profile:
         """Its cross-section; OptionError, with the member's ``name``, where none is given, or two."""
@@ -76,15 +81,26 @@ class MemberSection:
         text = f"member {name!r} has no section: expected {wanted} (of a cable area alone), found {found}"
         raise OptionError(text, what="structure.members", where=name)
 
-    def member(self, name: str, on: str | Curve) -> Member:
-        """The member along a line."""
+    def member(self, name: str, on: Any) -> Member:
+        """The member along a line, or between two points."""
         if self.young is None:
             text = f"member {name!r} has no material; give it young, Young's modulus"
             raise OptionError(text, what="structure.members", where=name)
         material = Material(self.young, self.poisson, self.density)
         propped = self.propped and isinstance(on, Curve)
-        label = name if isinstance(on, Curve) else on
-        return Member(on, self.profile(name), material, self.kind, self.ends, propped, label)
+        label = on if isinstance(on, str) else name
+        return Member(on, self.profile(name), material, self.kind, self.ends, propped, label, self.strength)
+
+    def between(self, name: str, points: Mapping[str, Any]) -> Iterator[Member]:
+        """Its columns or stays; ``points`` are those of the plan by name."""
+        for pair in self.bars:
+            on = list(pair) if isinstance(pair, Sequence) and not isinstance(pair, str) else pair
+            if isinstance(on, list) and on and isinstance(on[0], str):
+                if on[0] not in points:
+                    text = f"member {name!r}: {unknown('point', on[0], list(points))} in [plan.points]"
+                    raise OptionError(text, what="structure.members", where=name, found=on[0])
+                on[0] = points[on[0]]
+            yield self.member(name, on)
 
 
 def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tuple[Member, ...]:
@@ -102,6 +118,7 @@ def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tup
         members += [section.member(name, on) for on in section.on]
         curves = [curve_of(curve, f"member {name!r}") for curve in section.along]
         members += [section.member(name, curve) for curve in curves]
+        members += section.between(name, plan.points) if plan is not None else ()
     for owner, name, on in () if plan is None else _sites(plan):
         if name not in known:
             text = f"{owner}: {unknown('member', name, list(known))}; add [structure.members.{name}]"

@@ -1,10 +1,12 @@
-"""Members: beams and cables in the place of walls, along edges, and as rings around holes."""
+"""Members: beams and cables in the place of walls, along edges, around holes; columns and stays at points."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,60 +14,68 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
+from ..certificate.forces import Forces
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.curves import Curve
 from ..surface.geometry import segment_lengths
-from .frames import bar_axes
+from ..surface.pieces import point_text, to_space
 from .material import Material
 from .profile import Profile
 
 KINDS = ("beam", "cable")
 ENDS = ("hinged", "clamped")
 BESIDE = 0.02  # of the length of edges: so near to a curve their ends are on it
+SHORTEST = 1e-6  # of the size: a shorter bar is none
+FLAT = 0.02  # least singular value of the directions of bars: nearer to one plane their forces are no answer
 
 
 @dataclass(frozen=True)
 class Member:
-    """A beam or a cable of the structural model, along edges of the surface.
+    """A beam or a cable of the structural model, along edges of the surface; or a column or a stay.
 
     Parameters
     ----------
     on : where it is. The name of a wall: the member stands in the place of the wall, along its junction,
         and carries what the wall did. The name of a cable: that cable has this profile and material. A
         Curve: the edges of the boundary along it, seen along Π's normal; these are no support then, but the
-        member carries them from end to end, or as a ring.
+        member carries them from end to end, or as a ring. Two points: the beam is a column, the cable a stay,
+        from a point that holds the surface alone, (x, y) along Π or (x, y, z), to its foot or anchor.
     profile, material : its cross-section, and an isotropic material.
     kind : "beam", which an arch is, too, or "cable", without bending stiffness; a cable in the place of a
         wall has the tension that balances the sheets best.
     ends : of a beam, where a support holds it: "hinged", free to bend, but not to twist; or "clamped".
     propped : whether columns or a wall below hold a member on a Curve along Π's normal, all along it.
     name : of the member, for tables; by default the name that ``on`` is, or "member".
+    strength : stress that a column or a stay may have, force/area; 0 where it is not known.
 
     >>> Member("wall 1", Profile.tube(0.1, 0.005), Material(2.1e8)).label
     'wall 1'
     """
 
-    on: str | Curve
+    on: str | Curve | Sequence[Sequence[float]]
     profile: Profile
     material: Material
     kind: str = "beam"
     ends: str = "hinged"
     propped: bool = False
     name: str = ""
+    strength: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, kind in (("on", str | Curve), ("profile", Profile), ("material", Material)):
+        if not isinstance(self.on, str | Curve):
+            vars(self)["on"] = _two_points(self.on)
+        for name, kind in (("profile", Profile), ("material", Material)):
             if not isinstance(getattr(self, name), kind):
-                expected = {"on": "the name of a wall or a cable, or a Curve"}.get(name, f"a {name.title()}")
-                validate.refuse(f"Member.{name}", getattr(self, name), expected)
+                validate.refuse(f"Member.{name}", getattr(self, name), f"a {name.title()}")
+        validate.number("Member.strength", self.strength, least=0.0)
         validate.choice("Member.kind", self.kind, KINDS)
         validate.choice("Member.ends", self.ends, ENDS)
         validate.flag("Member.propped", self.propped)
         if self.material.cloth:
             text = f"member {self.label!r}: its material is a cloth; give it young alone"
             raise OptionError(text, what="Member.material", where=self.label)
-        if self.propped and isinstance(self.on, str):
+        if self.propped and not isinstance(self.on, Curve):
             text = f"member {self.label!r}: propped is for edges of the boundary; leave it out"
             raise OptionError(text, what="Member.propped", where=self.label)
 
@@ -73,6 +83,46 @@ class Member:
     def label(self) -> str:
         """Its name, or that of the wall or cable."""
         return self.name or (self.on if isinstance(self.on, str) else "member")
+
+    @property
+    def two_points(self) -> Sequence[Sequence[float]]:
+        """Of a column or a stay, the point that it holds, and its foot or anchor; of others none."""
+        return () if isinstance(self.on, str | Curve) else self.on
+
+
+def _two_points(given: Any) -> tuple[tuple[float, ...], ...]:
+    """Two points, of two or three coordinates."""
+    try:
+        points = tuple(tuple(validate.real(value) for value in point) for point in given)
+    except TypeError:
+        points = ()
+    if len(points) != 2 or not all(len(p) in (2, 3) and np.isfinite(p).all() for p in points):
+        expected = "the name of a wall or a cable, a Curve, or two points"
+        validate.refuse("Member.on", given, expected)
+    return points
+
+
+@dataclass(frozen=True, eq=False)
+class Bar:
+    """A column or a stay, from a point that holds the surface to its foot or anchor."""
+
+    name: str  # of the member; with a number where others have the same
+    member: Member
+    vertex: int  # that it holds
+    points: Floats  # (2,3) its ends, the foot or anchor last
+
+    @property
+    def kind(self) -> str:
+        return "column" if self.member.kind == "beam" else "stay"
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.points[1] - self.points[0]))
+
+    @property
+    def direction(self) -> Floats:
+        """(3,) from the surface to its foot."""
+        return (self.points[1] - self.points[0]) / self.length
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +140,6 @@ class MemberLine:
         """(b,2) the ends of its edges, in order."""
         order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
         return np.stack([order[:-1], order[1:]], axis=1)
-
-    def bars(self, surface: Surface) -> tuple[Floats, Floats]:
-        """(b,3,3) rows along each of its edges, across, and upright; (b,) their lengths."""
-        return bar_axes(surface.vertices, self.pairs, np.array(surface.plane.normal))
 
     @property
     def carried(self) -> Ints:
@@ -120,11 +166,9 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
     ('wall 1', 5, False)
     """
     lines, taken = list[MemberLine](), np.zeros(len(surface.topology.edges), dtype=bool)
-    cut = np.zeros(surface.n, dtype=bool)
-    for plane, mask in surface.on_planes:
-        cut |= mask & plane.mirror
+    cut = _mirrored(surface)
     for member in members:
-        if member.on in [cable.name for cable in surface.cables]:
+        if member.two_points or member.on in [cable.name for cable in surface.cables]:
             continue
         for line in _lines_of(surface, member):
             if cut[line.vertices].any():
@@ -138,6 +182,80 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
             lines.append(line)
     _refuse_half_walls(surface, {line.wall for line in lines})
     return tuple(lines)
+
+
+def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberLine]) -> tuple[Bar, ...]:
+    """The columns and stays at points of supports and at ends of the ``lines`` of beams; OptionError for one
+    at another point, for a stay inside the roof, and where statics alone does not find their forces.
+
+    >>> from pcmc.plan import Plan
+    >>> corners = [[0, 0, 4], [10, 0, 0], [10, 10, 4], [0, 10, 0]]
+    >>> sail = Plan([[0, 0], [10, 0], [10, 10], [0, 10]], edge="cable", cable=9.0, supports=corners,
+    ...             tension=1.0, pressure=0.0).surface()
+    >>> mast = Member([[0, 0], [-1, -1]], Profile.tube(0.2, 0.01), Material(2.1e8), name="mast")
+    >>> [bar] = bars_on(sail, [mast], ())
+    >>> bar.kind, bar.points.tolist()
+    ('column', [[0.0, 0.0, 4.0], [-1.0, -1.0, 0.0]])
+    """
+    given = [member for member in members if member.two_points]
+    if not given:
+        return ()
+    X, plane, topo, bars = surface.vertices, surface.plane, surface.topology, list[Bar]()
+    alone = Forces.of(surface).single
+    alone[
+        [v for line in lines if line.member.kind == "beam" for v, _ in line.ends(X) if surface.fixed[v]]
+    ] = True
+    rim = np.zeros(surface.n, dtype=bool)
+    rim[topo.edges[topo.boundary_edge]] = True
+    mirrored = _mirrored(surface)
+    points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
+    times, used = Counter(member.label for member in given), Counter[str]()
+    for member in given:
+        used[member.label] += 1
+        name = member.label if times[member.label] == 1 else f"{member.label}-{used[member.label]}"
+        top, foot = (
+            np.array(p) if len(p) == 3 else to_space(np.array([*p, 0.0]), plane) for p in member.two_points
+        )
+        apart = np.linalg.norm((plane.to_local(X[points]) - plane.to_local(top[None]))[:, :2], axis=1)
+        problem = ""
+        if apart.min(initial=np.inf) > near:
+            known = ", ".join(point_text(X[v]) for v in points[:6]) or "none"
+            problem = f"no support of one point is at {point_text(top)}; there are: {known}"
+        elif mirrored[points[apart.argmin()]]:
+            problem = "it stands in a mirror plane; take the whole roof, whole = true"
+        elif member.kind == "cable" and not rim[points[apart.argmin()]]:
+            problem = (
+                f"a stay from {point_text(top)}, inside the roof, would pierce it; take a point of its edge"
+            )
+        elif np.linalg.norm(foot - X[points[apart.argmin()]]) <= SHORTEST * surface.size:
+            problem = f"its foot is the point {point_text(top)} that it holds; give another one"
+        if problem:
+            raise OptionError(f"member {name!r}: {problem}", what="members", where=name)
+        vertex = int(points[apart.argmin()])
+        bars.append(Bar(name, member, vertex, np.array([X[vertex], foot])))
+    _refuse_mechanisms(bars)
+    return tuple(bars)
+
+
+def _mirrored(surface: Surface) -> Bools:
+    """(n,) the vertices in mirror planes."""
+    return np.any(
+        [mask & plane.mirror for plane, mask in surface.on_planes] or [np.zeros(surface.n, bool)], axis=0
+    )
+
+
+def _refuse_mechanisms(bars: Sequence[Bar]) -> None:
+    """Refuse bars at one point whose forces do not follow from their sum."""
+    for vertex in dict.fromkeys(bar.vertex for bar in bars):
+        own = [bar for bar in bars if bar.vertex == vertex]
+        if np.linalg.matrix_rank([bar.direction for bar in own], tol=FLAT) < len(own):
+            names, at = ", ".join(bar.name for bar in own), point_text(own[0].points[0])
+            text = (
+                f"members {names} meet at {at}: statics finds the forces of three bars, not in one plane, or"
+            )
+            raise OptionError(
+                f"{text} of two, not in one line; leave one out", what="members", where=own[0].name
+            )
 
 
 def _refuse_half_walls(surface: Surface, replaced: Set[str]) -> None:
@@ -164,7 +282,7 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:
             text = f"member {member.label!r}: no edge of the boundary runs along its curve; draw it along one"
             raise OptionError(text, what="members", where=member.label)
     else:
-        parts = re.compile(re.escape(member.on) + r"(-\d+)?( \(\d+\))?")
+        parts = re.compile(re.escape(str(member.on)) + r"(-\d+)?( \(\d+\))?")
         walls = [k for k, name in enumerate(names) if parts.fullmatch(name) and surface.walls[k]]
         if not walls:
             known = [name for name, wall in zip(names, surface.walls, strict=True) if wall]

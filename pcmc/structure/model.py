@@ -34,7 +34,7 @@ from .loads import (
     load_steps,
 )
 from .material import Material
-from .members import Member, MemberLine, lines_on
+from .members import Bar, Member, MemberLine, bars_on, lines_on
 from .pulls import at_vertices, balancing_force, corner_forces
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
@@ -64,7 +64,7 @@ class StructuralModel:
         is one more step. The form-finding load and self-weight have the factor 1 where they are not named.
     gas : what is enclosed and changes its pressure with its volume; see ``Gas``. ``analyse`` finds it.
     members : beams and cables in the place of walls, along edges, or with a profile for a cable of the
-        surface; see ``Member``. A wall with a member is left out of the model.
+        surface; see ``Member``. A wall with a member is left out of the model. Columns and stays, too.
 
     Raises
     ------
@@ -121,7 +121,7 @@ class StructuralModel:
         if not all(isinstance(member, Member) for member in self.members):
             validate.refuse("members", self.members, "a sequence of Members")
         vars(self)["members"] = tuple(self.members)
-        self.cable_sections  # noqa: B018
+        self.cable_sections, self.bars  # noqa: B018
         if self.weights and not any(material.density for material in self.materials):
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
@@ -230,6 +230,11 @@ class StructuralModel:
     def beams(self) -> tuple[MemberLine, ...]:
         """Those that are beams."""
         return tuple(line for line in self.lines if line.member.kind == "beam")
+
+    @cached_property
+    def bars(self) -> tuple[Bar, ...]:
+        """The columns and stays: they carry what the points of supports do, and are no elements."""
+        return bars_on(self.surface, self.members, self.lines)
 
     @cached_property
     def standing(self) -> Surface:

@@ -20,22 +20,18 @@ from .model import StructuralModel, expect_model
 from .tables import WHOLE, ResultBlock, read
 
 TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
-FAR = 1e-4  # of the size: a node farther from its vertex belongs to another surface
 
 
 @dataclass(frozen=True, eq=False)
 class StepResults:
-    """The end of one step of the analysis. Vertices and faces that are not in the model have NaN.
-
-    Stresses from an .frd file are the mean of a triangle's corners, averaged over all elements around each.
-    """
+    """The end of one step of the analysis. Vertices and faces that are not in the model have NaN."""
 
     name: str  # of the step
     model: StructuralModel
     displacements: Floats  # (n,3) length
     reactions: Floats  # (n,3) forces of the supports on the structure; zero at vertices that nothing holds
     stresses: Floats  # (m,3,3) tensors in the axes of space, force/area, the mean over the thickness
-    cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force; from a .dat alone
+    cable_tensions: Mapping[str, Floats]  # (k,) of the edges of each cable by name, force
     step: Step  # its loads, as far as they act
     share: float = 1.0  # of the step's loads, besides those of the step before: 1 but where it stopped
     taut: float = 1.0  # the part of that share up to which no face is slack, between increments by a line
@@ -71,13 +67,13 @@ class StepResults:
 
 
 def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[StepResults, ...]:
-    """Displacements, reactions and stresses of each step, from CalculiX's ``.dat`` or ``.frd`` file.
+    """Displacements, reactions and stresses of each step, from CalculiX's ``.dat`` file.
 
     The program's force at a held node is that of the elements alone; the load that acts on the node itself
     (a third of its triangles' pressures, its weight and snow) is added here, so that the reactions are those
     of ``pcmc.certify``.
 
-    ``path`` is what ``ccx`` wrote for the input file of the model; .dat has the stresses by element.
+    ``path`` is what ``ccx`` wrote for the input file of the model.
     FileError for a file that is missing, damaged, incomplete, or of another model.
     """
     expect_model(model)
@@ -96,11 +92,9 @@ def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tup
     ``share`` of the step that it reached; steps that it did not begin are left out.
     """
     check_regular(path)
-    suffix = suffix_of(path, (".dat", ".frd"), "a result of CalculiX")
-    if suffix == ".frd" and model.beams:
-        raise FileError(f"{path}: of a model with members read the file .dat beside it", what=str(path))
+    suffix_of(path, (".dat",), "a result of CalculiX")
     try:
-        tables = read(path.read_text(encoding="ascii"), suffix)
+        tables = read(path.read_text(encoding="ascii"))
         _check(tables, model, steps)
     except OSError as error:
         raise system_error(path, "read", error) from None
@@ -132,13 +126,7 @@ def _results(
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
     stresses = np.full((model.surface.m, 3, 3), np.nan)
-    if stress.by_node:
-        at_vertex = np.full((surface.n, 6), np.nan)
-        at_vertex[stress.ids - 1] = stress.values
-        values = at_vertex[surface.faces[model.active]].mean(axis=1)
-    else:
-        values = stress.means(model.faces + 1)
-    stresses[model.faces] = values[:, TENSOR]
+    stresses[model.faces] = stress.means(model.faces + 1)[:, TENSOR]
     tensions = {}
     for cable, area, _, numbers, along in model.cable_edges() if "cables" in blocks else ():
         mine = blocks["cables"].means(numbers)[:, TENSOR]
@@ -151,8 +139,6 @@ def _results(
 def _taut(model: StructuralModel, last: ResultBlock, k: int, start: ResultBlock | None) -> float:
     """The time in step k at which the first face gets slack, by lines through the least principal stress at
     the increments and at the ``start``; 1 if none does."""
-    if last.by_node:
-        return 1.0
     P, blocks = model.surface.vertices[model.surface.faces[model.faces]], [last]
     while (earlier := blocks[0].before) is not None:
         blocks.insert(0, earlier)
@@ -187,20 +173,12 @@ def _check(tables: list[dict[str, ResultBlock]], model: StructuralModel, steps: 
                 raise FileError(text, where=number)
         moved, stress = blocks["displacements"], blocks["stresses"]
         _same("nodes", moved.ids, nodes)
-        if stress.by_node:
-            _same("nodes with stresses", stress.ids, nodes)
-        else:
-            _same("elements", np.unique(stress.ids), model.faces + 1)
+        _same("elements", np.unique(stress.ids), model.faces + 1)
         if "cables" in blocks:
             _same("cable elements", np.unique(blocks["cables"].ids), np.array(cables))
         if "forces" in blocks:
             _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
             _same("nodes", np.union1d(blocks["forces"].ids, nodes), nodes)
-        if moved.places is not None:
-            gap = np.abs(moved.places - model.standing.vertices[nodes - 1]).max(initial=0.0)
-            if gap > FAR * model.surface.size:
-                text = f"its nodes are up to {gap:.3g} from the model's vertices"
-                raise FileError(f"{text}; they belong to another surface", found=float(gap))
     if len(tables) > len(steps):
         text = f"has {len(tables)} steps, the model {len(steps)}; is it another model's?"
         raise FileError(text, found=len(tables), expected=len(steps))

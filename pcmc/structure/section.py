@@ -16,7 +16,7 @@ from .gas import Gas
 from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
 from .material import Material
 from .member_keys import members_of
-from .members import lines_on
+from .members import bars_on, lines_on
 from .model import StructuralModel, checked_areas, checked_thickness
 
 MATERIAL = ("young", "poisson", "density", "weft", "shear", "warp")  # keys of a material
@@ -194,7 +194,7 @@ class Structure:
         self.materials(surface)
         check_loads(self.loads_on(surface), surface)
         members = members_of(self.members, plan)
-        lines_on(surface, members)
+        bars_on(surface, members, lines_on(surface, members))
         checked_areas(self.cable_area, surface, [str(member.on) for member in members])
 
     def model(

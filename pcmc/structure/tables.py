@@ -1,6 +1,4 @@
-"""The tables of numbers in CalculiX's result files, by step: ``.dat``, by node and integration point, and
-``.frd`` in ASCII, columns of fixed width, six digits, all by node.
-"""
+"""The tables of numbers in CalculiX's ``.dat`` files, by step, by node and integration point."""
 
 from __future__ import annotations
 
@@ -8,7 +6,6 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,10 +16,6 @@ WHOLE = 1e-6  # of a step: a time so near to its end is the end
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
 DAT_COLUMNS = {"displacements": (1, 3), "forces": (1, 3), "stresses": (2, 6)}  # keys and values of a row
-FRD_HEAD = re.compile(r"^(?:    2C|    3C|  100C|    1P| 9999).*$", re.M)
-FRD_KINDS = {"DISP": ("displacements", 3), "FORC": ("forces", 3), "STRESS": ("stresses", 6)}
-FRD_STRESSES = [0, 1, 2, 3, 5, 4]  # xx, yy, zz, xy, yz, zx in the file
-KEY, NUMBER = 13, 12  # characters of a row of an .frd file: " -1" and the node; each value
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +26,6 @@ class ResultBlock:
     time: float  # at the end of the step
     ids: Ints  # (k,) numbers of nodes or elements
     values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
-    by_node: bool  # whether the numbers are those of nodes
-    places: Floats | None = None  # (k,3) where the nodes are, if the file has it
     before: ResultBlock | None = None  # the same at the increment before, in the same step
 
     def means(self, elements: Ints) -> Floats:
@@ -45,16 +36,16 @@ class ResultBlock:
         return np.stack(sums, axis=1) / np.bincount(place, minlength=len(elements))[:, None]
 
 
-def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
+def read(text: str) -> list[dict[str, ResultBlock]]:
     """The tables of each step, which end at the times 1, 2, ...; of several in a step the last counts, so
     that of an analysis that stopped the last step's is what it reached. Each has the one ``before`` it.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
-    >>> read(text, ".dat")[0]["displacements"].values.tolist()
+    >>> read(text)[0]["displacements"].values.tolist()
     [[0.5, 0.0, -0.001]]
     """
     steps: list[dict[str, ResultBlock]] = []
-    for block in (_of_dat if suffix == ".dat" else _of_frd)(text):
+    for block in _blocks(text):
         number = max(math.ceil(block.time - WHOLE), 1)
         steps += [{} for _ in range(number - len(steps))]
         earlier = steps[number - 1].get(block.kind)
@@ -62,7 +53,7 @@ def read(text: str, suffix: str) -> list[dict[str, ResultBlock]]:
     return steps
 
 
-def _of_dat(text: str) -> Iterator[ResultBlock]:
+def _blocks(text: str) -> Iterator[ResultBlock]:
     heads = list(DAT_HEAD.finditer(text))
     if not heads:
         raise FileError("has no results; is it a .dat file of ccx, and has its analysis run?")
@@ -76,42 +67,7 @@ def _of_dat(text: str) -> Iterator[ResultBlock]:
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         time = float(_numbers([head[4]], 1, "time", line)[0, 0])
         kind = {"CABLES": "cables", "ENDS": "ends"}.get(head[3], kind)
-        yield ResultBlock(kind, time, rows[:, 0].astype(int), rows[:, keys:], keys == 1)
-
-
-def _of_frd(text: str) -> Iterator[ResultBlock]:
-    if not text.startswith("    1C") or "\n  100C" not in text:
-        raise FileError("has no results; is it an .frd file of ccx in ASCII, and has its analysis run?")
-    if not text.rstrip().endswith("9999"):
-        raise FileError("the file is cut off: its last line is not 9999; run ccx again")
-    nodes, places = np.empty(0, dtype=int), np.empty((0, 3))
-    for head, following in pairwise(FRD_HEAD.finditer(text)):
-        body, line = text[head.end() : following.start()], text.count("\n", 0, head.start()) + 1
-        name = re.search(r"^ -4  (\w+)", body, re.M)
-        if head[0].startswith("    2C"):
-            nodes, places = _frd_rows(body, 3, "nodes", line)
-        elif head[0].startswith("  100C") and name is not None and name[1] in FRD_KINDS:
-            kind, count = FRD_KINDS[name[1]]
-            ids, values = _frd_rows(body, count, kind, line)
-            values = values[:, FRD_STRESSES] if kind == "stresses" else values
-            time = float(_numbers([head[0][12:24]], 1, "time", line)[0, 0])
-            known = np.isin(ids, nodes).all() and len(nodes) == len(ids)
-            yield ResultBlock(kind, time, ids, values, True, places if known else None)
-
-
-def _frd_rows(body: str, columns: int, what: str, line: int) -> tuple[Ints, Floats]:
-    """The rows that start with -1: node numbers (k,), ascending, and values (k,columns)."""
-    rows = [row for row in body.split("\n") if row.startswith(" -1")]
-    width = KEY + NUMBER * columns
-    if not rows or any(len(row) < width for row in rows) or "\n -3" not in body:
-        raise FileError(f"line {line}: the {what} are cut off; run ccx again", where=line)
-    words = [row[k : k + NUMBER] for row in rows for k in range(KEY, width, NUMBER)]
-    try:
-        ids = np.array([row[3:KEY] for row in rows], dtype=int)
-    except ValueError as error:
-        raise FileError(f"line {line}: the {what} cannot be read ({error})", where=line) from None
-    order = np.argsort(ids, kind="stable")
-    return ids[order], _numbers(words, columns, what, line)[order]
+        yield ResultBlock(kind, time, rows[:, 0].astype(int), rows[:, keys:])
 
 
 def _numbers(words: list[str], columns: int, what: str, line: int) -> Floats:

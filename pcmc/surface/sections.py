@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -68,8 +68,9 @@ def without_repeats(points: Floats, closed: bool) -> Floats:
     return points[new]
 
 
-def curves_by_kind(surface: Surface) -> Iterator[tuple[str, EdgeCurve]]:
-    """Each curve with its kind, by the sheets at it that are no walls: two or more, one, or none.
+def curves_by_kind(surface: Surface, without: Collection[str] = ()) -> Iterator[tuple[str, EdgeCurve]]:
+    """Each curve with its kind, by the sheets at it that are no walls: two or more, one, or none; but for
+    those of the walls ``without`` alone.
 
     >>> from pcmc import Patch
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
@@ -79,4 +80,5 @@ def curves_by_kind(surface: Surface) -> Iterator[tuple[str, EdgeCurve]]:
     """
     for curve in (*surface.topology.junctions, *surface.topology.boundary_loops):
         roofs = sum(not surface.walls[k] for k in curve.sheets)
-        yield (WALL, RIM, RIDGE)[min(roofs, 2)], curve
+        if roofs or not {surface.patches[k].name for k in curve.sheets} <= {*without}:
+            yield (WALL, RIM, RIDGE)[min(roofs, 2)], curve

@@ -24,7 +24,7 @@ from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
 from .summary import summary
 from .topology import Topology, topology
-from .values import with_values
+from .values import part_index, with_values
 from .walls import wall_patches
 
 PARTS = (
@@ -246,13 +246,11 @@ class Surface(supports.Supported):
 
     def patch_index(self, name: str) -> int:
         """Index of the patch called ``name``."""
-        names = [p.name for p in self.patches]
-        return names.index(validate.choice("patch", name, names))
+        return part_index(self, "tensions", name)
 
     def cable_index(self, name: str) -> int:
         """Index of the cable called ``name``."""
-        names = [cable.name for cable in self.cables]
-        return names.index(validate.choice("cable", name, names))
+        return part_index(self, "cables", name)
 
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
@@ -369,13 +367,13 @@ class Surface(supports.Supported):
         """The surface itself; SurfaceError where its snow ends at a free edge, as in ``with_snow``."""
         edges = np.flatnonzero(self._uncancelled(self.snows))
         if len(edges):
-            topo, first = self.topology, edges[0]
-            beside = np.unique(self.patch_of_face[(topo.edge_of_face == first).any(axis=1)])
+            topo = self.topology
+            beside = np.unique(self.patch_of_face[(topo.edge_of_face == edges[0]).any(axis=1)])
             seam = (topo.seam_edge & ~topo.one_way_edge)[edges].all() and not self.walls[beside].any()
             some = [self.patches[k] for k in beside] if seam else self.patches
             most, *others = sorted(some, key=lambda patch: -abs(patch.snow))
             step = others[0].name if seam else ""
-            checks.refuse_snow(most.snow, most.name, len(edges), topo.edges[first], step)
+            checks.refuse_snow(most.snow, most.name, len(edges), topo.edges[edges[0]], step)
         return self
 
     def __copy__(self, memo: object = None) -> Surface:

@@ -13,7 +13,7 @@ strips", α/t everywhere, tells what the mesh itself leaves.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,10 @@ from pcmc import CuttingPattern, Material, StructuralModel, Surface, cutting_pat
 from pcmc.base.arrays import Floats
 from pcmc.plan import Plan
 from pcmc.structure import StepResults, calculix, read_results, write_structure
+from pcmc.structure.calculix import NotConverged
 from pcmc.structure.inp import POINTS
 from pcmc.surface.geometry import area_vectors, face_areas, vertex_sums
+from pcmc.surface.topology import topology
 
 from ..folder import Folder
 from ..orders import slope
@@ -35,18 +37,22 @@ from .structure import Row, rounded
 EXTENSION = 0.01  # of the cloth under α
 POISSON = 0.3
 THICKNESS = 2e-4  # of the size
-COUNTS = (5, 8, 13)  # strips across the roof
 STRESSES = "*INITIAL CONDITIONS, TYPE=STRESS\n"
 
 
-def _rectangle(edge_length: float) -> Surface:
-    outline = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]]
-    return Plan(outline, edge_length=edge_length, tension=1.6).surface()
+RECTANGLE = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]]
+L_SHAPE = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.4], [1.4, 1.4], [1.4, 3.0], [0.0, 3.0]]
+CORNERED, CORNER = "L-roof", np.array([1.4, 1.4, 0.0])  # the re-entrant corner of the plan
+NEAR = 0.1  # of the size, around that corner
 
-
-SHAPES: dict[str, Callable[[], Surface]] = {
-    "cap": lambda: spherical_cap(0.05, alpha=0.8),
-    "rectangle": lambda: _rectangle(0.08),
+# the shapes and the numbers of strips across them; orders need three
+SHAPES: dict[str, tuple[Callable[[], Surface], Sequence[int]]] = {
+    "cap": (lambda: spherical_cap(0.05, alpha=0.8), (5, 8, 13)),
+    "cap of wide strips": (lambda: spherical_cap(0.05, alpha=0.8), (3,)),
+    "near hemisphere": (lambda: spherical_cap(0.05, alpha=0.55), (5, 8)),
+    "rectangle": (lambda: Plan(RECTANGLE, edge_length=0.08, tension=1.6).surface(), (5, 8, 13)),
+    "cushion": (lambda: Plan(RECTANGLE, edge_length=0.1, tension=1.6, cushion=1.5).surface(), (5, 8, 11)),
+    CORNERED: (lambda: Plan(L_SHAPE, edge_length=0.08, tension=1.6).surface(), (5, 8, 13)),
 }
 
 
@@ -54,25 +60,32 @@ def data(folder: Folder, short: bool) -> None:
     """``records``: a row per shape and number of strips."""
     calculix.expect_program()
     records: list[Row] = []
-    for name, build in SHAPES.items():
+    for name, (build, counts) in SHAPES.items():
         roof = solve(build()).surface
         alpha = float(roof.tensions.max())
         stiffness = (1.0 - POISSON) * alpha / EXTENSION
         options: dict[str, Any] = {"stiffness": (stiffness, stiffness), "poisson": POISSON}
-        for count in COUNTS[: 1 if short else None]:
+        for count in counts[: 1 if short else None]:
             pattern = cutting_pattern(roof, strips=count, anyway=True, **options)
             sewn, cut = sewn_together(pattern)
             model = membrane(sewn, stiffness)
-            plain = blown_up(model, None)
-            blown = blown_up(model, cloth_forces(sewn, cut, stiffness))
             row: Row = {"shape": name, "strips": count, "triangles": sewn.m}
-            row |= {"width": float(pattern.table["width"].max()) / sewn.size}
+            row |= {"width": float(pattern.table["width"].mean()) / sewn.size}
             row |= {"strain": float(pattern.table["strain_rms"].max()) / 100.0}
-            both = compared(model, blown, alpha)
-            row |= {"moved": compared(model, blown, alpha, plain.displacements)["shape"]}
+            plain = blown_up(model, None)
+            try:
+                blown = blown_up(model, cloth_forces(sewn, cut, stiffness))
+            except NotConverged:
+                records.append(row | {"at_rest": False})
+                continue
+            row |= {"at_rest": True, "moved": compared(model, blown, plain.displacements)["shape"]}
+            both, mesh = compared(model, blown), compared(model, plain)
             row |= {f"with_mesh_{key}": value for key, value in both.items() if key == "shape"}
             row |= {key: value for key, value in both.items() if key != "shape"}
-            row |= {f"mesh_{key}": compared(model, plain, alpha)[key] for key in ("shape", "stress_rms")}
+            row |= {f"mesh_{key}": mesh[key] for key in ("shape", "stress_rms")}
+            if name == CORNERED:
+                away = compared(model, blown, plain.displacements, CORNER)
+                row |= {f"away_{key}": away[key] for key in ("shape", "stress_mean", "stress_rms")}
             records.append(row)
     folder.write_table("records", rounded(records))
 
@@ -84,13 +97,12 @@ def sewn_together(pattern: CuttingPattern) -> tuple[Surface, Floats]:
     faces = np.concatenate([s.faces + k for s, k in zip(pattern.strips, first[:-1], strict=True)])
     cut = np.concatenate([strip.cut[strip.faces] for strip in pattern.strips])
     _, kept, number = np.unique(roof.round(9), axis=0, return_index=True, return_inverse=True)
-    whole = pattern.surface
+    whole, names = pattern.surface, [patch.name for patch in pattern.surface.patches]
+    patch = np.repeat([names.index(s.patch) for s in pattern.strips], [len(s.faces) for s in pattern.strips])
     X, F = roof[kept], number.ravel()[faces]
-    edges = np.sort(F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    once, counts = np.unique(edges, axis=0, return_counts=True)
-    rim = np.unique(once[counts == 1])
-    sewn = Surface(X, F, np.zeros(len(F), dtype=int), whole.patches[:1], fixed=rim, plane=whole.plane)
-    return sewn, cut
+    topo = topology(F, patch, len(X))
+    rim = np.isin(np.arange(len(X)), topo.edges[topo.curve_edge])
+    return Surface(X, F, patch, whole.patches, fixed=rim, plane=whole.plane), cut
 
 
 def membrane(sewn: Surface, stiffness: float) -> StructuralModel:
@@ -132,14 +144,22 @@ def blown_up(model: StructuralModel, forces: Floats | None) -> StepResults:
         return read_results(path.with_suffix(".dat"), model)[0]
 
 
-def compared(model: StructuralModel, form: StepResults, alpha: float, still: Floats | float = 0.0) -> Row:
-    """How far the membrane is from ``still`` (n,3) along its normals, over the size; its stress over α/t."""
-    surface = model.surface
+def compared(
+    model: StructuralModel, form: StepResults, still: Floats | float = 0.0, corner: Floats | None = None
+) -> Row:
+    """How far the membrane is from ``still`` (n,3) along its normals, over the size; its stress over α/t.
+
+    With a ``corner`` (3,), only farther from it than ``NEAR`` of the size."""
+    surface, faces = model.surface, model.surface.faces[model.faces]
     normal = vertex_sums(area_vectors(surface.vertices[surface.faces]), surface.faces, surface.n)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     off = np.abs(((form.displacements - still) * normal).sum(axis=1))
-    ratio = form.principal_stresses[model.faces] * model.thicknesses[0] / alpha
-    area = face_areas(surface.vertices[surface.faces[model.faces]])
+    alpha = surface.tensions[surface.patch_of_face[model.faces]]
+    ratio = form.principal_stresses[model.faces] * model.thicknesses[0] / alpha[:, None]
+    area = face_areas(surface.vertices[faces])
+    if corner is not None:
+        far = np.linalg.norm(surface.vertices - corner, axis=1) > NEAR * surface.size
+        off, ratio, area = off[far], ratio[far[faces].all(axis=1)], area[far[faces].all(axis=1)]
     share = area / area.sum()
     return {
         "shape": float(off.max()) / surface.size,
@@ -150,21 +170,29 @@ def compared(model: StructuralModel, form: StepResults, alpha: float, still: Flo
     }
 
 
+def _series(records: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """The shapes with three numbers of strips and more."""
+    shapes = records.groupby("shape", sort=False)
+    return ((str(name), given) for name, given in shapes if len(given) > 2)
+
+
 def table(folder: Folder) -> dict[str, float]:
     """``orders``: in the width of the strips, of the strain, the way back to the shape and the stress."""
     records = folder.read_table("records")
     rows: list[Row] = []
     measured: dict[str, float] = {}
-    for name, given in records.groupby("shape", sort=False):
+    for name, given in _series(records):
         width = given["width"].to_numpy()
         keys = {"strain": "strain", "moved": "moved", "stress": "stress_rms"}
+        keys |= {"away_moved": "away_shape", "away_stress": "away_stress_rms"} if name == CORNERED else {}
         orders = {key: slope(width, given[column].to_numpy()).order for key, column in keys.items()}
-        rows.append({"shape": str(name), **{key: round(order, 2) for key, order in orders.items()}})
+        rows.append({"shape": name, **{key: round(order, 2) for key, order in orders.items()}})
         finest = given.iloc[-1]
-        measured |= {f"order_{key}_{name}": round(order, 2) for key, order in orders.items()}
+        key_name = name.replace("-", "_")
+        measured |= {f"order_{key}_{key_name}": round(order, 2) for key, order in orders.items()}
         for key in ("width", "strain", "moved", "stress_mean", "stress_rms"):
-            measured[f"{key}_{name}"] = float(finest[key])
-        measured[f"moved_widest_{name}"] = float(given.iloc[0]["moved"])
+            measured[f"{key}_{key_name}"] = float(finest[key])
+        measured[f"moved_widest_{key_name}"] = float(given.iloc[0]["moved"])
     folder.write_table("orders", pd.DataFrame(rows))
     return measured
 
@@ -175,7 +203,7 @@ def figure(folder: Folder) -> None:
 
     records = folder.read_table("records")
     curves: dict[str, Any] = {}
-    for name, given in records.groupby("shape", sort=False):
+    for name, given in _series(records):
         curves[f"{name}: way back to the shape, over the size"] = given["width"], given["moved"]
         curves[f"{name}: stress over α/t less 1, root mean square"] = given["width"], given["stress_rms"]
     width = records["width"].to_numpy()

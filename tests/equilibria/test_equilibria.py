@@ -16,6 +16,7 @@ from generators import (
     cylinder,
     enneper,
     enneper_exact,
+    four_fans,
     spherical_cap,
     spherical_cap_exact,
     two_squares,
@@ -304,3 +305,11 @@ def test_the_line_may_be_a_direction_and_the_boundary():
     found = find_equilibria(cap, wider, starts=0)
     assert [one.index for one in found.found] == [0, 1]
     assert found.branches["boundary"][0].folds.parameter[0] == pytest.approx(1.2, abs=0.05)
+
+
+@pytest.mark.nightly
+def test_walls_on_both_diameters_slip_away_from_their_balance():
+    """Example 3 of the paper: each wall gets shorter as it leaves its diameter, so the index is 2."""
+    found = find_equilibria(four_fans(5), (), starts=0)
+    assert [one.index for one in found.found] == [2]
+    assert found.failed == ("The 4 ways down from a saddle of index 2: pinches off or collapses (4).",)

@@ -361,3 +361,36 @@ def test_when_the_program_has_ended_the_page_says_so(driver):
     page.enter("Tension α of cap", 0.7)
     assert "has stopped" in until(lambda: page.text("#note"), "the note")
     page.complaints()
+
+
+def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
+    from selenium.webdriver.common.keys import Keys
+
+    running = explore.start(spherical_cap(0.3))
+    try:
+        page = Explored(driver, running.url)
+        page.find("#equilibria").click()
+        until(lambda: page.text("#equilibria-result ol"), "the equilibria")
+        assert page.text("#equilibria-result ol").splitlines()[0].startswith("stable, E = ")
+        assert "Barrier from 1 over saddle 2" in page.text("#equilibria-result .detail")
+        before = page.picture()
+        page.find("#equilibria-result li:nth-child(2) button").click()
+        page.idle()
+        assert page.verdict == "saddle"
+        assert changed(before, page.picture()) > 0.05
+        points = page.driver.find_elements("css selector", ".diagram circle.way")
+        pressures = {float(point.get_attribute("aria-label").split()[1].strip(",")) for point in points}
+        assert min(pressures) < 0.6
+        points[0].send_keys(Keys.ENTER)  # on the branch, at another pressure, and by the keyboard
+        page.idle()
+        there = float(points[0].get_attribute("aria-label").split()[1].strip(","))
+        shown = page.number("Pressure p of cap").get_attribute("value")
+        assert float(shown) == pytest.approx(there, rel=1e-3)
+        assert len(page.driver.find_elements("css selector", ".diagram [aria-current=true]")) == 1
+        page.find("#undo").click()
+        page.idle()
+        assert page.verdict == "saddle"
+        assert not page.find("#equilibria-result").is_displayed()  # it is about the surface shown
+        assert page.complaints() == []
+    finally:
+        running.close()

@@ -5,20 +5,23 @@ from __future__ import annotations
 import threading
 
 import numpy as np
+import pandas as pd
 import pytest
 from asking import Client
 from browsing import until
+from scipy.spatial import cKDTree
 from small_project import HALL_WITH_ARCH
 
 import pcmc
 from generators import spherical_cap
-from pcmc import explore
+from pcmc import check_mesh, explore
 from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import ShownRoof, read_roof
-from pcmc.explore.session import Session, figures_data
+from pcmc.explore.session import Session, figures_data, solved_start
 from pcmc.panelling.distance import difference
+from pcmc.project.outcome import plan_corners
 
 CAP = spherical_cap(edge_length=0.25)
 
@@ -39,13 +42,40 @@ def apex(surface, name):
     return measure(surface, Target("apex", name)).value
 
 
-def test_the_page_says_that_it_leaves_out_members(tmp_path):
+def test_the_page_has_the_members_with_their_forces_at_every_state(tmp_path):
+    """Their pieces lie on the surface, and follow it; of a part of a roof they are left out."""
     (tmp_path / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
     explorer = explore.start(read_roof(tmp_path / "hall.toml"))
+
+    def force(header):
+        rows = [r for r in header["figures"] if r["owner"] == "member"]
+        assert [(r["quantity"], r["of"]) for r in rows] == [("least N", "wall 1"), ("largest N", "wall 1")]
+        return rows[1]["value"]
+
     try:
-        assert Client(explorer).ask("/api/open")[0]["note"].startswith("members are left out (wall 1)")
+        client = Client(explorer)
+        header, arrays = client.ask("/api/open")
+        assert "members" not in header["note"]
+        ends = arrays["member_ends"].reshape(-1, 3)
+        away, _ = cKDTree(arrays["vertices"].reshape(-1, 3)).query(ends)
+        assert away.max() < 1e-6
+        assert len(ends) == 10
+        name = header["session"]
+        higher, moved = client.ask(f"/api/{name}/settle", {"pressures": {"west": 0.36, "east": 0.36}})
+        assert moved["member_ends"].reshape(-1, 3)[5, 2] > ends[5, 2]
+        assert force(higher) != pytest.approx(force(header), rel=0.01)
     finally:
         explorer.close()
+
+
+def test_the_page_checks_the_mesh_with_the_corners_of_the_plan(hall_roof):
+    """As the command does: without them the outline would be taken as smooth there."""
+    session = Session(solved_start(hall_roof.surface))
+    here = session.check_mesh(project=hall_roof.project).table
+    there = check_mesh(hall_roof.surface, corners=hall_roof.outcome.corners).table
+    pd.testing.assert_frame_equal(here, there)
+    assert len(plan_corners(hall_roof.project, hall_roof.surface)) > 3
+    assert not len(plan_corners(None, hall_roof.surface))
 
 
 def test_a_project_opens_at_its_targets(hall_roof, client):

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from backends import every_backend
 from refusals import refused
 from starts import bezier_hall, stationary, two_caps, two_squares
 
@@ -20,7 +21,7 @@ from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import SolverState
 from pcmc.solvers.steps import Stepper
-from pcmc.stability.factorisation import SingularMatrix, available
+from pcmc.stability.factorisation import SingularMatrix
 
 
 def flat(n=8):
@@ -40,7 +41,7 @@ def weaker(n, alpha_aux=1.0, **options):
     return result, abs(result.energy / direct.energy - 1.0)
 
 
-@pytest.mark.parametrize("backend", available())
+@every_backend
 def test_from_a_pinched_surface_to_a_weaker_wall(backend):
     result, gap = weaker(8, backend=backend)
     assert result.converged

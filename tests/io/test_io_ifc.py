@@ -19,7 +19,8 @@ from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
 from pcmc.base.units import FORCES, LENGTHS, Units
 from pcmc.forces.functional import patch_areas
 from pcmc.plan import Plan, polyline
-from pcmc.structure.members import lines_on
+from pcmc.structure import StructuralModel, drawn_members
+from pcmc.structure.columns import columns_at_rest
 
 
 def roof_of(path):
@@ -66,7 +67,8 @@ def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
     members = [pcmc.Member("wall 1", pcmc.Profile.tube(0.1, 0.005), steel)]
     for y, profile in zip(sides, profiles, strict=True):
         members.append(pcmc.Member(polyline([[0, y], [4, y]]), profile, steel, name=f"edge {y:.0f}"))
-    path, lines = tmp_path / "a.ifc", lines_on(surface, members)
+    model = StructuralModel(surface, steel, 1e-3, members=members, anyway=True)
+    path, lines = tmp_path / "a.ifc", drawn_members(model)
     pcmc.write(path, surface, units=Units("m", "kN"), members=lines)
     model, _, parts = roof_of(path)
     [arch], [wall] = model.by_type("IfcMember"), model.by_type("IfcVirtualElement")
@@ -74,7 +76,7 @@ def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
     assert {part.Name for part in model.by_type("IfcBeam")} == {"edge 0", "edge 2"}
     assert get_pset(arch, "Pcmc_Member", "YoungsModulus") == 2.1e8
     assert get_material(arch).ForProfileSet.MaterialProfiles[0].Profile.WallThickness == 0.005
-    lengths = {line.name: line.bars(surface)[1].sum() for line in lines}
+    lengths = {line.name: line.segments(np.eye(3)[2])[2].sum() for line in lines}
     for part, profile in ((parts["edge 0"], profiles[0]), (arch, members[0].profile)):
         volume = get_volume(geom.create_shape(geom.settings(), part).geometry)
         assert volume == pytest.approx(profile.area * lengths[part.Name], rel=0.05)
@@ -85,6 +87,27 @@ def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
     assert again.m == surface.m
     with pytest.warns(LostWarning, match="members"):
         pcmc.write(tmp_path / "a.obj", surface, members=lines)
+
+
+def test_columns_and_stays_have_their_forces(tmp_path):
+    """IfcColumn and IfcTendon, with the force at rest of the table; nothing of it in an uncertified roof."""
+    corners = [[0, 0, 4], [10, 0, 0], [10, 10, 4], [0, 10, 0]]
+    outline, edges = [p[:2] for p in corners], {"edge": "cable", "cable": 9.0, "supports": corners}
+    start = Plan(outline, **edges, tension=1.0, pressure=0.0, edge_length=2.5).surface()
+    steel, tube, rope = pcmc.Material(2.1e8), pcmc.Profile.tube(0.1, 0.005), pcmc.Profile(3e-4, 1e-9)
+    members = [pcmc.Member([[0, 0], [0, 0]], tube, steel, name="mast")]
+    members += [pcmc.Member([[0, 0], a], rope, steel, "cable", name="stay") for a in ([-3, -1], [-1, -3])]
+    about = {"material": steel, "thickness": 1e-3, "cable_area": 1e-4, "members": members, "anyway": True}
+    at_rest = StructuralModel(pcmc.solve(start), **about)
+    forces = columns_at_rest(at_rest).set_index("member")["N"]
+    pcmc.write(tmp_path / "a.ifc", at_rest.surface, units=Units("m", "kN"), members=drawn_members(at_rest))
+    model = roof_of(tmp_path / "a.ifc")[0]
+    [mast] = model.by_type("IfcColumn")
+    stays = [part for part in model.by_type("IfcTendon") if part.Name.startswith("stay")]
+    assert [mast.Name, *(part.Name for part in stays)] == list(forces.index)
+    for part in (mast, *stays):
+        assert get_pset(part, "Pcmc_Member", "LargestForceAtRest") == pytest.approx(forces[part.Name])
+    assert all(one.forces is None for one in drawn_members(StructuralModel(start, **about)))
 
 
 def test_the_hierarchy_is_whole(tmp_path):

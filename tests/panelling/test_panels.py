@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from itertools import product
 
@@ -305,6 +306,35 @@ def test_the_command_writes_schedule_surface_and_picture(tmp_path, squares, caps
     written = np.loadtxt(table, delimiter=",", skiprows=1, usecols=(5, 6, 7))
     again = pcmc.panels(pcmc.read(fewer), 0.02)
     assert np.array_equal(written, again.panels[["a", "b", "c"]].to_numpy())
+
+
+def test_the_curve_of_families_against_change_of_shape_has_its_costs(tmp_path, squares, capsys):
+    fewer = pcmc.fewer_families(squares, 0.01, 0.02)
+    assert fewer.steps.iloc[0].tolist() == [fewer.before.count, 0.0]
+    assert fewer.steps.iloc[-1].tolist() == [fewer.after.count, fewer.change]
+    assert (np.diff(fewer.steps, axis=0) * [-1, 1] > 0).all()  # fewer families for more change
+    costs = fewer.costs(100.0, 20.0)
+    assert (costs["cost"] == 100.0 * costs["families"] + 20.0 * len(fewer.after.panels)).all()
+    assert costs["cheapest"].tolist() == [False] * (len(costs) - 1) + [True]
+    assert fewer.costs(0.0, 20.0)["cheapest"].tolist() == [True] + [False] * (len(costs) - 1)
+    halved = fewer.steps.iloc[len(fewer.steps) // 2]
+    again = pcmc.fewer_families(squares, 0.01, halved["change"])
+    assert again.change <= halved["change"]
+    assert again.after.count < fewer.before.count
+    roof, table = tmp_path / "roof.pcmc", tmp_path / "s.csv"
+    pcmc.write(roof, squares)
+    options = ["--tolerance", "0.01", "--change", "0.02", "--cost", "100,20", "-o", str(table)]
+    assert main(["panels", str(roof), *options]) == 0
+    assert re.search(rf"{fewer.after.count} +\S+ +\S+ cheapest", capsys.readouterr().out)
+    assert pd.read_csv(tmp_path / "s-costs.csv")["cost"].tolist() == pytest.approx(costs["cost"].tolist())
+    assert (tmp_path / "s-costs.svg").read_text().count("the cheapest") == 1
+    for bad in (
+        ["--change", "0.02", "--cost", "100"],
+        ["--change", "0.02", "--cost=-1,2"],
+        ["--cost", "1,2"],
+    ):
+        assert main(["panels", str(roof), "--tolerance", "0.01", *bad]) == 2
+        assert "two numbers FAMILY,PANEL" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -110,8 +110,8 @@ def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
         ({"patches": {"a": {"tension": 1.0}}, "tension": 2.0}, {"what": "tension"}),
         ({"outline": [["0", "0"], ["8", "0"], ["8", "4"]]}, {"what": "outline"}),
         (
-            {"patches": [PatchSpec(f"{k}", 1.0) for k in range(200_000)]},
-            {"what": "patches", "found": 200_000},
+            {"patches": [PatchSpec(f"{k}", 1.0) for k in range(2001)]},
+            {"what": "patches", "found": 2001},
         ),
         ({"dividers": [WALL] * 1001}, {"what": "dividers", "found": 1001}),
         ({"points": {"a\nb": [1, 1]}}, {"what": "points"}),

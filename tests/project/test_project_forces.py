@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from force_cases import BUBBLE_TOML, cables
 from refusals import refused
@@ -16,7 +17,7 @@ from pcmc.base.errors import LostWarning, OptionError
 from pcmc.forces.rooms import room_volumes
 from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.project import run, varied
-from pcmc.project.members import members_left_out
+from pcmc.project.members import members_drawn
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 SAIL_TOML = """
@@ -99,15 +100,35 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     capsys.readouterr()
 
 
-def test_files_and_drawings_say_that_they_leave_out_members(folder):
-    (folder / "hall.toml").write_text(HALL_WITH_ARCH, encoding="utf-8")
-    text = "members are left out (wall 1); a wall in whose place one stands is drawn"
+def test_rhino_and_drawings_have_members_and_other_files_say_that_they_leave_them_out(folder):
+    """The same section and force in both; the layer of the wall is hidden, and read back."""
+    import ezdxf
+    import rhino3dm
+
+    (folder / "hall.toml").write_text(HALL_WITH_ARCH.replace('"hall.obj"', '"hall.obj", "hall.3dm"'))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         outcome = run("hall.toml")
     losses = [str(w.message) for w in caught if issubclass(w.category, LostWarning)]
-    assert losses == [f"hall.obj: {text}", f"drawings: {text}"]
-    assert members_left_out(outcome) == text
+    assert losses == ["hall.obj: members are left out; a wall in whose place one stands is drawn"]
+    [arch] = members_drawn(outcome)
+    texts = arch.texts(outcome.units)
+    assert texts["N at rest"] == " to ".join(f"{N:.4g}" for N in arch.forces) + " kN"
+
+    model = rhino3dm.File3dm.Read("hall.3dm")
+    visible = {layer.Name: layer.Visible for layer in model.Layers}
+    assert (visible["wall 1"], visible["west"], visible["member wall 1"]) == (False, True, True)
+    assert "PCMC-WALL" not in visible
+    [line] = [item for item in model.Objects if item.Attributes.Name == "member wall 1"]
+    assert dict(line.Attributes.GetUserStrings()) == texts
+    points = [line.Geometry.Point(k) for k in range(line.Geometry.PointCount)]
+    np.testing.assert_allclose([(p.X, p.Y, p.Z) for p in points], arch.points)
+    assert [patch.name for patch in io.read("hall.3dm").patches] == ["west", "east", "wall 1"]
+
+    [line] = ezdxf.readfile("hall.dxf").modelspace().query('POLYLINE[layer=="PCMC-MEMBER-wall 1"]')
+    np.testing.assert_allclose([list(v.dxf.location) for v in line.vertices], arch.points)
+    words = [value for _, value in line.get_xdata("PCMC")]
+    assert words == ["wall 1", *(f"{key}: {text}" for key, text in texts.items() if key != "member")]
 
 
 def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_for(folder):

@@ -77,29 +77,26 @@ def test_the_stored_page_of_keys_is_of_today():
 
 
 # of which users call functions; the others are reached by the command or by pcmc itself
-SUBPACKAGES = [
+SUBPACKAGES = (
     "accuracy",
     "certificate",
     "compas",
-    "continuation",
     "design",
-    "diagnostics",
     "drawings",
-    "existence",
-]
-SUBPACKAGES += [
+    "equilibria",
     "forces",
     "io",
-    "margins",
     "meshing",
     "panelling",
     "plan",
     "report",
     "solvers",
+    "solvers.continuation",
     "stability",
+    "structure",
     "surface",
-]
-SUBPACKAGES += ["sweep"]
+    "sweep",
+)
 
 
 def test_every_public_function_of_the_subpackages_has_an_example():

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from backends import every_backend
 from shapes import disc
 
 from pcmc import Patch, Surface
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.solvers.smoother import HarmonicExtension
-from pcmc.stability.factorisation import available
 
 
-@pytest.mark.parametrize("backend", available())
+@every_backend
 @pytest.mark.parametrize("gap", [1e-2, 1e-7])
 def test_sheets_are_carried_along_rigidly_however_thin_a_triangle_beside_the_boundary(backend, gap):
     flat, F = disc(4)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from backends import every_backend
 from refusals import refused
 from shapes import pyramid
 from starts import four_fans, sphere, spherical_cap, two_squares
@@ -12,11 +13,10 @@ from pcmc.certificate import Verdict
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers import solve_once
 from pcmc.solvers.result import Status
-from pcmc.stability.factorisation import available
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
-    pytest.mark.parametrize("backend", available()),
+    every_backend,
 ]
 TARGETS = pytest.mark.parametrize("target", ["minimum", "stationary"])
 

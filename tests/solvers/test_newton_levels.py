@@ -6,15 +6,15 @@ import weakref
 
 import numpy as np
 import pytest
+from backends import every_backend
 
 from generators import spherical_cap, two_squares
 from pcmc.certificate import certificate
 from pcmc.meshing.refinement import refine
 from pcmc.solvers import solve_once
 from pcmc.stability import equilibrium
-from pcmc.stability.factorisation import available
 
-pytestmark = pytest.mark.parametrize("backend", available())
+pytestmark = every_backend
 
 
 @pytest.mark.parametrize("target", ["minimum", "stationary"])

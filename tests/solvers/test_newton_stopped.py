@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from backends import every_backend
 from refusals import refused
 from starts import four_fans, spherical_cap, two_caps, two_squares
 
@@ -16,7 +17,7 @@ from pcmc.stability.factorisation import BACKENDS, available
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
-    pytest.mark.parametrize("backend", available()),
+    every_backend,
 ]
 
 

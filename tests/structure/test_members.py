@@ -1,16 +1,19 @@
 """Beams, cables and rings of a structural model: what the sheets pull them with, and what CalculiX finds."""
 
+import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from refusals import refused
+from small_project import HALL_WITH_ARCH
 from starts import spherical_cap
 from structures import FABRIC, model_of, square
 
 import pcmc
 from generators import joined_caps
-from pcmc import Material, SelfWeight, Snow, StructuralModel
+from pcmc import Material, SelfWeight, Snow, StructuralModel, cli
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
@@ -20,6 +23,7 @@ from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, members_at_rest
 from pcmc.structure.member_keys import members_of
+from pcmc.structure.pulls import balancing_force, turns
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 STEEL = Material(2.1e8, density=7.85)
@@ -270,6 +274,71 @@ def test_members_of_a_project_are_refused_in_a_line():
     hole = {"curve": circle([2, 1], 0.4), "edge": "free", "member": "arch"}
     with refused(OptionError, what="member"):
         members_of({"arch": good}, Plan(area, holes=[hole], tension=2.0))
+
+
+@needs_ccx
+def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
+    """A wire in the place of an arch moves beyond span/300; an edge so soft that the film spans in its place.
+    With the stiffness that the line names neither is told."""
+
+    def weak(analysis):
+        return [line for line in analysis.answers() if "too weak" in line]
+
+    def factor(line):
+        return float(line.split("it would need ")[1].split(" times")[0])
+
+    arch = Member("wall 1", Profile.tube(0.005, 0.0005), STEEL)
+    [told] = weak(analyse(hall_with(arch), remedy=False))
+    [rest] = members_at_rest(hall_with(arch))
+    assert told.startswith("wall 1 is too weak: under form pressure it moves 0.0")
+    assert factor(told) == pytest.approx(300.0 * rest.deflection / rest.span, rel=0.01)
+    assert weak(analyse(hall_with(replace(arch, profile=arch.profile.scaled(factor(told)))))) == []
+
+    edge = Member(polyline([[0, 1], [1, 1]]), Profile.tube(0.06, 0.005), Material(2.1e6), name="edge")
+    [told] = weak(analyse(model_of(square(8, tension=2.0), members=[edge], anyway=True)))
+    assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
+    stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
+    assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
+
+
+def test_the_lines_that_the_command_offers_give_a_shape_that_does_not_bend(tmp_path, capsys):
+    """What N leaves of the sheets' pull falls below a twentieth: by the project, its lines, and again."""
+
+    def bending(model):
+        if model.beams:
+            return members_at_rest(model)[0].balance[1]
+        [cable], [pulls] = model.standing.cables, [forces_on_members(model, model.steps[0])]
+        [curve] = model.standing.topology.chains(cable.edges, np.zeros(model.surface.n, bool))
+        P = model.standing.vertices[curve.vertices]
+        return balancing_force(P, pulls[curve.vertices] - cable.tension * turns(P, False), False)[1]
+
+    path, shares = tmp_path / "hall.toml", []
+    text = HALL_WITH_ARCH.split("[output]")[0]
+    for _ in range(2):
+        path.write_text(text, encoding="utf-8")
+        assert cli.main(["structure", str(path), "-o", str(tmp_path / "hall.inp")]) == 0
+        printed = capsys.readouterr().out.splitlines()
+        outcome = pcmc.project.designed(path)
+        shares.append(bending(outcome.model(outcome.project.structure)))
+        offered = [line for line in printed if re.match("(wall|cable|name) = ", line)]
+        text = text.replace("wall = 0.6", ", ".join(offered) or "wall = 0.6")
+    assert offered == []  # the second time
+    assert shares[0] > 0.1
+    assert shares[1] < 0.05 * shares[0]
+
+
+def test_a_wall_with_a_tension_that_is_free_along_it_balances_a_line_that_does_not_bend():
+    """On the circle where two spheres meet N κ is the wall's own tension; elsewhere it is another one."""
+    off = []
+    for edge in (1.0, 0.5):
+        caps = joined_caps(edge, exact=True)
+        [beam] = members_at_rest(model_of(caps, members=[Member("wall", TUBE, STEEL)], anyway=True))
+        off.append(np.nanmean(np.abs(beam.wall_tensions - 3.0), axis=0))
+    assert (off[1] < 0.5 * off[0]).all()
+    [beam] = members_at_rest(hall_with())
+    pull, unbent = beam.wall_tensions[1:-1].T
+    assert pull[2:-2] == pytest.approx(0.6, rel=0.05)
+    assert np.ptp(unbent) > 0.1
 
 
 def test_a_cable_in_the_place_of_a_wall_finds_a_shape_that_does_not_bend():

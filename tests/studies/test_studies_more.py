@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from tables import last_row
 
-from generators import four_fans, two_squares
-from pcmc import sweep
+from generators import four_fans, spherical_cap, two_squares
+from pcmc import certify, energy, sweep
 from pcmc.accuracy import AccuracyStatus
 from pcmc.base.errors import OptionError, SweepError
 from pcmc.meshing.quality import triangle_quality
@@ -23,7 +23,8 @@ from studies.corners.cone import cone
 from studies.examples.flow import NOISE
 from studies.folder import Folder
 from studies.orders import limit_order, slope
-from studies.questions import accuracy, curved, refinement, solvers, stability
+from studies.questions import accuracy, bench, curved, refinement, solvers, stability
+from studies.reference import evolver
 from studies.registry import STUDIES, chosen, of_the_paper
 from studies.study import perform
 
@@ -309,3 +310,19 @@ def test_adaptive_meshes_go_on_up_to_the_limit_of_triangles(family, tmp_path):
 def test_every_ladder_of_stored_bars_has_several_meshes():
     bars = pd.read_csv(RESULTS / "accuracy" / "bars.csv")
     assert bars.groupby(["family", "quantity", "meshes"]).triangles.nunique().min() >= 3
+
+
+# --------------------------------------------------------------------------------------- bench
+
+
+@pytest.mark.parametrize("program", ["pcmc", "Surface Evolver", "NLopt L-BFGS", "scipy L-BFGS"])
+def test_each_program_of_the_bench_brings_a_cap_to_rest_and_is_heard_where_there_is_none(program):
+    if program == "Surface Evolver" and not evolver.available():
+        pytest.skip("evolver is not installed")
+    run = bench.PROGRAMS[program]
+    end = run(spherical_cap(0.3, alpha=0.6))
+    assert energy(end.surface) == pytest.approx(bench.EXACT, rel=0.01)
+    assert certify(end.surface, modes=0).residual < 1e-4
+    none = run(spherical_cap(0.3, alpha=0.45))
+    assert none.surface is None or certify(none.surface, modes=0).residual > bench.REST
+    assert none.said

@@ -63,38 +63,3 @@ def dat_text(model: StructuralModel, seed: int = 0) -> tuple[str, list[dict[str,
             text += "\n"
         steps.append(values)
     return text, steps
-
-
-def frd_text(model: StructuralModel, seed: int = 0) -> tuple[str, list[dict[str, np.ndarray]]]:
-    """An .frd file of random numbers for each step of a model, and the numbers, all by node."""
-    rng, steps = np.random.default_rng(seed), []
-    nodes = np.flatnonzero(model.nodes) + 1
-
-    def rows(values: np.ndarray) -> str:
-        lines = (
-            f" -1{node:10d}" + "".join(f"{v:12.5E}" for v in row)
-            for node, row in zip(nodes, values, strict=True)
-        )
-        return "\n".join(lines) + "\n -3\n"
-
-    text = "    1C\n    1UPGM               CalculiX\n"
-    text += f"    2C{len(nodes):30d}{1:38d}\n" + rows(model.standing.vertices[nodes - 1])
-    text += f"    3C{len(model.faces):30d}{1:38d}\n"
-    for k, corners in enumerate(model.standing.faces[model.active] + 1, 1):
-        text += f" -1{k:10d}    7    0    1\n -2" + "".join(f"{v:10d}" for v in corners) + "\n"
-    text += " -3\n"
-    for number in range(1, len(model.steps) + 1):
-        values = {}
-        for kind, name, count in (
-            ("displacements", "DISP", 3),
-            ("stresses", "STRESS", 6),
-            ("forces", "FORC", 3),
-        ):
-            values[kind] = rng.normal(size=(len(nodes), count)).round(4)
-            text += f"    1PSTEP{number:26d}           1           1\n"
-            text += f"  100CL  10{number}{float(number):12.9f}{len(nodes):12d}{0:22d}{1:5d}{1:12d}\n"
-            text += f" -4  {name:8s}    {count}    1\n -5  D1          1    2    1    0\n" + rows(
-                values[kind]
-            )
-        steps.append(values)
-    return text + " 9999\n", steps

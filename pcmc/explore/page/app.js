@@ -1,11 +1,12 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { capital, choice, digits, element } from "./elements.js";
+import { choice, digits, element } from "./elements.js";
 import { addSaving, follow } from "./file.js";
 import {
-  arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
+  arrowsOf, COLOURS, fieldOf, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
 import { Panel } from "./panel.js";
+import { QUESTIONS } from "./questions.js";
 import { ask, fetchFile } from "./server.js";
 import { Targets } from "./targets.js";
 import { Tools } from "./tools.js";
@@ -17,7 +18,7 @@ const POOR = 0.3; // of the worst triangle: new triangles are offered below it
 const ACTS = {
   undo: "undo", redo: "redo", reset: "reset", stabilise: "stabilise", remesh: "remesh", back: "undo",
 };
-const ENDING = [...Object.values(ACTS), "recall"]; // the words about targets are then of another surface
+const ENDING = [...Object.values(ACTS), "recall", "visit"]; // the words about targets are then of another surface
 const SHOWS = { mesh: "Mesh", supports: "Supports", walls: "Walls", smooth: "Smooth", grid: "Grid" };
 const FORMATS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
@@ -26,35 +27,6 @@ const FORMATS = {
 };
 const find = (selector) => document.querySelector(selector);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
-
-// questions about the surface shown: the words of their button meanwhile, and what shows the answer
-const QUESTIONS = {
-  check: {
-    busy: "Solving on finer meshes…",
-    show: (page, { check }) => check && showCheck(find("#check-result"), check),
-  },
-  margin: {
-    busy: "Following to the edge…",
-    body: () => ({ what: find("#margin-of").value }),
-    show(page, { margin }, { vertices }) {
-      if (!margin) return;
-      page.edge = vertices;
-      find("#margin-result .detail").textContent = capital(margin);
-      find("#margin-result").hidden = false;
-      page.showEdge(false);
-    },
-  },
-  verify: {
-    show: (page, { badge, text }) =>
-      Object.assign(find("#theorem"), { hidden: false, textContent: capital(badge), title: capital(text) }),
-  },
-  families: {
-    show(page, header, { family }) {
-      page.arrays.family = family;
-      page.colour();
-    },
-  },
-};
 
 class Page {
   pending = 0; // requests without an answer yet
@@ -231,10 +203,11 @@ class Page {
     if (findings.supports) showSupports(find("#supports"), findings, units);
     this.variants.show(header, units);
     if (!this.next) this.panel.show(header.values, values);
-    const enabled = { check: atRest, margin: atRest, verify: atRest, undo: header.undo, redo: header.redo };
+    const enabled = { check: atRest, margin: atRest, equilibria: atRest, verify: atRest, undo: header.undo, redo: header.redo };
     for (const [id, on] of Object.entries(enabled)) find(`#${id}`).disabled = !on;
     const shown = {
       "check-result": false, theorem: false, "margin-result": false, // they were about the last surface
+      "equilibria-result": this.visiting && !find("#equilibria-result").hidden,
       stabilise: atRest && verdict.name === "saddle",
       remesh: verdict.name === "degenerate" || findings.quality < POOR,
       back: !atRest && header.undo,
@@ -244,6 +217,7 @@ class Page {
     if (!this.swaying || !arrays.mode) {
       this.sway(false);
       this.viewer?.setVertices(arrays.vertices);
+      this.viewer?.setMembers(arrays.member_ends ?? []);
     }
     this.tools?.show(header.values.shown.points);
     if (header.compared !== this.compared) {
@@ -279,6 +253,13 @@ class Page {
       this.notify(error.message);
     }
     if (asking) Object.assign(asking, { disabled: !this.header.at_rest, textContent: words });
+  }
+
+  /** Show a surface of the search for equilibria, whose diagram stays. */
+  async visit(number) {
+    this.visiting = true;
+    await this.act("visit", { number });
+    this.visiting = false;
   }
 
   /** Show the shape at the edge instead of the roof, or the roof again. */
@@ -374,7 +355,7 @@ class Page {
       },
     };
     for (const [id, act] of Object.entries(ACTS)) clicks[`#${id}`] = () => this.act(act);
-    for (const name of ["check", "margin", "verify"]) clicks[`#${name}`] = () => this.look(name);
+    for (const name of ["check", "margin", "equilibria", "verify"]) clicks[`#${name}`] = () => this.look(name);
     for (const [selector, clicked] of Object.entries(clicks)) find(selector).onclick = clicked;
     for (const view of document.querySelectorAll("#views [data-view]")) {
       view.onclick = () => this.viewer?.camera.look(view.dataset.view);

@@ -71,11 +71,11 @@ export function showFindings(body, findings, figures, units) {
 
 const COLUMNS = { // of the parts of a roof, in the order of their tables
   patch: ["apex", "area", "volume", "reaction per length", "snow", "net pressure"],
-  wall: ["area", "lean"], cable: ["force", "length", "sag"], room: ["volume"],
+  wall: ["area", "lean"], cable: ["force", "length", "sag"], room: ["volume"], member: ["least N", "largest N"],
 };
 const SHORT = { "reaction per length": "Reaction", "net pressure": "Net p" };
 
-/** A table for the patches, the walls, the cables and the rooms, each with those of its quantities that are known. */
+/** A table for the patches, the walls, the cables, the rooms and the members, each with those of its quantities that are known. */
 export function showParts(root, figures, units) {
   root.replaceChildren(...Object.entries(COLUMNS).flatMap(([owner, wanted]) => {
     const own = figures.filter((one) => one.owner === owner || (owner === "patch" && one.owner === "roof"));

@@ -7,9 +7,10 @@ import { programs } from "./shaders.js";
 const MESH = [0.12, 0.16, 0.2, 0.3];
 const GRID = [0.55, 0.6, 0.65, 0.35];
 const MARK = [0.85, 0.1, 0.45, 1];
+const MEMBER = [0.88, 0.44, 0, 1];
 const WHOLE = [0, 0, 0, 1e30]; // a section that cuts nothing away: (normal, offset)
 // lines in the order in which they are drawn, and how far before the surface
-const LIFTS = { grid: 0, mesh: 1e-4, curves: 3e-4, arrows: 6e-4, section: 6e-4, marks: 2e-3 };
+const LIFTS = { grid: 0, mesh: 1e-4, curves: 3e-4, arrows: 6e-4, members: 8e-4, section: 6e-4, marks: 2e-3 };
 
 export class Viewer {
   options = { mesh: true, supports: true, walls: true, smooth: false, grid: true };
@@ -117,6 +118,12 @@ export class Viewer {
   setCut(cut) {
     this.cut = cut ?? WHOLE;
     this.fillMarks();
+  }
+
+  /** The ends of members' straight pieces, two by two, flat. */
+  setMembers(ends) {
+    this.placeLines("members", ends, MEMBER, [2.2]);
+    this.redraw();
   }
 
   /** Points to mark, and a line from one to the next. */

@@ -1,0 +1,90 @@
+// The branches of equilibria over the quantity that varies, and the equilibria at its present value.
+
+import { capital, digits, element } from "./elements.js";
+
+const [WIDTH, HEIGHT, LEFT, BOTTOM, PAD] = [320, 200, 44, 30, 10];
+const SVG = "http://www.w3.org/2000/svg";
+
+/** An element of SVG. */
+function drawn(name, attributes, text) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== undefined) made.textContent = text;
+  return made;
+}
+
+/** Least and greatest, with a little room. */
+function range(values) {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const room = 0.05 * (high - low || Math.abs(high) || 1);
+  return [low - room, high + room];
+}
+
+const kind = (index) => (index === 0 ? "stable" : `saddle, index ${index}`);
+
+/** Runs of a branch of one kind, each joined to the next: [first, last, stable]. */
+function runs(index) {
+  const found = [];
+  for (let k = 1; k < index.length; k += 1) {
+    const stable = index[k - 1] === 0 && index[k] === 0;
+    const last = found.at(-1);
+    if (last?.[2] === stable) last[1] = k;
+    else found.push([k - 1, k, stable]);
+  }
+  return found;
+}
+
+/** Draw the diagram and list the equilibria; `visit(number)` shows one, or a point of a branch. */
+export function showDiagram(root, { parameter, value, branches, equilibria, words }, units, visit) {
+  const [x0, x1] = range([value, ...branches.flatMap((branch) => branch.parameter)]);
+  const [y0, y1] = range([...equilibria.map(({ height }) => height), ...branches.flatMap((branch) => branch.height)]);
+  const x = (p) => LEFT + ((p - x0) / (x1 - x0)) * (WIDTH - LEFT - PAD);
+  const y = (h) => HEIGHT - BOTTOM - ((h - y0) / (y1 - y0)) * (HEIGHT - BOTTOM - PAD);
+  const unit = units.given ? `, ${units.length}` : "";
+  const svg = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "group", "aria-label": `Height over ${parameter}` });
+  const line = (className, ...[a, b, c, d]) => drawn("line", { class: className, x1: a, y1: b, x2: c, y2: d });
+  svg.append(
+    line("axis", LEFT, PAD, LEFT, HEIGHT - BOTTOM), line("axis", LEFT, HEIGHT - BOTTOM, WIDTH - PAD, HEIGHT - BOTTOM),
+    line("now", x(value), PAD, x(value), HEIGHT - BOTTOM),
+    drawn("text", { x: WIDTH - PAD, y: HEIGHT - 4, "text-anchor": "end" }, parameter),
+    drawn("text", { x: 2, y: PAD + 2 }, `height${unit}`),
+  );
+  for (const at of [0.1, 0.5, 0.9]) {
+    const [p, h] = [x0 + at * (x1 - x0), y0 + at * (y1 - y0)];
+    svg.append(
+      drawn("text", { x: x(p), y: HEIGHT - BOTTOM + 13, "text-anchor": "middle" }, digits(p, 3)),
+      drawn("text", { x: LEFT - 4, y: y(h) + 4, "text-anchor": "end" }, digits(h, 3)),
+    );
+  }
+  const shown = (number) => {
+    for (const one of svg.querySelectorAll("circle")) one.setAttribute("aria-current", one.dataset.number === String(number));
+    visit(number);
+  };
+  const point = (at, height, index, number, big) => {
+    const words = `${parameter} ${digits(at)}, height ${digits(height)}: ${kind(index)}`;
+    const circle = drawn("circle", {
+      cx: x(at), cy: y(height), r: big ? 5 : 4, class: big ? "" : "way", tabindex: 0, role: "button",
+      "aria-label": words, "data-number": number,
+    });
+    circle.append(drawn("title", {}, words));
+    circle.onclick = () => shown(number);
+    circle.onkeydown = ({ key }) => { if (key === "Enter" || key === " ") shown(number); };
+    svg.append(circle);
+  };
+  for (const { parameter: at, height, index } of branches) {
+    for (const [first, last, stable] of runs(index)) {
+      const points = at.slice(first, last + 1).map((p, k) => `${x(p)},${y(height[first + k])}`).join(" ");
+      svg.append(drawn("polyline", { points, class: stable ? "" : "saddle" }));
+    }
+  }
+  for (const { parameter: at, height, index, number } of branches) at.forEach((p, k) => point(p, height[k], index[k], number[k], false));
+  equilibria.forEach(({ height, index, number }) => point(value, height, index, number, true));
+  root.querySelector(".diagram").replaceChildren(svg);
+  root.querySelector("ol").replaceChildren(...equilibria.map(({ index, energy, number }) => element("li",
+    element("button", { type: "button", onclick: () => shown(number) },
+      `${kind(index)}, E = ${digits(energy, 5)}${units.given ? ` ${units.energy}` : ""}`))));
+  root.querySelector(".detail").replaceChildren(
+    element("p", "Solid: stable. Dashed: saddles. Click a point to see the roof there."),
+    ...words.map((text) => element("p", `${capital(text)}.`.replace("..", "."))));
+  root.hidden = false;
+}
