@@ -117,10 +117,10 @@ class Explorer:
         units = self.roof.outcome.units
         match act:
             case "check":
-                check = session.check_mesh(gone, self.roof.project)
+                check = session.check_mesh(gone)
                 return None if check is None else ({"check": page_data.mesh_findings(check, units)}, {})
             case "margin":
-                margin = session.margin(**given, gone=gone, project=self.roof.project)
+                margin = session.margin(**given, gone=gone)
                 if margin is None:
                     return None
                 there = page_data.drawn(margin.surface).vertices - self.origin

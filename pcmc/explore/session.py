@@ -24,8 +24,6 @@ from ..certificate.theorem import Theorem, verify
 from ..design import Parameter, Target, meet
 from ..equilibria import Equilibria, find_equilibria
 from ..meshing.remeshing import remesh
-from ..project.file import Project
-from ..project.outcome import plan_corners
 from ..project.values import changeable_values
 from ..solvers import solve, solve_once
 from ..surface import Surface
@@ -331,22 +329,13 @@ class Session:
         """Return to the start, as a new step."""
         return state.showing(self.start.surface).stepped()
 
-    def check_mesh(self, gone: Stop = lambda: False, project: Project | None = None) -> MeshCheck | None:
-        """The mesh check of the surface shown, with the corners of a project's plan; None if the page shows
-        another one, or is closed, before."""
+    def check_mesh(self, gone: Stop = lambda: False) -> MeshCheck | None:
+        """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
+        return self._look(lambda shown, check: check_mesh(shown, callback=check), gone)
 
-        def look(shown: Surface, check: Check) -> MeshCheck:
-            return check_mesh(shown, corners=plan_corners(project, shown), callback=check)
-
-        return self._look(look, gone)
-
-    def margin(self, what: str, gone: Stop = lambda: False, project: Project | None = None) -> Margin | None:
-        """How far the surface shown is from the edge; None and corners as for ``check_mesh``."""
-
-        def look(shown: Surface, check: Check) -> Margin:
-            return margin(shown, what, corners=plan_corners(project, shown), callback=check)
-
-        return self._look(look, gone)
+    def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
+        """How far the surface shown is from the edge; None as for ``check_mesh``."""
+        return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
 
     def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""

@@ -366,21 +366,16 @@ class Outcome:
     @property
     def corners(self) -> Ints:
         """(k,) the vertices of what is shown at the corners of the project's plan."""
-        corners = plan_corners(self.project, self.surface)
+        from scipy.spatial import cKDTree
+
+        plan = None if self.project is None else self.project.plan
+        if plan is None or not len(plan.corners):
+            return np.empty(0, dtype=np.int64)
+        away, nearest = cKDTree(self.surface.vertices).query(plan.corners)
+        corners: Ints = np.asarray(nearest)[np.asarray(away) <= SAME * self.surface.size]
         if not self.unfold:
             return corners
         return np.flatnonzero(np.isin(unfolded(self.surface).vertex, corners))
-
-
-def plan_corners(project: Project | None, surface: Surface) -> Ints:
-    """(k,) the vertices of a surface at the corners of a project's plan."""
-    from scipy.spatial import cKDTree
-
-    plan = None if project is None else project.plan
-    if plan is None or not len(plan.corners):
-        return np.empty(0, dtype=np.int64)
-    away, nearest = cKDTree(surface.vertices).query(plan.corners)
-    return np.asarray(nearest)[np.asarray(away) <= SAME * surface.size]
 
 
 def _reporter(what: str, progress: OnStep | None) -> Callable[[Progress], None]:

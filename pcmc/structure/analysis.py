@@ -106,25 +106,22 @@ class Analysis:
         """A row per case and combination.
 
         Columns: ``case``; ``share`` of its loads that is reached; ``taut``, the share up to which nothing is
-        slack; ``down`` and ``up``, the largest
-        deflections along Π's normal; ``moved``, the largest displacement, at ``x``, ``y``, ``z``;
-        ``least_force`` and ``largest_force`` of the principal membrane forces, force/length, the least at
-        ``least_x``, …;
-        ``slack_area``, where one of them is not above 0, and ``slack_share``, that over the area;
-        ``force_x``, …, the sum of all reactions. With a gas ``pressure`` and ``volume``.
+        slack; ``down`` and ``up``, the largest deflections along Π's normal; ``moved``, the largest
+        displacement, at ``x``, ``y``, ``z``; ``least_force`` and ``largest_force`` of the principal membrane
+        forces, force/length, the least at ``least_x``, …; ``slack_area``, where one of them is not above 0,
+        and ``slack_share``, that over the area; ``force_x``, …, the sum of all reactions. With a gas
+        ``pressure`` and ``volume``.
         """
         rows = []
         for case in self.cases:
             found, X = case.results, self.model.surface.vertices
             size = np.linalg.norm(found.displacements, axis=1)
             far, forces = int(np.nanargmax(size)), found.principal_forces
-            place = self.place_of_least(case)
+            place = X[self.model.surface.faces[self.slackest(case)]].mean(axis=0)
             area = self._areas[found.slack].sum()
             row = {"case": case.name, "share": case.share, "taut": case.taut}
-            row |= {
-                "down": max(0.0, -np.nanmin(found.deflections)),
-                "up": max(0.0, np.nanmax(found.deflections)),
-            }
+            row["down"] = max(0.0, -np.nanmin(found.deflections))
+            row["up"] = max(0.0, np.nanmax(found.deflections))
             row |= {"moved": size[far]} | dict(zip("xyz", X[far], strict=True))
             row |= {"least_force": np.nanmin(forces), "largest_force": np.nanmax(forces)}
             row |= {f"least_{axis}": value for axis, value in zip("xyz", place, strict=True)}
@@ -196,11 +193,9 @@ class Analysis:
         others["columns"] = self.columns
         return tables | {name: table for name, table in others.items() if len(table)}
 
-    def place_of_least(self, case: Case) -> Floats:
-        """(3,) the middle of the triangle whose least principal force is the smallest."""
-        face = int(np.nanargmin(case.results.principal_forces[:, 0]))
-        surface = self.model.surface
-        return np.asarray(surface.vertices[surface.faces[face]].mean(axis=0))
+    def slackest(self, case: Case) -> int:
+        """The triangle whose least principal force is the smallest."""
+        return int(np.nanargmin(case.results.principal_forces[:, 0]))
 
     def sunk(self, case: Case) -> float:
         """How far a roof that stood above Π has come below it, length; 0 if it has not."""
@@ -214,19 +209,15 @@ class Analysis:
         """A sentence for each case that is not carried, or has slack parts, and what helps."""
         units, lines = units or self.model.units, []
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
-            smallest = NOWHERE * self.model.surface.size
-            at = [0.0 if abs(row[f"least_{c}"]) < smallest else row[f"least_{c}"] for c in "xyz"]
-            x, y, z = (f"{value:.3g}" for value in at)
-            face = int(np.nanargmin(case.results.principal_forces[:, 0]))
-            patch = self.model.surface.patches[self.model.surface.patch_of_face[face]].name
-            place = f"around ({x}, {y}, {z}) of {patch!r}"
-            least = f"the least force {row['least_force']:.3g}{units.behind('tension')} {place}"
-            area = f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}"
-            area += units.behind("area")
-            if row["slack_area"] > 0.0:
-                state = f"{area}, {least}"
-            else:
-                state = f"nothing is slack yet, {least}"
+            surface = self.model.surface
+            at = [row[f"least_{c}"] * (abs(row[f"least_{c}"]) > NOWHERE * surface.size) for c in "xyz"]
+            patch = surface.patches[surface.patch_of_face[self.slackest(case)]].name
+            place = f"around ({', '.join(f'{value + 0.0:.3g}' for value in at)}) of {patch!r}"
+            state = (
+                f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}{units.behind('area')}"
+            )
+            state = state if row["slack_area"] > 0.0 else "nothing is slack yet"
+            state += f", the least force {row['least_force']:.3g}{units.behind('tension')} {place}"
             if not case.carried:
                 share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
                 lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
@@ -239,10 +230,8 @@ class Analysis:
         if any(case.taut < case.share < 1.0 for case in self.cases):
             lines.append(MESH)
         if self.remedy:
-            factor = f"{self.remedy:.3g} times as large"
-            lines.append(
-                f"tried: with tensions, cables and pressures {factor} the same shape carries all cases"
-            )
+            text = f"tried: with tensions, cables and pressures {self.remedy:.3g} times as large"
+            lines.append(f"{text} the same shape carries all cases")
         elif self.remedy is not None:
             lines.append("tried: larger tensions and pressures in the same ratio; they are not enough")
         elif not self.carried:
@@ -253,17 +242,16 @@ class Analysis:
         """The main columns of the table, and the answers."""
         shown = ["case", "share", "taut", "down", "up", "least_force", "largest_force", "slack_area"]
         shown += ["pressure"] if self.model.gas is not None else []
-        table = self.table[shown].rename(columns={"least_force": "least force", "largest_force": "largest"})
-        table = table.rename(columns={"slack_area": "slack area"})
+        heads = {"least_force": "least force", "largest_force": "largest", "slack_area": "slack area"}
+        table = self.table[shown].rename(columns=heads)
         for name in ("share", "taut"):
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
-        members = [self.members.to_string(index=False, float_format="{:.4g}".format)]
+        members = [self.members.to_string(index=False, float_format="{:.4g}".format)] * bool(self.model.beams)
         about = [*sentences(self.model, self.model.units), *cable_offers(self.model)]
-        members = [*members, *about] if len(self.members) else []
-        bars = [column_text(self.model, self.columns, self.model.units)] if len(self.columns) else []
-        return "\n".join([*units, numbers, *members, *bars, *self.answers()])
+        bars = [column_text(self.model, self.columns, self.model.units)] * bool(self.model.bars)
+        return "\n".join([*units, numbers, *members, *about, *bars, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:
@@ -318,7 +306,7 @@ def analyse(
     cases = [_case_of(model, step.name, start[: k + 2], k + 2) for k, step in enumerate(permanent)]
     found = chain([form], cases, _in_parallel(one, others, say))
     analysis = Analysis(model, tuple(found))
-    if analysis.carried or not remedy or _has_weight(model):
+    if analysis.carried or not remedy or model.surface.heavy:  # with weights the form would be another one
         return analysis
     return replace(analysis, remedy=_remedy(analysis, timeout, say))
 
@@ -381,11 +369,6 @@ def _in_parallel(one: Callable[[Step], Case], steps: Sequence[Step], say: OnCase
                 yield future.result()
         finally:  # after Ctrl-C or an error no other case begins
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _has_weight(model: StructuralModel) -> bool:
-    """Whether weights belong to the form: then it does not stay the same under larger tensions."""
-    return bool(model.surface.heavy)
 
 
 def _remedy(analysis: Analysis, timeout: float | None, say: OnCase) -> float:

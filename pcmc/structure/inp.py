@@ -15,7 +15,6 @@ from ..base.arrays import Floats, Ints, format_rows
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
-from ..surface.geometry import area_vectors
 from .frames import bar_axes
 from .loads import Step
 from .material import Material
@@ -126,7 +125,9 @@ def _beams(model: StructuralModel) -> Iterator[str]:
     if len(vertices):
         yield "*NODE, NSET=BEAMS\n"
         yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", number[vertices], *X[vertices].T)
-    for k, (line, elements) in enumerate(model.beam_elements(), 1):
+    first = model.surface.m + 1 + sum(len(cable.edges) for cable in model.standing.cables)
+    for k, line in enumerate(model.beams, 1):
+        elements, first = first + np.arange(len(line.pairs)), first + len(line.pairs)
         width, height, factor = line.member.profile.equal_rectangle
         yield f"** MEMBER_{k}: {_line(line.name)}\n*ELEMENT, TYPE=B31, ELSET=MEMBER_{k}\n"
         yield format_rows("%d,%d,%d\n", elements, *number[line.pairs].T)
@@ -192,14 +193,9 @@ def _supports(model: StructuralModel) -> Iterator[str]:
 
 def _prestress(model: StructuralModel) -> Iterator[str]:
     """σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge."""
-    surface, elements = model.standing, model.active
-    normals = area_vectors(surface.vertices[surface.faces[elements]])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    stress = np.eye(3) - normals[:, :, None] * normals[:, None, :]
-    stress *= model.prestress[:, None, None]
-    yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, stress, POINTS)
+    yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, model.stresses, POINTS)
     for cable, area, _, numbers, along in model.cable_edges():
-        pull = pull_along(surface, cable, cable.edges)[:, None, None]
+        pull = pull_along(model.standing, cable, cable.edges)[:, None, None]
         stress = pull / area * along[:, :, None] * along[:, None, :]
         yield _stresses(numbers, stress, CABLE_POINTS)
 

@@ -15,7 +15,6 @@ from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
-from ..surface.geometry import area_vectors
 from .frames import BarFrame
 from .loads import Step
 from .members import MemberLine
@@ -148,12 +147,7 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
     X = s.vertices if found is None else s.vertices + np.nan_to_num(found.displacements)
     faces = s.faces[model.active]
     thickness = model.thicknesses[s.patch_of_face[model.active], None, None]
-    if found is None:
-        normal = area_vectors(X[faces])
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        tensors = model.prestress[:, None, None] * (np.eye(3) - normal[:, :, None] * normal[:, None])
-    else:
-        tensors = found.stresses[model.faces]
+    tensors = model.stresses if found is None else found.stresses[model.faces]
     forces = model.nodal_loads(step, X - s.vertices)
     forces += at_vertices(corner_forces(X[faces], thickness * tensors), faces, s.n)
     for cable in s.cables:
@@ -255,11 +249,12 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
 def sentences(model: StructuralModel, units: Units) -> list[str]:
     """For each beam in a line: what it carries at rest, how stiff it must be, and what would not bend."""
     lines, force, length = list[str](), units.behind("force"), units.behind("length")
+    moment = f"{force}·{units.length}" if units else ""
     for beam in members_at_rest(model):
         N, share = beam.balance
         most = beam.largest
         far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
-        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment_unit(units)}"
+        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment}"
         about += f", M/N = {beam.eccentricity:.2g}{length}" if np.isfinite(beam.eccentricity) else ""
         about += f"; {beam.enough:.3g} times its E A and E I keep the"
         about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
@@ -304,12 +299,3 @@ def weak_members(
             text += f" sheets carry {100.0 * share:.0f} % of what it should; without them it would need"
             lines.append(f"{text} {max(rest.enough, worst.enough):.3g} times its E A and E I")
     return lines
-
-
-def moment_unit(units: Units) -> str:
-    """The unit of moments, with the blank before it; empty without units.
-
-    >>> moment_unit(Units("m", "kN"))
-    ' kN·m'
-    """
-    return f" {units.force}·{units.length}" if units else ""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..plan import Plan
-from ..plan.parts import curve_of
+from ..plan.parts import check_keys, curve_of
 from ..surface.curves import Curve
 from .material import Material
 from .members import ENDS, KINDS, Member
@@ -112,7 +112,9 @@ def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tup
     >>> arch.on, arch.profile.sizes
     ('wall 1', (0.1, 0.2))
     """
-    known, members = {name: _section(name, table) for name, table in given.items()}, list[Member]()
+    for name, table in given.items():
+        check_keys(table, MemberSection, f"structure.members.{name}")
+    known, members = {name: MemberSection(**table) for name, table in given.items()}, list[Member]()
     for name, section in known.items():
         section.profile(name)
         members += [section.member(name, on) for on in section.on]
@@ -141,11 +143,3 @@ def _sites(plan: Plan) -> Iterator[tuple[str, str, str | Curve]]:
             raise OptionError(f'{text}; make it edge = "fixed"', what="member", where=hole.name)
         if hole.member:
             yield hole.name, hole.member, hole.curve
-
-
-def _section(name: str, table: Mapping[str, Any]) -> MemberSection:
-    known = [f.name for f in fields(MemberSection)]
-    for key in table:
-        if key not in known:
-            raise OptionError(unknown(f"key of structure.members.{name}", key, known), what=name, found=key)
-    return MemberSection(**table)

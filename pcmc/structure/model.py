@@ -35,7 +35,7 @@ from .loads import (
 )
 from .material import Material
 from .members import Bar, Member, MemberLine, bars_on, lines_on
-from .pulls import at_vertices, balancing_force, corner_forces
+from .pulls import at_vertices, balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
@@ -190,6 +190,12 @@ class StructuralModel:
         faces, patch = s.faces[self.active], s.patch_of_face[self.active]
         return effective_tensions(s, s.vertices, faces, patch) / self.thicknesses[patch]
 
+    @cached_array
+    def stresses(self) -> Floats:
+        """(e,3,3) σ (I - ν ν): the prestress in the plane of each element, whose normal is ν."""
+        corners = self.standing.vertices[self.standing.faces[self.active]]
+        return self.prestress[:, None, None] * in_planes(corners)
+
     @cached_property
     def cable_sections(self) -> tuple[tuple[float, Material], ...]:
         """Of each cable of the standing surface the area of its section, length², and its material: those of
@@ -213,13 +219,6 @@ class StructuralModel:
     def beam_vertices(self) -> Ints:
         """The vertices of beams; their nodes come after the vertices' numbers."""
         return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
-
-    def beam_elements(self) -> Iterator[tuple[MemberLine, Ints]]:
-        """Each beam, and the numbers (k,) of its elements, which come after those of the cables."""
-        first = self.surface.m + 1 + sum(len(cable.edges) for cable in self.standing.cables)
-        for line in self.beams:
-            yield line, first + np.arange(len(line.pairs))
-            first += len(line.pairs)
 
     @cached_property
     def lines(self) -> tuple[MemberLine, ...]:
@@ -253,11 +252,8 @@ class StructuralModel:
         wall = s.patch_index(line.wall)
         faces = s.faces[s.patch_of_face == wall]
         P = s.vertices[faces]
-        normal = area_vectors(P)
-        load = s.net_pressures[wall] / 3.0 * normal[:, None]
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        tensors = s.tensions[wall] * (np.eye(3) - normal[:, :, None] * normal[:, None])
-        of_wall = at_vertices(corner_forces(P, tensors) + load, faces, s.n)
+        load = s.net_pressures[wall] / 3.0 * area_vectors(P)[:, None]
+        of_wall = at_vertices(corner_forces(P, s.tensions[wall] * in_planes(P)) + load, faces, s.n)
         N, _ = balancing_force(s.vertices[line.vertices], -of_wall[line.vertices], line.closed)
         if N <= 0.0:
             text = f'member {line.name!r}: the sheets press along it; no cable can; kind = "beam" does'

@@ -19,6 +19,17 @@ from ..base.arrays import Floats, Ints
 from ..surface.geometry import area_vectors
 
 
+def in_planes(P: Floats) -> Floats:
+    """(e,3,3) I - ν ν of triangles (e,3,3), ν their normals: a tension of 1 in each of their directions.
+
+    >>> (in_planes(np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])) + 0.0).tolist()
+    [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]]
+    """
+    normal = area_vectors(P)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    return np.eye(3) - normal[:, :, None] * normal[:, None]
+
+
 def corner_forces(P: Floats, tensors: Floats) -> Floats:
     """(e,3,3) the forces of membranes on the corners of their triangles P (e,3,3), from the tensors σ t
     (e,3,3), force per length: -σ t ½ ν × e, with e the side opposite the corner and ν the normal.

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..base import validate
-from ..base.errors import OptionError, unknown
+from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..plan import Plan
+from ..plan.parts import check_keys
 from ..surface import Surface
 from .gas import Gas
 from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
@@ -164,10 +165,7 @@ class Structure:
         """The gas that is shut in."""
         if not isinstance(self.gas, Mapping):
             return Gas() if validate.flag("gas", self.gas) else None
-        known = [f.name for f in fields(Gas)]
-        for name in self.gas:
-            if name not in known:
-                raise OptionError(unknown("key of structure.gas", name, known), what="gas", found=name)
+        check_keys(self.gas, Gas, "structure.gas")
         return Gas(**self.gas)
 
     def loads(self, roof: Sequence[str]) -> tuple[Load | tuple[Load, ...], ...]:

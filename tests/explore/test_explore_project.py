@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 
 import numpy as np
-import pandas as pd
 import pytest
 from asking import Client
 from browsing import until
@@ -14,14 +13,13 @@ from small_project import HALL_WITH_ARCH
 
 import pcmc
 from generators import spherical_cap
-from pcmc import check_mesh, explore
+from pcmc import explore
 from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import ShownRoof, read_roof
-from pcmc.explore.session import Session, figures_data, solved_start
+from pcmc.explore.session import Session, figures_data
 from pcmc.panelling.distance import difference
-from pcmc.project.outcome import plan_corners
 
 CAP = spherical_cap(edge_length=0.25)
 
@@ -66,16 +64,6 @@ def test_the_page_has_the_members_with_their_forces_at_every_state(tmp_path):
         assert force(higher) != pytest.approx(force(header), rel=0.01)
     finally:
         explorer.close()
-
-
-def test_the_page_checks_the_mesh_with_the_corners_of_the_plan(hall_roof):
-    """As the command does: without them the outline would be taken as smooth there."""
-    session = Session(solved_start(hall_roof.surface))
-    here = session.check_mesh(project=hall_roof.project).table
-    there = check_mesh(hall_roof.surface, corners=hall_roof.outcome.corners).table
-    pd.testing.assert_frame_equal(here, there)
-    assert len(plan_corners(hall_roof.project, hall_roof.surface)) > 3
-    assert not len(plan_corners(None, hall_roof.surface))
 
 
 def test_a_project_opens_at_its_targets(hall_roof, client):
