@@ -138,6 +138,17 @@ The study `panels` moves vertices of roofs at rest so that fewer different panel
 {panels.same_verdict_after:.0%} of its runs the roof keeps its verdict: in {panels.stable_after:.0%} it is
 stable, in the others a saddle."""
 
+NETS = """\
+The study `nets` lays planar quads along lines of curvature, smaller and smaller. On pieces of Delaunay's
+surfaces all are planar, and whole panels leave the surface with the size to the power
+{nets.order_panel_distance_nodoid:.1f} to {nets.order_panel_distance_unduloid:.1f}, on Example 1
+{nets.order_panel_distance_example_1:.1f}. There {nets.not_planar_example_1:.0f} panels of the finest net
+stay warped, by up to {nets.planarity_example_1:.1%} of their diagonals, at the ends of the ridge.
+On two halls with a wall between them the power is {nets.order_panel_distance_two_halls:.1f}, and
+{nets.not_planar_two_halls:.0f} panels beside the ridge stay warped; on an L-shaped roof it is
+{nets.order_panel_distance_l_roof:.1f}, and none.
+`nets/places.csv` has the umbilics and the warped panels."""
+
 SPEED = """\
 Surface Evolver solves the same mesh of Example 1, and the same cap, in the same run. `python -m studies
 benchmark` writes this table, and `benchmark/scaling.csv` and `scaling.png`, which show how time and
@@ -206,7 +217,8 @@ def report(results: Path) -> str:
     if (results / "accuracy" / "savings.csv").is_file():
         above = {"above": measured["accuracy.most_over_estimate"] - 1.0}
         sections["Adaptive meshes"] = [fill(ACCURACY, measured | above, {"worse": _worse(results)})]
-    for title, study, text in (("Mesh check", "mesh_check", CHECK), ("Panels", "panels", PANELS)):
+    texts = ("Mesh check", "mesh_check", CHECK), ("Panels", "panels", PANELS), ("Nets", "nets", NETS)
+    for title, study, text in texts:
         if (results / study / "measured.csv").is_file():
             sections[title] = [fill(text, measured)]
     if (results / "curved" / "ahead_times.csv").is_file():
