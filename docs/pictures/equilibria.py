@@ -1,4 +1,4 @@
-"""Every equilibrium of a dome: the branch in its pressure, both domes on it, and the barrier between them."""
+"""The equilibria of a dome: the branch in its pressure, both domes on it, and the barrier between them."""
 
 import pcmc
 from pcmc.plan import Plan

@@ -80,19 +80,22 @@ def lines(
             axes.plot(*_curve(label, *fits[label], xscale, yscale), color=color, linewidth=1.1)
     for label, level in (levels or {}).items():
         axes.axhline(level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5)
-    if xscale == "log":
-        _plain_ticks(axes.xaxis)
+    for scale, axis in ((xscale, axes.xaxis), (yscale, axes.yaxis)):
+        if scale == "log":
+            _plain_ticks(axis)
     add_legend(axes, len(curves) + len(levels or {}))
     return finish(figure, path)
 
 
 def _plain_ticks(axis: Any) -> None:
-    """On a logarithmic axis shorter than a decade and a half: round numbers in plain notation."""
+    """On a logarithmic axis shorter than two decades: round numbers in plain notation."""
     low, high = axis.get_view_interval()
-    if not 0.0 < low < high < 30.0 * low:
+    if not 1e-4 < low < high < 100.0 * low:
         return
     decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high))
-    steps = (1, 1.5, 2, 3, 4, 5, 6, 8) if high < 5.0 * low else (1, 2, 3, 5)
+    steps = (
+        (1, 1.5, 2, 3, 4, 5, 6, 8) if high < 5.0 * low else (1, 2, 3, 5) if high < 30.0 * low else (1, 2, 5)
+    )
     ticks = [step * decade for decade in decades for step in steps if low <= step * decade <= high]
     axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
     axis.set_ticks([], minor=True)
@@ -165,6 +168,9 @@ def convergence(
     if len(every) <= 8:
         axes.xaxis.set_ticks(every, [f"{v:.3g}" for v in every])
         axes.xaxis.set_ticks([], minor=True)
+    else:
+        _plain_ticks(axes.xaxis)
+    _plain_ticks(axes.yaxis)
     add_legend(axes, len(curves))
     return finish(figure, path)
 
@@ -262,7 +268,8 @@ def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
             marked.add(str(kind))
-            look = {"markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.8}
+            size = 6.4 if kind == "fold" else 3.6  # a fold shows around the change of index that it often is
+            look = {"markersize": size, "markerfacecolor": "white", "markeredgewidth": 0.8}
             axes.plot(rows[x], rows[y], EVENT_MARKERS[str(kind)], color=color, label=text, **look)
     return len(marked)
 

@@ -27,6 +27,7 @@ from pcmc.drawings.sheet import LAYERS, SMALL, SheetLine, box, corner, drawing_a
 from pcmc.drawings.views import ELEVATIONS, profile
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
+from pcmc.surface.colours import patch_colors
 from pcmc.surface.geometry import cross_2d, edge_vectors
 from pcmc.surface.sections import section
 
@@ -233,6 +234,13 @@ def test_cables_are_whole_curves_with_names_and_masts_are_marked(tmp_path):
     assert {"S4", "point", "force_z, kN"} <= {t.dxf.text for t in doc.layouts.get("Supports").query("TEXT")}
 
 
+def test_setting_out_begins_with_the_ends_of_the_ridge(squares, drawings):
+    first = drawings.points.iloc[:2][["point", *"xyz"]].to_numpy().tolist()
+    ridge = squares.vertices[squares.topology.junctions[0].vertices]
+    assert sorted(first[k][1:] for k in (0, 1)) == sorted(ridge[[0, -1]].tolist())
+    assert [row[0] for row in first] == ["P1", "P2"]
+
+
 def test_a_name_longer_than_dxf_allows_is_cut(tmp_path, squares):
     patches = [replace(patch, name=f"{patch.name} {'x' * 85}") for patch in squares.patches]
     given = (squares.vertices, squares.faces, squares.patch_of_face, patches, squares.fixed)
@@ -334,6 +342,9 @@ def test_rhino_files_have_ridges_rims_and_walls_as_curves(tmp_path, squares):
     assert lengths["PCMC-RIDGE"] == pytest.approx(length(junction), abs=1e-9)
     assert lengths["PCMC-RIM"] == pytest.approx(24.0, abs=1e-9)
     assert "PCMC-WALL" in lengths
+    shown = np.round(255.0 * patch_colors(squares)).astype(int).tolist()
+    colors = {layer.Name: layer.Color for layer in model.Layers}
+    assert [colors[patch.name] for patch in squares.patches] == [(*rgb, 255) for rgb in shown]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         again = pcmc.read(path)

@@ -119,6 +119,12 @@ def test_a_row_of_triangles_needs_as_few_families_as_intervals():
     assert families(lengths, 0.25).family.max() + 1 == 4
 
 
+def test_the_search_leaves_fewer_families_than_the_sweeps():
+    """Triangles of families that are dissolved go into those that stay: 10, and 11 where none does."""
+    lengths = np.random.default_rng(3).uniform(1.0, 1.4, (80, 3))
+    assert families(lengths, 0.1).family.max() + 1 == 10
+
+
 def test_areas_add_up_and_flat_panels_are_congruent_to_their_faces(caps):
     schedule = pcmc.panels(caps, 0.01)
     faces = caps.faces[schedule.panels["face"]]

@@ -63,6 +63,21 @@ def test_the_edge_of_a_flat_sheet_pulls_a_straight_beam_sideways():
     assert beam.enough == pytest.approx(300.0 * beam.deflection)
 
 
+def test_beams_have_nodes_of_their_own_tied_to_the_vertices_where_these_are(tmp_path):
+    model = hall_with()
+    pcmc.write_structure(tmp_path / "hall.inp", model)
+    text = (tmp_path / "hall.inp").read_text()
+    [line] = model.beams
+    part = re.search(r"^\*NODE, NSET=BEAMS\n(.*?)^\*", text, re.M | re.S)[1]
+    nodes = {int(row[0]): row[1:] for row in np.loadtxt(part.splitlines(), delimiter=",").tolist()}
+    assert len(nodes) == len(np.unique(line.pairs))
+    tied = re.findall(r"^\*EQUATION\n2\n(\d+),(\d),1\.,(\d+),(\d),-1\.$", text, re.M)
+    for node, axis, vertex, same in tied:
+        assert axis == same
+        assert nodes[int(node)] == pytest.approx(model.standing.vertices[int(vertex) - 1].tolist())
+    assert {int(node) for node, *_ in tied} == set(nodes) - {95, 96}  # the feet are held
+
+
 @needs_ccx
 def test_the_deflection_of_a_stiff_beam_goes_like_one_over_its_stiffness():
     """In CalculiX, too, 5 α L⁴ / 384 E I within 2 %: with a stiff member the shape is that of the form."""
