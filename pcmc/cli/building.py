@@ -16,7 +16,6 @@ from ..certificate.certificate import require_certified
 from ..drawings.net_drawings import SUFFIXES as NETS
 from ..drawings.net_drawings import net_files, net_paths
 from ..io import FORMATS, write
-from ..panelling import panel_net
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
 from ..project.settings import Output, Structure, cost_paths, schedule_paths
@@ -185,15 +184,13 @@ def _net(
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)
         progress("laying out panels")
-        surface, certificate = roof.shown
-        about: dict[str, Any] = {"anyway": build.allow_uncertified, "certificate": certificate}
-        net = panel_net(surface, size, pattern, direction=direction, **about)
+        net = roof.panel_net(size, pattern, direction, build.allow_uncertified)
         works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name)
         if picture is not None:
             works.append((picture, partial(panel_planarity, net, view=seen)))
         written = write_all(works, progress)
     print(net.text(roof.units))
-    return reports.ended(certificate.certified and roof.good, written)
+    return reports.ended(net.certificate.certified and roof.good, written)
 
 
 def draw_(

@@ -53,9 +53,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
 def flat_places(surface: Surface, X: Floats) -> Floats:
     """(n,3) where the nodes would be if the elements were flat, with the same corners."""
     place = X.copy()
-    place[surface.nodes] = np.einsum(
-        "ic,ecd->eid", lattice(surface.order).nodes / surface.order, X[surface.nodes[:, :3]]
-    )
+    place[surface.nodes] = lattice(surface.order).nodes / surface.order @ X[surface.nodes[:, :3]]
     return place
 
 

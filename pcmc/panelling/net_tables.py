@@ -18,13 +18,14 @@ from .planar import before, convex, planarity, polygon_areas, torsion
 
 KINDS = np.array(["inside", "edge", "corner"])
 SHORT = 0.1  # of the size: the ends of an edge that is shorter become one node
+BESIDE = 0.15  # of the size: beside a corner, √SLIVER and more, so that no sliver has the corner
 SLIVER = 0.02  # of the size squared: twice the area of a panel between a rim and its chord that is left out
 
 
 def tidied(net: Net, size: float) -> Net:
     """A net without short edges and slivers."""
     P, kind, start, corner = net.points, net.kind, net.start, net.corner
-    number = _merged(P, kind, np.stack([corner, corner[before(start)]], axis=1), SHORT * size)
+    number = _merged(P, kind, np.stack([corner, corner[before(start)]], axis=1), size)
     owner = np.repeat(np.arange(len(start) - 1), np.diff(start))
     used = number[corner]
     shown = used != used[before(start)]
@@ -33,6 +34,8 @@ def tidied(net: Net, size: float) -> Net:
         start = np.append(np.flatnonzero(np.diff(owner, prepend=-1)), len(owner))
         on_rim = np.add.reduceat(kind[used] == INSIDE, start[:-1]) == 0
         sliver = on_rim & (2.0 * polygon_areas(P, start, used) < SLIVER * size**2)
+        alone = (kind[used] == CORNER) & (np.bincount(used)[used] == 1)
+        sliver &= ~np.logical_or.reduceat(alone, start[:-1])  # the corner would be cut off
         shown = np.repeat((np.diff(start) > 2) & ~sliver, np.diff(start))
         uses = np.bincount(used[shown], minlength=len(P))
         shown &= (kind[used] != EDGE) | (uses[used] > 1)  # else no other panel ends there
@@ -44,11 +47,12 @@ def tidied(net: Net, size: float) -> Net:
     return net._replace(points=P[nodes], normals=net.normals[nodes], kind=kind[nodes], **panels)
 
 
-def _merged(P: Floats, kind: Ints, pairs: Ints, short: float) -> Ints:
-    """(n,) for each node the one that it is merged with: at the ends of edges shorter than ``short``.
+def _merged(P: Floats, kind: Ints, pairs: Ints, size: float) -> Ints:
+    """(n,) for each node the one that it is merged with: at the ends of short edges.
 
     A corner stays, else a node of a ridge or rim; two corners are not merged.
     """
+    short = size * np.where((kind[pairs] == CORNER).any(axis=1), BESIDE, SHORT)
     label = components(pairs[segment_lengths(P, pairs) < short], len(P))
     first = np.lexsort((-kind, label))
     stays = first[np.unique(label[first], return_index=True)[1]]

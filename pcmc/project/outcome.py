@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..design import Design
     from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
-    from ..panelling import FewerFamilies, Panels
+    from ..panelling import FewerFamilies, PanelNet, Panels
     from ..report import RoofReport
     from ..structure import Analysis
     from ..structure.model import StructuralModel
@@ -228,6 +228,13 @@ class Outcome:
         from ..panelling import fewer_families
 
         return fewer_families(self.shown.surface, tolerance, change, **options)
+
+    def panel_net(self, size: float, pattern: str, direction: float, anyway: bool = False) -> PanelNet:
+        """Quads or hexagons on what is shown; see ``pcmc.panel_net``."""
+        from ..panelling import panel_net
+
+        surface, certificate = self.shown
+        return panel_net(surface, size, pattern, direction=direction, anyway=anyway, certificate=certificate)
 
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""

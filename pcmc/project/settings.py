@@ -21,8 +21,11 @@ from ..cloth.settings import CuttingOptions
 from ..cloth.sheets import SUFFIXES as PATTERNS
 from ..cloth.sheets import table_paths
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
+from ..drawings.net_drawings import SUFFIXES as NETS
+from ..drawings.net_drawings import net_paths
 from ..drawings.sheet import FORMATS
 from ..meshing.remeshing import check_lengths, remesh, size_note
+from ..panelling.panel_net import PATTERNS as NET_PATTERNS
 from ..plot.figure import SUFFIXES
 from ..plot.scene import VIEWS
 from ..report.document import SUFFIXES as REPORTS
@@ -36,7 +39,7 @@ COLOURS = ("patches", "curvature", "error", "reactions")
 CSV, INP = ".csv", ".inp"
 SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
 SAME_WARP = 1.0  # degree: directions of [pattern] and [structure] that differ by less are one
-LISTS = ("files", "drawings", "pattern")  # keys of several files
+LISTS = ("files", "drawings", "net", "pattern")  # keys of several files
 SECTION = TypeVar("SECTION")
 
 
@@ -156,6 +159,10 @@ class Output:
     panels : the schedule of panels, .csv; NAME-families.csv and NAME-edges.csv come with it.
     tolerance : largest difference of edges in a family of panels; with it drawings and report have them.
     panel_sheets : whether drawings have each panel at true size; needs ``tolerance``.
+    net : files of a net of quads or hexagons: .csv, .obj, .dxf, .pdf, .svg; see ``pcmc panels --pattern``.
+    net_pattern : of the net: planar-quads along lines of curvature; quads or hexagons of a grid in plan.
+    net_size : edge of its panels, length; needs ``net``.
+    net_direction : of a grid in plan, degrees from x.
     structure : the structural model, .inp; needs the section [structure].
     pattern : files of the cutting pattern: .dxf, .pdf, .svg, .csv; needs the section [pattern].
     report : the report, .pdf; see ``pcmc report``.
@@ -173,6 +180,10 @@ class Output:
     panels: PathLike | None = None
     tolerance: float | None = None
     panel_sheets: bool = False
+    net: Sequence[PathLike] = ()
+    net_pattern: str = field(default="planar-quads", metadata={"kind": NET_PATTERNS})
+    net_size: float | None = None
+    net_direction: float = 0.0
     structure: PathLike | None = None
     pattern: Sequence[PathLike] = ()
     report: PathLike | None = None
@@ -186,6 +197,17 @@ class Output:
             validate.positive("tolerance", self.tolerance)
         for drawing in self.drawings:
             suffix_of(drawing, DRAWINGS, "a drawing")
+        for file in self.net:
+            suffix_of(file, NETS, "a net of panels")
+        validate.choice("net_pattern", self.net_pattern, NET_PATTERNS)
+        validate.number("net_direction", self.net_direction)
+        if self.net_size is not None:
+            validate.positive("net_size", self.net_size)
+        if bool(self.net) != (self.net_size is not None):
+            text = (
+                "net: files of a net need net_size = LENGTH, the edge of its panels, and net_size needs net"
+            )
+            raise OptionError(text, what="net_size" if self.net else "net")
         if self.panels is not None:
             suffix_of(self.panels, (CSV,), "a schedule of panels")
         if self.structure is not None:
@@ -207,21 +229,25 @@ class Output:
     @property
     def documents(self) -> bool:
         """Whether there are any besides files and a picture."""
-        return bool(self.drawings or self.pattern) or {self.panels, self.structure, self.report} != {None}
+        return bool(self.drawings or self.pattern or self.net) or {
+            self.panels,
+            self.structure,
+            self.report,
+        } != {None}
 
     @property
     def names(self) -> list[str]:
         """The names of the files, as they are given."""
         single = [getattr(self, name) for name in SINGLE]
-        return [
-            str(name) for name in (*self.files, *self.drawings, *self.pattern, *single) if name is not None
-        ]
+        several = [file for name in LISTS for file in getattr(self, name)]
+        return [str(name) for name in (*several, *single) if name is not None]
 
     @property
     def paths(self) -> list[Path]:
         """All files that are known before the roof is; sheets as .svg get numbers."""
         others = schedule_paths(Path(self.panels))[1:] if self.panels is not None else []
         others += [path for file in self.pattern for path in table_paths(Path(file))[1:]]
+        others += [path for file in self.net for path in net_paths(Path(file))[1:]]
         return [Path(name) for name in self.names] + others
 
     def in_folder(self, folder: Path) -> Output:
@@ -236,6 +262,8 @@ class Output:
             expect_length(units.length, "a drawing")
         if any(Path(file).suffix.lower() != CSV for file in self.pattern):
             expect_length(units.length, "a cutting pattern")
+        if any(Path(file).suffix.lower() in DRAWINGS for file in self.net):
+            expect_length(units.length, "a net of panels")
         if self.pattern and pattern is None:
             text = "a cutting pattern needs the width of the cloth; add [pattern] with width, strips or seams"
             raise OptionError(text, what="pattern", expected="a table")

@@ -20,6 +20,7 @@ from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
+from ..drawings.net_drawings import net_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
 from ..structure import Analysis, DrawnMember, StructuralModel, write_structure
@@ -56,6 +57,10 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
                 add("drawing" if sheets[0].suffix.lower() == ".svg" else "drawings", [sheets])
         if output.panels is not None and output.tolerance is not None:
             add("panels", schedule_jobs(Path(output.panels), outcome.panels(output.tolerance, anyway=anyway)))
+        if output.net_size is not None:
+            progress("laying out panels")
+            net = outcome.panel_net(output.net_size, output.net_pattern, output.net_direction, anyway)
+            add("net of panels", net_files(net, output.net, outcome.units, output.sheet, outcome.name))
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
             add("structural model", [model_job(Path(output.structure), model)])

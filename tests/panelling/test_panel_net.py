@@ -106,6 +106,15 @@ def test_triangles_that_planarity_lays_flat_on_a_rim_are_left_out_and_the_rim_st
     assert len(net.points) - len(net.beams) + len(net.panels) == 1
 
 
+def test_no_corner_of_a_roof_is_cut_off():
+    outline = [[0, 0], [12, 0], [12, 6], [6, 6], [6, 10], [0, 10]]
+    roof = pcmc.solve(Plan(outline, edge_length=0.4, tension=5.0).surface()).surface
+    for size in (0.7, 0.8, 1.1):
+        nodes = panel_net(roof, size).nodes
+        corners = nodes.loc[nodes["kind"] == "corner", ["x", "y"]].to_numpy().round(9).tolist()
+        assert sorted(corners) == sorted(outline)
+
+
 def test_the_share_of_the_roof_that_panels_cover_grows_as_they_get_smaller(walled):
     left = [1.0 - panel_net(walled, size, "quads").covered for size in (1.6, 0.8)]
     assert 0.0 < 2.0 * left[1] < left[0] < 0.01

@@ -131,6 +131,12 @@ UNFINISHED = "[solve]\niterations = 1\n"
             "views",
         ),
         (UNITS + SMALL + OUTPUT + 'drawings = ["a.dxf"]\nsheet = "B2"', "output.sheet"),
+        (SMALL + OUTPUT + 'net = ["a.dxf"]\nnet_size = 1.0', "units"),
+        (SMALL + OUTPUT + 'net = ["a.obj"]', "net_size"),
+        (SMALL + OUTPUT + "net_size = 1.0", "net"),
+        (SMALL + OUTPUT + 'net = ["a.obj"]\nnet_size = -1.0', "net_size"),
+        (SMALL + OUTPUT + 'net = ["a.stl"]\nnet_size = 1.0', "a.stl"),
+        (SMALL + OUTPUT + 'net = ["a.obj"]\nnet_size = 1.0\nnet_pattern = "octagons"', "output.net_pattern"),
     ],
 )
 def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypatch, text, key):
@@ -158,6 +164,24 @@ def test_panels_larger_than_a_sheet_are_in_model_space(tmp_path, monkeypatch):
     doc = ezdxf.readfile(tmp_path / "a.dxf")
     assert "Panels larger than A4" in doc.layouts.names()
     assert len(doc.modelspace().query('LWPOLYLINE[layer=="PCMC-CUT"]')) == 26
+
+
+def test_a_project_with_a_net_writes_its_files_as_the_command_does(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    output = 'net = ["net.obj", "net.csv", "net.dxf", "net.pdf"]\nnet_size = 0.6\nsheet = "A2"\n'
+    output += 'net_pattern = "quads"\nnet_direction = 20.0\n'
+    (tmp_path / "roof.toml").write_text(UNITS + SMALL + OUTPUT + output, encoding="utf-8")
+    assert cli.main(["solve", "roof.toml"]) == 0
+    names = {"net.obj", "net.csv", "net-nodes.csv", "net-beams.csv", "net.dxf", "net.pdf"}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"roof.toml"}
+    polygons = [line for line in Path("net.obj").read_text().splitlines() if line.startswith("f ")]
+    layouts = ezdxf.readfile("net.dxf").layouts.names()
+    assert len(polygons) == len(Path("net.csv").read_text().splitlines()) - 1
+    assert {"Panels and nodes in plan", "Nodes", "Panels"} < set(layouts)
+    assert len(words_of("net.pdf")) == len(layouts) - 1  # besides the model
+    options = ["--pattern", "quads", "--size", "0.6", "--direction", "20", "-o", "same.obj"]
+    assert cli.main(["panels", "roof.toml", *options]) == 0
+    assert Path("same.obj").read_bytes() == Path("net.obj").read_bytes()
 
 
 def test_an_uncertified_roof_writes_nothing_or_marked_documents(tmp_path, monkeypatch):
