@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.integrate import simpson
+from scipy.interpolate import CubicSpline
 from scipy.linalg import eigvalsh_tridiagonal
 from scipy.spatial import cKDTree
 
@@ -35,8 +36,8 @@ class Meridian:
     @cached_property
     def tangent(self) -> Floats:
         """(k,2) r' and z'."""
-        step = self.length / (len(self.r) - 1)
-        along = np.gradient(np.column_stack([self.r, self.z]), step, axis=0, edge_order=2)
+        s = np.linspace(0.0, self.length, len(self.r))
+        along = np.asarray(CubicSpline(s, np.column_stack([self.r, self.z]))(s, 1))
         return along / np.linalg.norm(along, axis=1)[:, None]
 
     @property

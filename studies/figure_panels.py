@@ -26,10 +26,12 @@ def curve_panels(
     width: int = 1200,
     height: int = 250,
     ticks: Sequence[float] = (),
+    looks: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Curves y(x) by label in panels by title, logarithmic axes, one scale, one legend below.
 
-    Curves that lie on each other all stay visible. With ``ticks`` along x both axes have plain numbers.
+    Curves that lie on each other all stay visible, unless their ``looks`` are given by label. With ``ticks``
+    along x both axes have plain numbers.
     """
     from matplotlib.ticker import FuncFormatter, NullLocator
 
@@ -40,7 +42,7 @@ def curve_panels(
     axes, _ = grid(figure, len(panels), columns, sharex=True, sharey=True)
     across, up = (_range([pair[k] for curves in panels.values() for pair in curves.values()]) for k in (0, 1))
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
-    looks = {
+    looks = looks or {
         label: {"color": CURVES[k % len(CURVES)], **overlap_style(k, len(labels))}
         for k, label in enumerate(labels)
     }
@@ -58,7 +60,7 @@ def curve_panels(
         place.set_title(title, fontsize=SMALL, color=INK, pad=2.5)
         place.set_ylabel("" if k % columns else ylabel, fontsize=SMALL, color=INK, labelpad=2.0)
         place.set_xlabel(xlabel if last else "", fontsize=SMALL, color=INK, labelpad=1.5)
-    _legend(figure, {}, TEXT, columns=3, lines=looks)
+    _legend(figure, {}, TEXT, columns=3, lines={label: looks[label] for label in labels})
     finish(figure, path)
 
 

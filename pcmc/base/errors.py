@@ -50,6 +50,10 @@ class SurfaceError(PcmcError):
     """The arrays given do not describe a surface that can be solved."""
 
 
+class CurvedContactError(SurfaceError):
+    """Curved elements would have to rest on Π, which only flat triangles do."""
+
+
 class OptionError(PcmcError):
     """A parameter has a value that is not allowed."""
 

@@ -1,12 +1,13 @@
-"""The force of a cable's weight g per length: the part Σ g ℓ z̄ of E; gradient and Hessian block.
+"""The force of a cable's weight g per length: the part Σ g ∫ z ds of E; gradient and Hessian block.
 
-z̄ is the height of an edge's middle over Π, whose normal is n; ℓ and t are as in ``cables``. With σ = -1 at
-the end a and 1 at b,
+z is the height over Π, whose normal is n; x, N_i and t along an edge are as in ``cables``. Then
 
-    ∂/∂x_i = g (½ ℓ n + σ_i z̄ t),     ∂²/∂x_i∂x_j = g (½ σ_j n tᵀ + ½ σ_i t nᵀ + σ_i σ_j z̄ (1 - t tᵀ) / ℓ)
+    ∂/∂x_i = g ∫ N_i |x'| n + N_i' z t
+    ∂²/∂x_i∂x_j = g ∫ N_i N_j' n tᵀ + N_i' N_j t nᵀ + N_i' N_j' z (1 - t tᵀ) / |x'|
 
-and L has (g z̄)₊/ℓ. So a cable of weight g pulls with τ + g z: in its plane, where nothing else acts, it hangs
-in the catenary z + τ/g = c cosh(x/c). Where τ + g z ≤ 0 it is under compression.
+over 0..1, and L has ∫ (g z)₊ N_i' N_j' / |x'|. Of a straight edge z is the height of its middle, N = ½. So
+a cable of weight g pulls with τ + g z: in its plane, where nothing else acts, it hangs in the catenary
+z + τ/g = c cosh(x/c). Where τ + g z ≤ 0 it is under compression.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..surface import Surface
-from .cables import ENDS, PAIRS, across, directions, inverse
+from ..surface.lagrange import side_shapes
+from .cables import across, along, inverse
 from .elements import Elements
 
 
@@ -31,26 +33,29 @@ def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
     >>> load.value.tolist(), load.gradient()[0, 0].round(9).tolist()
     ([7.5], [1.2, -0.9, 1.25])
     """
-    ends, _, weight = surface.cable_edges
+    nodes, _, weight = surface.cable_sides
     if weight.any():
-        yield moments(surface, X, ends, weight)
+        yield moments(surface, X, nodes, weight)
 
 
-def moments(surface: Surface, X: Floats, ends: Ints, weight: Floats) -> Elements:
-    """Σ g ℓ z̄ over edges (c,2) of weights (c,) at X (n,3)."""
-    n, (t, length) = np.array(surface.plane.normal), directions(X, ends)
-    z = surface.plane.height(X)[ends].mean(axis=1)
+def moments(surface: Surface, X: Floats, nodes: Ints, weight: Floats) -> Elements:
+    """Σ g ∫ z ds over edges of nodes (c,p+1) and weights (c,) at X (n,3)."""
+    n, (N, slope, dt) = np.array(surface.plane.normal), side_shapes(nodes.shape[1] - 1)
+    t, speed = along(X, nodes)
+    z = surface.plane.height(N @ X[nodes])
 
     def gradient() -> Floats:
-        return np.asarray(0.5 * length[:, None, None] * n + (z[:, None] * ENDS)[:, :, None] * t[:, None])
+        fall = np.einsum("qi,cq->ci", N, dt * speed)[..., None] * n
+        return np.asarray(fall + np.einsum("qi,cqx->cix", slope, (dt * z)[..., None] * t))
 
     def hessian() -> Floats:
-        bend = PAIRS[..., None, None] * ((z * inverse(length))[:, None, None] * across(t))[:, None, None]
-        lean = 0.5 * n[:, None] * t[:, None, :]
-        tilt = np.einsum("j,exy->ejxy", ENDS, lean)[:, None]
-        return np.asarray(bend + tilt + np.einsum("i,eyx->eixy", ENDS, lean)[:, :, None])
+        bend = (dt * z * inverse(speed))[..., None, None] * across(t)
+        lean = np.einsum("qi,qj,x,cqy->cijxy", N, slope, n, dt[:, None] * t)
+        bent = np.einsum("qi,qj,cqxy->cijxy", slope, slope, bend)
+        return np.asarray(bent + lean + lean.transpose(0, 2, 1, 4, 3))
 
     def stiffness() -> Floats:
-        return np.asarray((np.where(weight * z > 0.0, z, 0.0) * inverse(length))[:, None, None] * PAIRS)
+        pull = np.where(weight[:, None] * z > 0.0, dt * z, 0.0) * inverse(speed)
+        return np.asarray(np.einsum("qi,qj,cq->cij", slope, slope, pull))
 
-    return Elements(ends, length * z, gradient, hessian, stiffness).times(weight)
+    return Elements(nodes, (dt * z * speed).sum(axis=1), gradient, hessian, stiffness).times(weight)

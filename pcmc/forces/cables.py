@@ -1,10 +1,12 @@
 """The force of a cable: the part Σ τ ℓ of E over edges with a line tension τ; gradient and Hessian block.
 
-An edge from a to b has the length ℓ = |b - a| and the direction t = (b - a) / ℓ. Then
+Along an edge of nodes x_i with shape functions N_i (``surface.lagrange``) x = Σ N_i x_i and x' = Σ N_i' x_i,
+its direction is t = x'/|x'|, and
 
-    ∂ℓ/∂b = t = -∂ℓ/∂a,     ∂²ℓ/∂b² = (1 - t tᵀ) / ℓ = ∂²ℓ/∂a² = -∂²ℓ/∂a∂b
+    ℓ = ∫ |x'|,     ∂ℓ/∂x_i = ∫ N_i' t,     ∂²ℓ/∂x_i∂x_j = ∫ N_i' N_j' (1 - t tᵀ) / |x'|
 
-and L has τ/ℓ. An edge without length has no direction and contributes none of these.
+over 0..1, and L has τ N_i' N_j' / |x'|. Of a straight edge from a to b, N' is -1 and 1, and |x'| = |b - a|.
+Where that is 0 an edge has no direction and contributes none of these.
 """
 
 from __future__ import annotations
@@ -16,12 +18,10 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
 from ..surface import Surface
+from ..surface.lagrange import side_shapes
 from ..surface.parts import Cable
 from ..surface.topology import Topology
 from .elements import Elements
-
-ENDS = np.array([-1.0, 1.0])  # the signs of ∂ℓ at a and b
-PAIRS = np.outer(ENDS, ENDS)
 
 
 def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
@@ -35,39 +35,48 @@ def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
     ([10.0], [[[1.6, -1.2, 0.0], [-1.6, 1.2, 0.0]]])
     """
     if surface.cables:
-        yield lengths(X, surface.cable_edges.ends).times(surface.cable_edges.tension)
+        yield lengths(X, surface.cable_sides.ends).times(surface.cable_sides.tension)
 
 
-def lengths(X: Floats, ends: Ints) -> Elements:
-    """Σ ℓ over edges (c,2) at X (n,3)."""
-    t, length = directions(X, ends)
+def lengths(X: Floats, nodes: Ints) -> Elements:
+    """Σ ℓ over edges of nodes (c,p+1) at X (n,3)."""
+    _, slope, weight = side_shapes(nodes.shape[1] - 1)
+    t, speed = along(X, nodes)
 
     def hessian() -> Floats:
-        return np.asarray(
-            PAIRS[..., None, None] * (inverse(length)[:, None, None] * across(t))[:, None, None]
-        )
+        bend = (weight * inverse(speed))[..., None, None] * across(t)
+        return np.asarray(np.einsum("qi,qj,cqxy->cijxy", slope, slope, bend))
 
     def stiffness() -> Floats:
-        return np.asarray(inverse(length)[:, None, None] * PAIRS)
+        return np.asarray(np.einsum("qi,qj,cq->cij", slope, slope, weight * inverse(speed)))
 
-    return Elements(ends, length, lambda: ENDS[:, None] * t[:, None], hessian, stiffness)
+    def gradient() -> Floats:
+        return np.asarray(np.einsum("qi,cqx->cix", slope, weight[:, None] * t))
+
+    return Elements(nodes, speed @ weight, gradient, hessian, stiffness)
+
+
+def along(X: Floats, nodes: Ints) -> tuple[Floats, Floats]:
+    """Unit directions (c,q,3) and speeds |x'| (c,q) of edges of nodes (c,p+1) at X (n,3)."""
+    x = side_shapes(nodes.shape[1] - 1)[1] @ X[nodes]
+    speed = np.sqrt(np.einsum("cqx,cqx->cq", x, x))
+    return x / np.where(speed > 0.0, speed, 1.0)[..., None], speed
 
 
 def inverse(length: Floats) -> Floats:
-    """(c,) 1/ℓ; 0 without length."""
+    """1/ℓ; 0 without length."""
     return np.asarray(1.0 / np.where(length > 0.0, length, np.inf))
 
 
 def across(t: Floats) -> Floats:
-    """(c,3,3) 1 - t tᵀ."""
-    return np.asarray(np.eye(3) - t[:, :, None] * t[:, None, :])
+    """(…,3,3) 1 - t tᵀ of directions (…,3)."""
+    return np.asarray(np.eye(3) - t[..., :, None] * t[..., None, :])
 
 
 def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
     """Unit directions (c,3) and lengths (c,) of edges (c,2) at X (n,3); zero without length."""
-    side = X[ends[:, 1]] - X[ends[:, 0]]
-    length = np.sqrt(np.einsum("ij,ij->i", side, side))
-    return side / np.where(length > 0.0, length, 1.0)[:, None], length
+    t, length = along(X, ends)
+    return t[:, 0], length[:, 0]
 
 
 def cable_pulls(surface: Surface, X: Floats) -> Floats:

@@ -59,9 +59,8 @@ class Linearisation:
         turn = np.zeros(len(self.X))
         if classes.nodes.shape[1] == 3:
             _add_turns(classes.faces, self.X, d, self.sheet_factor, turn)
-        else:  # the normals are quadratic in X
-            ends = [normal_vectors(surface, classes, self.X, self.X + side * d) for side in (1.0, -1.0)]
-            turn = 0.5 * (self.sheet_factor * (ends[0] - ends[1])).sum(axis=1)
+        else:
+            turn = (self.sheet_factor * normal_vectors(surface, classes, self.X, d)).sum(axis=1)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)

@@ -240,15 +240,13 @@ def _fill(
             basis[v, 1, d], basis[v, 2, d] = second[d], third[d]
 
 
-def normal_vectors(
-    surface: Surface, classes: VertexClasses, X: Floats, there: Floats | None = None
-) -> Floats:
+def normal_vectors(surface: Surface, classes: VertexClasses, X: Floats, d: Floats | None = None) -> Floats:
     """(n,3) along the sheets' normals: the area vectors of flat triangles around each vertex.
 
     At the nodes of curved elements the unit normals of the corners are interpolated, each of the triangles
     around it in the same sheet and their mirror images: where the normals of nodes are uneven, so are their
-    distances after a step, and elements of order 4 and more lose their order. Quadratic in ``there``, if
-    those of these positions are asked for, with the lengths that make them unit normals at X.
+    distances after a step, and elements of order 4 and more lose their order. With a motion d (n,3) of
+    these, how they change along it, their lengths kept.
     """
     if classes.nodes.shape[1] == 3:
         return vertex_area_vectors(X, classes.faces)[0]
@@ -263,12 +261,13 @@ def normal_vectors(
 
     around = stars(X)
     length = np.linalg.norm(around, axis=1)[:, None]
-    around = around if there is None else stars(there)
+    if d is not None:  # area vectors are quadratic in X
+        around = 0.5 * (stars(X + d) - stars(X - d))
     around /= np.where(length > 0.0, length, 1.0)
     per_element = len(law) // len(nodes)
     corners = nodes[:, :3] + n * law[::per_element, None]
     place, out = lattice(isqrt(per_element)).nodes, np.zeros_like(X)
-    out[nodes] = np.einsum("kc,ecd->ekd", place / isqrt(per_element), around[corners])
+    out[nodes] = place / isqrt(per_element) @ around[corners]
     return out
 
 

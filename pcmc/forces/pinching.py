@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
-from ..base.errors import SurfaceError
+from ..base.errors import CurvedContactError
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
@@ -175,13 +175,13 @@ class StandingPart:
 
     @classmethod
     def of(cls, whole: Surface, walls: Walls, resting: Bools) -> StandingPart:
-        """The part that stands where the given vertices rest; SurfaceError for curved elements there."""
+        """The part that stands where the given vertices rest; CurvedContactError if elements are curved."""
         if whole.order > 1 and resting.any():
             message = (
                 f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only flat"
             )
             message += " triangles have contact; give order=1"
-            raise SurfaceError(message, what="order", found=whole.order, expected=1)
+            raise CurvedContactError(message, what="order", found=whole.order, expected=1)
         surface = _without_pinched_walls(whole, walls, resting)
         links, beside = resting_links(walls, resting), beside_resting(walls, resting)
         return cls(whole, walls, resting, surface, vertex_classes(surface, links, beside))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..base.errors import SurfaceError
+from ..base.errors import CurvedContactError, SurfaceError
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import known_order, lattice
@@ -45,7 +45,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
         raise SurfaceError(message, what="order", found=order, expected=surface.order)
     if standing_part(surface).resting.any():
         message = "order: a wall rests on the plane, and only flat triangles have contact; give order=1"
-        raise SurfaceError(message, what="order", found=order, expected=1)
+        raise CurvedContactError(message, what="order", found=order, expected=1)
     fine = refine(surface, order.bit_length() - 1, project).rebuilt(order=order)
     return fine.moved(blended(fine, fine.vertices, np.ones(fine.n, dtype=bool)))
 
@@ -53,9 +53,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
 def flat_places(surface: Surface, X: Floats) -> Floats:
     """(n,3) where the nodes would be if the elements were flat, with the same corners."""
     place = X.copy()
-    place[surface.nodes] = np.einsum(
-        "ic,ecd->eid", lattice(surface.order).nodes / surface.order, X[surface.nodes[:, :3]]
-    )
+    place[surface.nodes] = lattice(surface.order).nodes / surface.order @ X[surface.nodes[:, :3]]
     return place
 
 

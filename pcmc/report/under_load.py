@@ -72,7 +72,8 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
 
 def _columns(analysis: Analysis, units: Units) -> Iterator[Block]:
     """The forces of columns and stays, and what they leave to others."""
-    table, sections = analysis.columns, {bar.name: bar.member.profile.label for bar in analysis.model.bars}
+    table, profiles = analysis.columns, {bar.name: bar.member.profile for bar in analysis.model.bars}
+    sections = {name: p.label if p.shape else f"A = {p.area:.4g}" for name, p in profiles.items()}
     words: Columns = {"case": table["case"], "member": table["member"], "kind": table["kind"]}
     words[f"section, {units.length}"] = [sections[name] for name in table["member"]]
     columns: Columns = columns_in(table, ["length"], units.length)
@@ -83,7 +84,8 @@ def _columns(analysis: Analysis, units: Units) -> Iterator[Block]:
         columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
     yield text_table("Forces of columns and stays", words, columns)
     yield ABOUT_COLUMNS
-    yield from (f"{line}." for line in column_answers(analysis.model, table, units))
+    lines = column_answers(analysis.model, table, units)
+    yield from (f"{line[:1].upper()}{line[1:]}." for line in lines)
 
 
 def _members(analysis: Analysis, units: Units) -> Iterator[Block]:

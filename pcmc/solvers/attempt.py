@@ -46,7 +46,8 @@ class NewtonOptions:
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     backend : factorisation, ``"pardiso"`` or ``"superlu"``; by default the fastest here.
     order : of the elements of the result: flat triangles are solved first, on all levels, and then, as
-        elements of order 2, 4 or 8, once more; by default the order of the surface.
+        elements of order 2, 4 or 8, once more; by default the order of the surface. Where a wall comes to
+        rest on Π, they stay flat.
     """
 
     tolerance: float = 1e-12

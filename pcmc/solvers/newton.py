@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import SurfaceError
+from ..base.errors import CurvedContactError, SurfaceError
 from ..base.tolerances import POOR
 from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..forces.functional import energy
@@ -48,12 +48,17 @@ def newton(
     if order != surface.order > 1:
         elevate(surface, order)  # refuses it before the work
     last = options.levels + (order > surface.order)
-    for level in range(last + 1):
-        end = _solve_level(surface, options, log, level, rows)
-        if end.status is not Status.CONVERGED or level == last:
+    end = _solve_level(surface, options, log, 0, rows)
+    for level in range(1, last + 1):
+        if end.status is not Status.CONVERGED:
             break
-        reached, rows, end.clear = end.state.result_surface(), end.rows, None
-        surface = refine(reached) if level < options.levels else elevate(reached, order)
+        reached, end.clear = end.state.result_surface(), None
+        try:
+            surface = refine(reached) if level <= options.levels else elevate(reached, order)
+            end = _solve_level(surface, options, log, level, end.rows)
+        except CurvedContactError as error:
+            why = str(error).removeprefix("order: ").removesuffix("; give order=1")
+            end.note = f"its triangles are flat, though order={order} was asked for: {why}"
     reached = end.state.result_surface()
     return Result(
         surface=reached,

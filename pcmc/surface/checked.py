@@ -11,7 +11,7 @@ from ..base.errors import SurfaceError
 from . import checks
 from .guides import Plane
 from .held_curve import checked_curves
-from .lagrange import checked_order
+from .lagrange import checked_order, element_nodes, sides_along
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes
 from .topology import topology
@@ -53,9 +53,11 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     checks.mesh(X, F, patch, topo, patches, bound, plane.height(X))
     check_on([(plane, resolved["on_plane"]), *planes], X, size)
     order = checked_order(given["order"], F, patch)
-    if order > 1 and cables:
-        message = f"order: cables run along flat triangles only, and order is {order}; give order=1"
-        raise SurfaceError(message, what="order", where=cables[0].name, found=order, expected=1)
+    for cable in cables if order > 1 else ():
+        if order * len(sides_along(element_nodes(F, order), order, cable.edges)) < len(cable.edges):
+            message = f"cable {cable.name!r}: its edges are no whole sides of elements of order {order};"
+            message += " let it run from corner to corner, or give order=1"
+            raise SurfaceError(message, what="order", where=cable.name, found=order, expected=1)
     return {
         "order": order,
         "vertices": X,

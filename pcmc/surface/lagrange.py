@@ -20,6 +20,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats, Ints, read_only
 from ..base.errors import PcmcError, SurfaceError
+from .topology import edge_places
 
 ORDERS = (1, 2, 4, 8)
 
@@ -118,6 +119,40 @@ def element_nodes(F: Ints, order: int) -> Ints:
         message += " 1→4 refinement, in its order; give order=1 for flat triangles"
         raise SurfaceError(message, what="order", where=face, found=order)
     return read_only(np.ascontiguousarray(nodes))
+
+
+@cache
+def side_nodes(order: int) -> Ints:
+    """(3,p+1) the nodes on each side of an element, from corner to corner; side k is opposite corner k.
+
+    >>> side_nodes(2).tolist()
+    [[1, 5, 2], [2, 4, 0], [0, 3, 1]]
+    """
+    nodes = lattice(order).nodes
+    on = [np.flatnonzero(nodes[:, k] == 0) for k in range(3)]
+    return np.stack([side[np.argsort(nodes[side, k - 1])] for k, side in enumerate(on)])
+
+
+def sides_along(nodes: Ints, order: int, edges: Ints) -> Ints:
+    """(s,p+1) the nodes of those sides of elements (e,k) whose small edges are all among ``edges`` (c,2)."""
+    sides = nodes[:, side_nodes(order)].reshape(-1, order + 1)
+    steps = np.sort(np.stack([sides[:, :-1], sides[:, 1:]], axis=2), axis=2)
+    among = (edge_places(steps.reshape(-1, 2), edges) >= 0).reshape(-1, order).all(axis=1)
+    sides = sides[among]
+    return sides[np.unique(np.sort(sides[:, [0, -1]], axis=1), axis=0, return_index=True)[1]]
+
+
+@cache
+def side_shapes(order: int) -> tuple[Floats, Floats, Floats]:
+    """(q,p+1) the N_l along a side and their derivatives by t in 0..1, at q points, and the weights (q,).
+
+    >>> [values.tolist() for values in side_shapes(1)]
+    [[[0.5, 0.5]], [[-1.0, 1.0]], [1.0]]
+    """
+    points, weight = np.polynomial.legendre.leggauss(ceil((3 * order - 1) / 2))
+    t, side = 0.5 * (1.0 + points), side_nodes(order)[2]
+    value, slope, _ = shape_functions(order, np.stack([1.0 - t, t, 0.0 * t], axis=1))
+    return value[:, side], slope[:, side], 0.5 * weight
 
 
 def turned_over(F: Ints, order: int) -> Ints:

@@ -16,6 +16,7 @@ from ..base.arrays import Floats, Ints, read_only
 from ..base.errors import SurfaceError
 from ..base.validate import checked_name
 from . import checks
+from .lagrange import sides_along
 from .topology import Topology, edge_places
 
 Part = TypeVar("Part")
@@ -168,21 +169,22 @@ class Cable:
 class CableEdges(NamedTuple):
     """The edges of a surface that pull, with the tension and weight of each."""
 
-    ends: Ints  # (c,2)
+    ends: Ints  # (c,2), or (c,p+1) the nodes of sides of curved elements
     tension: Floats  # (c,) force
     weight: Floats  # (c,) force/length
 
 
-def cable_edges(cables: Sequence[Cable]) -> CableEdges:
-    """The edges of all cables whose tension is not 0.
+def cable_edges(cables: Sequence[Cable], nodes: Ints | None = None, order: int = 1) -> CableEdges:
+    """The edges of all cables whose tension is not 0, or the sides of elements (e,k) that they are.
 
     >>> cable_edges([Cable("a", 2.0, [[0, 1], [1, 2]]), Cable("b", 0.0, [[2, 3]])]).tension.tolist()
     [2.0, 2.0]
     """
     pulling = [cable for cable in cables if cable.tension > 0.0]
-    ends = np.concatenate([np.empty((0, 2), dtype=np.int32), *(cable.edges for cable in pulling)])
+    runs = [c.edges if nodes is None else sides_along(nodes, order, c.edges) for c in pulling]
+    ends = np.concatenate([np.empty((0, order + 1), dtype=np.int32), *runs])
     laws = np.array([[cable.tension, cable.weight] for cable in pulling]).reshape(-1, 2).T
-    counts = [len(cable.edges) for cable in pulling]
+    counts = [len(run) for run in runs]
     return CableEdges(read_only(ends), *(read_only(np.repeat(law, counts)) for law in laws))
 
 

@@ -234,6 +234,11 @@ class Surface(supports.Supported):
         """The edges that carry a line tension, and how much."""
         return cable_edges(self.cables)
 
+    @cached_property
+    def cable_sides(self) -> CableEdges:
+        """The same as sides of elements, with all their nodes; of flat ones the edges."""
+        return self.cable_edges if self.order == 1 else cable_edges(self.cables, self.nodes, self.order)
+
     @cached_array
     def room_signs(self) -> Floats:
         """(r,k) 1 or -1 where a patch bounds a room, by the sense of its normal; 0 elsewhere."""

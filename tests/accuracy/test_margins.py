@@ -11,8 +11,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 from generators import barrel, catenoid, joined_caps, spherical_cap, two_caps, two_squares
 from generators.catenary import FOLD
-from pcmc import certify, margin, solve
+from pcmc import Cable, Patch, Surface, certify, margin, solve
 from pcmc.accuracy import MarginEnd
+from pcmc.accuracy.varied import named
 from pcmc.base.errors import OptionError, SurfaceError
 from studies.reference import evolver
 
@@ -144,6 +145,15 @@ def test_names():
         margin(caps, "pressure", towards="les")
     less = margin(cap(), "pressure", towards="less")
     assert (less.more, less.factor, less.ends_by) == (False, 0.1, MarginEnd.NONE)
+
+
+def test_one_name_of_a_patch_and_of_a_cable_means_the_patch():
+    tent = Surface(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 1, 2]], [0], [Patch("sail", 2.0)],
+        fixed=[0], cables=[Cable("sail", 3.0, [[0, 1]])],
+    )  # fmt: skip
+    assert named(tent)["sail"] == (("tension", "sail"),)
+    assert named(tent)["tension"] == (("tension", "sail"), ("cable", "sail"))
 
 
 def test_what_is_not_at_rest_has_none():

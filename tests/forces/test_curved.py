@@ -1,11 +1,14 @@
 """Curved elements: derivatives, identities, and the order of closed forms."""
 
+import dataclasses
 from functools import partial
 
 import numpy as np
 import pytest
+from cable_cases import hanging, heavy_net
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from generators import (
     delaunay,
@@ -16,12 +19,14 @@ from generators import (
     joined_caps_exact,
     spherical_cap,
     spherical_cap_exact,
+    triple_bubble,
 )
 from pcmc import Patch, Surface, energy, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.diagnostics import check_gradient, check_hessian, taylor
 from pcmc.forces.functional import energy_and_gradient, patch_areas, patch_volumes
 from pcmc.forces.mesh import energy_mesh
+from pcmc.forces.rooms import room_volumes
 from pcmc.forces.second_variation import add_products, hessian
 from pcmc.forces.volume_below import volume_below, volume_below_gradient
 from pcmc.meshing.elevation import elevate
@@ -48,6 +53,38 @@ def test_taylor_slopes(order, weight):
     surface = shaken(order, weights=weight)
     assert check_gradient(surface).passed
     assert check_hessian(surface).passed
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_taylor_slopes_with_cables_and_their_weights(order):
+    surface = elevate(heavy_net(), order)
+    moves = 0.05 / order**2 * np.random.default_rng(2).standard_normal((surface.n, 3))
+    surface = surface.moved(surface.vertices + np.where(surface.fixed[:, None], 0.0, moves))
+    assert check_gradient(surface).passed
+    assert check_hessian(surface).passed
+
+
+def test_a_rope_along_sides_of_elements_hangs_in_its_catenary():
+    """z + τ/g = c cosh(x/c) from (-1, 1) to (1, 1); E = τ L + g ∫ z ds, in a sheet that stays flat."""
+    c = brentq(lambda c: c * np.cosh(1.0 / c) - 2.0, 1.0, 5.0)
+    exact = c + 0.5 * c**2 * np.sinh(2.0 / c) + 4.0  # g ∫ c cosh(x/c) ds, and the sheet
+    errors = []
+    for columns in (2, 4, 8):
+        result = solve(hanging(columns), order=2)
+        assert (result.converged, result.surface.order) == (True, 2)
+        errors.append(abs(result.energy - exact))
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([4.0, 4.0], abs=0.5)
+    nodes = result.surface.cable_sides.ends
+    assert nodes.shape == (8, 3)
+    x, _, z = result.surface.vertices[np.unique(nodes)].T
+    assert np.abs(z - (c * np.cosh(x / c) - 1.0)).max() < 1e-5
+
+
+def test_a_cable_that_ends_within_a_side_is_refused():
+    curved = elevate(heavy_net(), 2)
+    part = dataclasses.replace(curved.cables[0], edges=curved.cables[0].edges[:1])
+    with pytest.raises(SurfaceError, match=r"^cable 'edge': its edges are no whole sides of elements"):
+        dataclasses.replace(curved, cables=[part])
 
 
 @pytest.mark.nightly
@@ -186,6 +223,14 @@ def test_elements_follow_a_junction_that_bends():
     ]
     assert errors[1] < 1e-2 * errors[0]
     assert errors[2] < 1e-12
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_three_bubbles_of_volume_1_have_the_area_of_the_literature():
+    result = solve(triple_bubble(0.5), order=4)
+    assert (result.converged, result.surface.order, result.certificate.index) == (True, 4, 0)
+    np.testing.assert_allclose(room_volumes(result.surface), 1.0, rtol=1e-10)
+    assert patch_areas(result.surface).sum() == pytest.approx(13.128168244433, rel=2e-5)
 
 
 def test_the_variational_curvature_is_exact_at_rest():

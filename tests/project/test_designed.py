@@ -278,6 +278,7 @@ def test_the_command_shows_and_clears_the_cache(folder, capsys, monkeypatch):
     assert cli.main(["cache"]) == 0
     assert capsys.readouterr().out.startswith("1 roofs in ")
     assert cli.main(["cache", "--clear"]) == 0
+    assert capsys.readouterr().out.startswith("1 roofs removed from ")
     assert not cached_files()
     monkeypatch.setenv("PCMC_CACHE", "off")
     assert cli.main(["cache"]) == 0

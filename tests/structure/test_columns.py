@@ -1,5 +1,6 @@
 """Columns and stays: statics at the points that hold a sail, Euler's load, and what cannot be."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,7 +14,9 @@ from pcmc import Material, StructuralModel
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, polyline
-from pcmc.structure import Member, Profile
+from pcmc.report.tables import Table
+from pcmc.report.under_load import chapter
+from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.columns import column_answers, column_table, column_text, columns_at_rest
 from pcmc.structure.member_forces import members_at_rest
 from pcmc.structure.member_keys import members_of
@@ -95,6 +98,22 @@ def test_a_case_with_other_reactions_has_its_own_rows():
     assert table["N"][1] == pytest.approx(2.0 * table["N"][0])
     assert table["case"].tolist() == ["one", "two"]
     assert column_text(model, table, NONE).splitlines()[-1].startswith("two: across mast ")
+
+
+@pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+def test_each_case_and_the_report_have_the_forces_of_columns():
+    """By CalculiX at rest as by the certificate, and other ones under snow."""
+    upright = sail_on(column([0, 0], [0, 0]), stay([0, 0], [-3, -3]))
+    analysis = analyse(replace(upright, loads=[pcmc.Snow(0.1)], certificate=None))
+    rest, form = columns_at_rest(upright), analysis.columns[:2]
+    assert form["N"].to_numpy() == pytest.approx(rest["N"].to_numpy(), rel=1e-2)
+    assert (analysis.columns["N"][2:].abs().to_numpy() > 1.05 * form["N"].abs().to_numpy()).all()
+    assert "columns" in analysis.tables
+    assert "euler_over" in str(analysis)
+    tables = [block for block in chapter(analysis, Units("m", "kN")) if isinstance(block, Table)]
+    [table] = [block for block in tables if block.title == "Forces of columns and stays"]
+    assert table.rows[0][:4] == ["form pressure", "mast", "column", "tube 0.1143 × 0.005"]
+    assert table.rows[1][3] == "A = 0.0003"
 
 
 def test_what_gives_way_is_told():

@@ -71,6 +71,9 @@ def test_beams_have_nodes_of_their_own_tied_to_the_vertices_where_these_are(tmp_
     part = re.search(r"^\*NODE, NSET=BEAMS\n(.*?)^\*", text, re.M | re.S)[1]
     nodes = {int(row[0]): row[1:] for row in np.loadtxt(part.splitlines(), delimiter=",").tolist()}
     assert len(nodes) == len(np.unique(line.pairs))
+    blocks = re.findall(r"^\*ELEMENT.*\n([^*]*)", text, re.M)
+    numbers = [row.split(",")[0] for rows in blocks for row in rows.split()]
+    assert len(numbers) == len(set(numbers)) == len(model.faces) + len(line.pairs)
     tied = re.findall(r"^\*EQUATION\n2\n(\d+),(\d),1\.,(\d+),(\d),-1\.$", text, re.M)
     for node, axis, vertex, same in tied:
         assert axis == same

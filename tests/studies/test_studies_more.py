@@ -16,13 +16,14 @@ from pcmc.accuracy import AccuracyStatus
 from pcmc.base.errors import OptionError, SweepError
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
+from pcmc.solvers import solve
 from studies import cases
 from studies.cases import run_sweep
 from studies.corners.cone import cone
 from studies.examples.flow import NOISE
 from studies.folder import Folder
 from studies.orders import limit_order, slope
-from studies.questions import accuracy, bench, refinement, solvers, stability
+from studies.questions import accuracy, bench, curved, refinement, solvers, stability
 from studies.reference import evolver
 from studies.registry import STUDIES, chosen, of_the_paper
 from studies.study import perform
@@ -226,6 +227,48 @@ def test_closed_forms_are_met_with_second_order(tmp_path, monkeypatch):
     again = pd.concat([records, records.assign(level=records.level + 3)])
     verdicts = ["confirmed"] * 2 + ["not confirmed"] + ["confirmed"] * 2
     assert refinement._claim(again).verdict.tolist() == verdicts
+
+
+# -------------------------------------------------------------------------------------- curved
+
+
+def test_the_quickest_runs_that_are_accurate_enough(tmp_path):
+    perform(curved.STUDY, tmp_path, short=True, steps=["data", "table"])
+    folder = Folder(tmp_path / "curved")
+    records = folder.read_table("records").set_index(["program", "elements"])
+    assert "seconds" not in records.columns
+    assert records.error["pcmc", "order 8"] < 1e-12
+    # the same mesh, the same flat triangles, and quadratic ones that differ in their quadrature
+    assert records.error["evolver", "linear"] == pytest.approx(records.error["pcmc", "flat"], rel=1e-3)
+    assert records.error["evolver", "quadratic"] == pytest.approx(records.error["pcmc", "order 2"], rel=0.02)
+    runs = pd.DataFrame(
+        {
+            "program": ["pcmc", "pcmc", "evolver"],
+            "elements": ["flat", "order 2", "linear"],
+            "error": [1e-5, 1e-6, 1e-4],
+            "seconds": [1.0, 0.5, 2.0],
+        }
+    )
+    row = curved._cheapest(runs, curved.CASES[0], 1e-4)
+    assert (row["pcmc_elements"], row["evolver_elements"], row["theirs_over_ours"]) == (
+        "order 2",
+        "linear",
+        4.0,
+    )
+    assert math.isnan(curved._cheapest(runs, curved.CASES[0], 1e-5)["theirs_over_ours"])
+    assert curved._cheapest(runs, curved.CASES[0], 1e-7) == {}
+
+
+def test_a_mesh_graded_towards_the_corner_of_an_l_keeps_its_order():
+    even, graded = (
+        [
+            solve(curved.graded(edge, levels), target="stationary", order=2).energy
+            for edge in (0.3, 0.15, 0.075)
+        ]
+        for levels in (0, 6)
+    )
+    assert np.log2((even[0] - even[1]) / (even[1] - even[2])) < 1.6  # 4/3 from the corner's r^(2/3)
+    assert np.log2((graded[0] - graded[1]) / (graded[1] - graded[2])) > 2.5
 
 
 # ------------------------------------------------------------------------------------- solvers
