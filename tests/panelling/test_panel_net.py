@@ -119,7 +119,7 @@ def test_no_corner_of_a_roof_is_cut_off():
 
 def test_a_small_panel_with_an_acute_corner_is_no_sliver():
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
-    points = np.array([[0, 0, 0], [0.16, 0, 0], [0.16 * c, 0.16 * s, 0], [1, 0, 0], [c, s, 0]])
+    points = np.array([[0, 0, 0], [0.195, 0, 0], [0.195 * c, 0.195 * s, 0], [1, 0, 0], [c, s, 0]])
     kind = np.array([CORNER, EDGE, EDGE, CORNER, CORNER])
     corners, start = np.array([0, 1, 2, 1, 3, 4, 2]), np.array([0, 3, 7])
     rest = np.zeros(2, dtype=int), np.ones(2, dtype=bool), np.zeros(2)
