@@ -38,8 +38,8 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
     >>> from generators import delaunay
     >>> from pcmc import panel_net
     >>> drawings = net_drawings(panel_net(delaunay(exact=True), 0.9, anyway=True), "m", sheet="A0")
-    >>> [page.title for page in drawings.sheets[:4]]
-    ['Panels and nodes in plan', 'Nodes', 'Panels', 'Panel 3 at true size, outside up']
+    >>> [page.title for page in drawings.sheets[:3]], drawings.sheets[3].title[7:]
+    (['Panels and nodes in plan', 'Nodes', 'Panels'], ' at true size, outside up')
     """
     validate.choice("sheet", sheet, tuple(FORMATS))
     length = expect_length(as_units(units).length, "drawings of panels")

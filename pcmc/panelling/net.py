@@ -166,8 +166,9 @@ def _pieces(at: Floats, hexagons: bool) -> tuple[Ints, Ints, Floats]:
     place = low[row] + np.stack([k % size[row, 0], k // size[row, 0]], axis=1)
     if hexagons:
         row, place = (values[place.sum(axis=1) % 2 == 0] for values in (row, place))
-    tiles = shapely.polygons(place[:, None] + shape)
-    cut = shapely.intersection(shapely.polygons(at)[row], tiles, grid_size=GRID)
+    tiles, cut = shapely.polygons(place[:, None] + shape), shapely.polygons(at)[row]
+    crossed = ~shapely.covers(tiles, cut)
+    cut[crossed] = shapely.intersection(cut[crossed], tiles[crossed], grid_size=GRID)
     found = np.flatnonzero(shapely.area(cut) > 0.0)
     double = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
     cut = shapely.orient_polygons(cut[found], exterior_cw=double[row[found]] < 0.0)  # where lines fold

@@ -132,30 +132,18 @@ class PanelNet:
         """Totals, with the units of the numbers if they are given."""
         table, beams = self.panels, self.beams
         kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
-        worst = table.iloc[table["planarity"].argmax()]
+        worst, area = table.iloc[table["planarity"].argmax()], table["area"]
+        covered = f"{100.0 * self.covered:.2f} % of the roof's; panels {area.min():.3g} to {area.max():.3g}"
+        warp = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
+        away = f"nodes {self.nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
+        turns = [(beams[name].median(), beams[name].max()) for name in ("torsion", "torsion_normal")]
+        torsion = "of beams, median {:.2g}, largest {:.3g} degrees; along normals {:.2g} and {:.3g}"
         rows = [
             ("panels", f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"),
-            (
-                "area",
-                f"{table['area'].sum():.6g}, {100.0 * self.covered:.2f} % of the roof's; "
-                f"panels {table['area'].min():.3g} to {table['area'].max():.3g}",
-            ),
-            (
-                "planarity",
-                f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g} "
-                f"(panel {worst['panel']}, {worst['kind']})",
-            ),
-            (
-                "distance",
-                f"from the surface, nodes {self.nodes['distance'].max():.3g}, "
-                f"panels {table['distance'].max():.3g}",
-            ),
-            (
-                "torsion",
-                f"of beams, median {beams['torsion'].median():.2g}, largest {beams['torsion'].max():.3g} "
-                f"degrees; along normals {beams['torsion_normal'].median():.2g} and "
-                f"{beams['torsion_normal'].max():.3g}",
-            ),
+            ("area", f"{area.sum():.6g}, {covered}"),
+            ("planarity", f"{warp} (panel {worst['panel']}, {worst['kind']})"),
+            ("distance", f"from the surface, {away}"),
+            ("torsion", torsion.format(*turns[0], *turns[1])),
         ]
         if len(self.umbilics):
             places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])

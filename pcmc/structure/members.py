@@ -201,38 +201,32 @@ def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberL
     if not given:
         return ()
     X, plane, topo, bars = surface.vertices, surface.plane, surface.topology, list[Bar]()
-    alone = Forces.of(surface).single
-    alone[
-        [v for line in lines if line.member.kind == "beam" for v, _ in line.ends(X) if surface.fixed[v]]
-    ] = True
+    alone, mirrored = Forces.of(surface).single, _mirrored(surface)
+    for line in lines:
+        if line.member.kind == "beam":
+            alone[[v for v, _ in line.ends(X) if surface.fixed[v]]] = True
     rim = np.zeros(surface.n, dtype=bool)
     rim[topo.edges[topo.boundary_edge]] = True
-    mirrored = _mirrored(surface)
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
     times, used = Counter(member.label for member in given), Counter[str]()
     for member in given:
         used[member.label] += 1
         name = member.label if times[member.label] == 1 else f"{member.label}-{used[member.label]}"
-        top, foot = (
-            np.array(p) if len(p) == 3 else to_space(np.array([*p, 0.0]), plane) for p in member.two_points
-        )
-        apart = np.linalg.norm((plane.to_local(X[points]) - plane.to_local(top[None]))[:, :2], axis=1)
-        problem = ""
-        if apart.min(initial=np.inf) > near:
+        top, foot = (to_space(np.array([*p, 0.0]), plane) if len(p) == 2 else p for p in member.two_points)
+        away = plane.to_local(X[points]) - plane.to_local(np.array([top]))
+        here, at, problem = points[np.hypot(*away[:, :2].T) <= near], point_text(np.array(top)), ""
+        if not len(here):
             known = ", ".join(point_text(X[v]) for v in points[:6]) or "none"
-            problem = f"no support of one point is at {point_text(top)}; there are: {known}"
-        elif mirrored[points[apart.argmin()]]:
+            problem = f"no support of one point is at {at}; there are: {known}"
+        elif mirrored[here[0]]:
             problem = "it stands in a mirror plane; take the whole roof, whole = true"
-        elif member.kind == "cable" and not rim[points[apart.argmin()]]:
-            problem = (
-                f"a stay from {point_text(top)}, inside the roof, would pierce it; take a point of its edge"
-            )
-        elif np.linalg.norm(foot - X[points[apart.argmin()]]) <= SHORTEST * surface.size:
-            problem = f"its foot is the point {point_text(top)} that it holds; give another one"
+        elif member.kind == "cable" and not rim[here[0]]:
+            problem = f"a stay from {at}, inside the roof, would pierce it; take a point of its edge"
+        elif np.linalg.norm(foot - X[here[0]]) <= SHORTEST * surface.size:
+            problem = f"its foot is the point {at} that it holds; give another one"
         if problem:
             raise OptionError(f"member {name!r}: {problem}", what="members", where=name)
-        vertex = int(points[apart.argmin()])
-        bars.append(Bar(name, member, vertex, np.array([X[vertex], foot])))
+        bars.append(Bar(name, member, int(here[0]), np.array([X[here[0]], foot])))
     _refuse_mechanisms(bars)
     return tuple(bars)
 

@@ -19,12 +19,14 @@ from generators import (
     joined_caps_exact,
     spherical_cap,
     spherical_cap_exact,
+    triple_bubble,
 )
 from pcmc import Patch, Surface, energy, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.diagnostics import check_gradient, check_hessian, taylor
 from pcmc.forces.functional import energy_and_gradient, patch_areas, patch_volumes
 from pcmc.forces.mesh import energy_mesh
+from pcmc.forces.rooms import room_volumes
 from pcmc.forces.second_variation import add_products, hessian
 from pcmc.forces.volume_below import volume_below, volume_below_gradient
 from pcmc.meshing.elevation import elevate
@@ -221,6 +223,14 @@ def test_elements_follow_a_junction_that_bends():
     ]
     assert errors[1] < 1e-2 * errors[0]
     assert errors[2] < 1e-12
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_three_bubbles_of_volume_1_have_the_area_of_the_literature():
+    result = solve(triple_bubble(0.5), order=4)
+    assert (result.converged, result.surface.order, result.certificate.index) == (True, 4, 0)
+    np.testing.assert_allclose(room_volumes(result.surface), 1.0, rtol=1e-10)
+    assert patch_areas(result.surface).sum() == pytest.approx(13.128168244433, rel=2e-5)
 
 
 def test_the_variational_curvature_is_exact_at_rest():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pcmc
-from generators import delaunay, spherical_cap
+from generators import delaunay, spherical_cap, two_squares
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.panelling import panel_net
 from pcmc.panelling.directions import shape_operators
@@ -201,6 +201,14 @@ def test_bad_input_is_refused_in_one_line(rectangle):
     wall = [replace(patch, pressure=0.0, wall=True) for patch in rectangle.patches]
     with pytest.raises(SurfaceError, match="no panels: every patch is a wall"):
         panel_net(replace(rectangle, patches=tuple(wall)), 1.0, anyway=True)
+
+
+@pytest.mark.parametrize("pattern", ["quads", "hexagons"])
+@pytest.mark.parametrize("direction", [0.0, 45.0, 60.0])
+def test_lines_along_edges_and_through_vertices_of_the_mesh_leave_no_gap(pattern, direction):
+    net = panel_net(two_squares(8), 0.5, pattern, direction=direction, anyway=True)
+    assert len(net.points) - len(net.beams) + len(net.panels) == 1
+    assert net.beams.query("neighbour == 0")["length"].sum() == pytest.approx(24.0, rel=1e-6)
 
 
 def test_a_panel_with_a_hole_is_refused():
