@@ -10,6 +10,8 @@ from generators import delaunay, spherical_cap, two_squares
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.panelling import panel_net
 from pcmc.panelling.directions import shape_operators
+from pcmc.panelling.net import CORNER, EDGE, Net
+from pcmc.panelling.net_tables import tidied
 from pcmc.panelling.planar import by_corners
 from pcmc.plan import Plan
 
@@ -113,6 +115,17 @@ def test_no_corner_of_a_roof_is_cut_off():
         nodes = panel_net(roof, size).nodes
         corners = nodes.loc[nodes["kind"] == "corner", ["x", "y"]].to_numpy().round(9).tolist()
         assert sorted(corners) == sorted(outline)
+
+
+def test_a_small_panel_with_an_acute_corner_is_no_sliver():
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    points = np.array([[0, 0, 0], [0.16, 0, 0], [0.16 * c, 0.16 * s, 0], [1, 0, 0], [c, s, 0]])
+    kind = np.array([CORNER, EDGE, EDGE, CORNER, CORNER])
+    corners, start = np.array([0, 1, 2, 1, 3, 4, 2]), np.array([0, 3, 7])
+    rest = np.zeros(2, dtype=int), np.ones(2, dtype=bool), np.zeros(2)
+    left = tidied(Net(points, np.tile([0.0, 0, 1], (5, 1)), kind, start, corners, *rest), 1.0)
+    assert np.array_equal(left.points, points)
+    assert left.start.tolist() == [0, 3, 7]
 
 
 def test_the_share_of_the_roof_that_panels_cover_grows_as_they_get_smaller(walled):
