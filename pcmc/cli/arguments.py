@@ -16,6 +16,7 @@ import typer
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
+from ..base.files import check_regular
 from ..base.units import LENGTHS
 from ..io import FORMATS, READ_ONLY
 from ..project import Outcome, Output, Project
@@ -196,6 +197,7 @@ def check_suffix(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
     suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
     if suffix not in known:
+        check_regular(file)
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 
 

@@ -180,6 +180,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "none.toml"], "none.toml: cannot be read"),
         (["solve", "roof.toml", "-o", "x.obk"], "did you mean '.obj'"),
         (["solve", "roof"], "Known: .toml, .pcmc"),
+        (["solve", "."], ".: is no regular file but a folder"),
         (["certify", "roof.txt"], "Known: .toml, .pcmc"),
         (["solve", "roof.toml", "-o", "roof.png"], "a picture has its own option"),
         (["solve", "roof.toml", "--picture", "roof.obj"], "roof.obj: the suffix of a picture is .png"),
