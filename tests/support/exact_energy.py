@@ -47,7 +47,7 @@ class Frozen:
         self.surface, self.classes = part.surface, part.classes
         self.X = [[arb(x) for x in row] for row in part.surface.vertices.tolist()]
         self.space = motion_space(part.surface, part.classes, part.surface.vertices)
-        free = rigid_modes(self.space, rigid_motions(part.surface), part.surface.vertices)
+        free, _ = rigid_modes(self.space, rigid_motions(part.surface), part.surface.vertices)
         self.held = [[arb(x) for x in column] for column in free.T.tolist()]
         self.size, self.rooms = self.space.size, len(surface.rooms)
         self.borders = self.rooms + len(self.held)
