@@ -158,7 +158,7 @@ BENCH = """\
 The study `bench` takes the same surfaces from the same start to rest through other programs, each asked in
 its own way (see the first lines of `studies/questions/bench.py`). A program not at rest within {limit:.0f} s,
 to a relative residual of {rest:g}, was not asked for finer meshes. `bench/bench.png` shows the times; they
-differ from run to run. What could not run here is left out: Kratos' form finding."""
+differ from run to run. Kratos' form finding was not tried."""
 
 FAIR_PAIRS = {  # rows of the benchmark: theirs, ours
     "step": ("Newton step, evolver", "Newton step, pardiso"),
