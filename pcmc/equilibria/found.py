@@ -183,12 +183,18 @@ class Equilibria:
             units.sentence if units else "",
             table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False),
         ]
+        given = "The search was stopped before its end." if self.stopped else ""
+        ways = self.barrier_lines(units)
+        return "\n".join(filter(None, [*lines, *ways, *self.searched, *self.failed, given, INCOMPLETE]))
+
+    def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
+        """A line for each barrier: from where, over which saddle, to where, and its energy."""
+        lines = list[str]()
         for b in self.barriers:
             end = b.end if b.to is None else f"to {b.to}"
             energy = f"{b.energy:.6g}{units.behind('energy')}"
             lines.append(f"barrier from {b.start} over saddle {b.saddle} {end}: {energy}")
-        given = "The search was stopped before its end." if self.stopped else ""
-        return "\n".join(filter(None, [*lines, *self.searched, *self.failed, given, INCOMPLETE]))
+        return lines
 
     def __str__(self) -> str:
         return self.text()

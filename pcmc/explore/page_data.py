@@ -224,7 +224,7 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def diagram(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
+def equilibria_data(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
     """The branches and equilibria of a search, each point with the number of its surface, and in words."""
     numbers, branches = count(len(found)), []
     (line,) = found.lines
@@ -233,13 +233,12 @@ def diagram(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
         columns = {name: shown[name].tolist() for name in ("parameter", "height", "index")}
         branches.append(columns | {"number": [next(numbers) for _ in range(len(shown))]})
     rows = found.table[["height", "index", "energy"]].to_dict(orient="records")
-    words = [text for text in found.text(units).splitlines() if text.startswith("barrier")]
     return {
         "parameter": line.name,
         "value": line.value,
         "branches": branches,
         "equilibria": [row | {"number": k} for k, row in enumerate(rows)],
-        "words": [*words, *found.failed, INCOMPLETE],
+        "words": [*found.barrier_lines(units), *found.failed, INCOMPLETE],
     }
 
 

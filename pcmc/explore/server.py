@@ -127,7 +127,7 @@ class Explorer:
                 return {"margin": margin.text(units)}, {"vertices": there}
             case "equilibria":
                 found = session.equilibria(**given, gone=gone)
-                return None if found is None else (page_data.diagram(found, units), {})
+                return None if found is None else (page_data.equilibria_data(found, units), {})
             case "verify":
                 theorem = session.verify()
                 return {"badge": theorem.brief(units), "text": theorem.text(units)}, {}

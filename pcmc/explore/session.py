@@ -304,7 +304,7 @@ class Session:
         fallback: ProjectFallback | None = None,
     ) -> SessionState:
         """Show another start, as a new step: the file behind the page was saved."""
-        self.start, self.units = start, units
+        self.start, self.units, self.found = start, units, None
         self.fallback = (fallback or self.fallback).with_walls(start.surface)
         state = replace(state.showing(start.surface, start.certificate), aims=None)
         return replace(state, wanted=start.wanted, failure=start.failure).stepped()

@@ -32,7 +32,7 @@ ALIGNED = np.radians(10.0)  # a curve is a line of curvature if half of it is wi
 ROUND = 0.05  # of the mean curvature: a sheet is part of a sphere if (κ₁ - κ₂)/2 is smaller on half of it
 FLAT = 1e-6  # curvature times size
 STRETCHES, SHIFTS = np.linspace(0.8, 1.25, 46), np.arange(0.0, 1.0, 0.025)  # of lines, that are tried
-SOFT = 1e-9  # of conditions, some of which follow from others
+SOFT = 1e-9  # added to the diagonal, as some conditions follow from others and make the matrix singular
 
 
 def curvature_coordinates(sheet: SheetMesh, size: float, name: str) -> tuple[Floats, Ints, Bools, Floats]:

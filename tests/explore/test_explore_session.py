@@ -251,3 +251,14 @@ def test_a_surface_that_nothing_brings_to_rest_is_shown_as_it_was_given():
     state = Session(begun).settle({"tensions": {"cap": 0.8}})
     assert state.failure is None
     assert state.certificate.verdict is Verdict.STABLE
+
+
+def test_another_file_leaves_no_search_behind(cap):
+    session = Session(cap)
+    assert session.equilibria("pressure") is session.found
+    assert session.visit(1).certificate.verdict is Verdict.SADDLE
+    with refused(OptionError, what="number", found=10_000):
+        session.visit(10_000)
+    session.renew(cap)
+    with refused(OptionError, what="number", found=1):
+        session.visit(1)

@@ -297,7 +297,7 @@ def test_members_of_a_project_are_refused_in_a_line():
 @needs_ccx
 def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
     """A wire in the place of an arch moves beyond span/300; an edge so soft that the film spans in its place.
-    With the stiffness that the line names neither is told."""
+    Each is named; with the stiffness that the line gives, neither is."""
 
     def weak(analysis):
         return [line for line in analysis.answers() if "too weak" in line]
