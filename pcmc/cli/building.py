@@ -13,8 +13,9 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
+from ..drawings.drawing_set import table_paths
 from ..drawings.net_drawings import SUFFIXES as NETS
-from ..drawings.net_drawings import net_files, net_paths
+from ..drawings.net_drawings import TABLES, net_files
 from ..io import FORMATS, write
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
@@ -178,7 +179,8 @@ def _net(
     """Lay out quads or hexagons and write them."""
     for path in files:
         suffix_of(path, NETS, "a net of panels")
-    outputs = Output(picture=picture, view=seen).paths + [one for path in files for one in net_paths(path)]
+    outputs = Output(picture=picture, view=seen).paths
+    outputs += [one for path in files for one in table_paths(path, TABLES)]
     check_outputs(outputs, inputs=files_of(file))
     size, pattern, direction = wanted
     with working() as progress:

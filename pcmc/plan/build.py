@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..forces.rooms import check_rooms
-from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
+from ..meshing.quality import improve_angles
 from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
