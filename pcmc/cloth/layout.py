@@ -28,12 +28,7 @@ class ClothSheet:
     patch: str
     along: Floats  # (3,) unit vector of the warp
     across: Floats  # (3,) unit vector; the seams lie near to levels of x · across
-    levels: Floats  # (k,) ascending, with both ends: k - 1 strips
-
-    @property
-    def inner(self) -> Floats:
-        """The levels of seams."""
-        return self.levels[1:-1]
+    levels: Floats  # (k,) ascending, with both ends: k - 1 strips, seams between
 
 
 def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, Floats]:
@@ -94,7 +89,9 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: In
     for sheet in sheets:
         meet, mine = MEET * float(np.diff(sheet.levels).min()), sheet_of_source[mesh.source] == sheet.number
         height = mesh.X @ sheet.across  # a geodesic may cross the next level, so all ends come first
-        lines = [line for level in sheet.inner.tolist() for line in level_ends(mesh, mine, height, level)]
+        lines = [
+            line for level in sheet.levels[1:-1].tolist() for line in level_ends(mesh, mine, height, level)
+        ]
         for line in lines:
             vertices = []
             for point in line:
