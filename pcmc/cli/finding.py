@@ -49,13 +49,13 @@ def equilibria(
     """
     from ..equilibria import find_equilibria
     from ..plot import equilibria as diagram
-    from ..plot.branches import SHOWN
+    from ..plot.uses import BRANCH_VALUES
 
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format
     check_outputs(files, inputs=files_of(file))
-    arguments.validate.choice("--axis", axis, SHOWN)
+    arguments.validate.choice("--axis", axis, BRANCH_VALUES)
     with working() as progress:
         roof = what.roof(load(file, units), progress, whole=False)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}

@@ -22,10 +22,9 @@ from ..plot import draw, families, reactions
 from ..plot.figure import png
 from ..surface import Surface, expect_surface
 from . import tables
-from .cutting import cutting
+from .chapters import cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .under_load import chapter
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
 SUFFIXES = (".pdf",)
@@ -115,9 +114,9 @@ class RoofReport:
             yield Heading("Mesh check")
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
-            yield from chapter(self.analysis, units)
+            yield from under_load_chapter(self.analysis, units)
         if self.pattern is not None:
-            yield from cutting(self.pattern, units)
+            yield from cutting_chapter(self.pattern, units)
         if self.schedule is not None:
             yield Heading("Panels", new_page=True)
             yield panel_text(self.schedule, units)

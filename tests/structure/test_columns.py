@@ -14,8 +14,8 @@ from pcmc import Material, StructuralModel
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, polyline
+from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Table
-from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.columns import column_answers, column_table, column_text, columns_at_rest
 from pcmc.structure.member_forces import members_at_rest
@@ -110,7 +110,7 @@ def test_each_case_and_the_report_have_the_forces_of_columns():
     assert (analysis.columns["N"][2:].abs().to_numpy() > 1.05 * form["N"].abs().to_numpy()).all()
     assert "columns" in analysis.tables
     assert "euler_over" in str(analysis)
-    tables = [block for block in chapter(analysis, Units("m", "kN")) if isinstance(block, Table)]
+    tables = [block for block in under_load_chapter(analysis, Units("m", "kN")) if isinstance(block, Table)]
     [table] = [block for block in tables if block.title == "Forces of columns and stays"]
     assert table.rows[0][:4] == ["form pressure", "mast", "column", "tube 0.1143 × 0.005"]
     assert table.rows[1][3] == "A = 0.0003"

@@ -1,4 +1,4 @@
-"""The chapter of a report on a roof under load."""
+"""The chapters of a report on a roof under load and on its cutting pattern."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..base.units import Units
-from ..plot import member_forces, under_load
+from ..base.units import Units, length_factor
+from ..plot import member_forces, strains, under_load
 from ..plot.figure import png
 from ..structure.columns import column_answers
 from ..structure.member_forces import sentences
-from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
+from .plan import FORMAT, on_paper
+from .tables import Block, Columns, Heading, Picture, column, columns_in, one, text_table, vectors_of
 
 if TYPE_CHECKING:
+    from ..cloth import CuttingPattern
     from ..structure import Analysis
 
 PIXELS = 1300  # width of a picture
@@ -33,9 +35,15 @@ ABOUT_COLUMNS = (
     "They follow from the forces of the supports by statics; N is above 0 in tension. Euler's load is that "
     "of a column with hinged ends. Their own weight is left out."
 )
+ABOUT_CLOTH = (
+    "Each strip is laid flat with the least strain for which the sides of every seam are equally long. Strain"
+    " is that of the cloth on the roof beside the strain from its tension; its mean is the root mean square"
+    " over the area. Lengths and widths are those of the cut strip, shortened by the compensation, without"
+    " allowances."
+)
 
 
-def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
+def under_load_chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     """Cases, answers, pictures, and the tables of patches, supports and cables."""
     force = units.force or "force"
     yield Heading("Under load", new_page=True)
@@ -111,3 +119,23 @@ def _members(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield SIGNS
     yield Picture("", png(member_forces(analysis, units=units, width=PIXELS)))
     yield from (f"{line}." for line in sentences(analysis.model, units))
+
+
+def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
+    """What is cut in sentences, the strips on the roof from above and coloured by strain, and their table."""
+    from ..cloth.sheets import seam_sheet
+
+    table, sewn = pattern.table, pattern.seam_table.query("kind != 'rim'")
+    sheet = seam_sheet(pattern, FORMAT, length_factor(units.length, "mm"))
+    yield Heading(f"Cutting pattern, scale {sheet.scale}, lengths in {units.length}", new_page=True)
+    yield on_paper(sheet.scale, *sheet.drawn())
+    area, long = one(float(table["cut_area"].sum())), one(float(sewn["length"].sum()))
+    yield f"{len(table)} strips of {area} {units.area} of cloth, {long} {units.length} of seams between them."
+    yield ABOUT_CLOTH
+    yield Picture("Strain of the cloth", png(strains(pattern, width=PIXELS)))
+    columns: Columns = columns_in(table, ["length", "width"], units.length)
+    columns |= columns_in(table, ["area", "cut_area"], units.area)
+    names = {"strain_min": "strain from", "strain_max": "to", "strain_rms": "mean"}
+    names |= {"warp": "warp shorter", "weft": "weft shorter"}
+    columns |= columns_in(table.rename(columns=names), names.values(), "%")
+    yield text_table("Strips", {"strip": table["strip"], "patch": table["patch"]}, columns)
