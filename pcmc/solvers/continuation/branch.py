@@ -168,10 +168,8 @@ class Branch:
 
     def _known_line(self, what: str) -> ParameterLine:
         if self._line is None:
-            message = (
-                f"{what}: this branch was put together from tables; only one that follow gave can {what}"
-            )
-            raise OptionError(message, what="branch")
+            message = f"{what}: this branch was put together from tables; only one that follow gave can"
+            raise OptionError(f"{message} {what}", what="branch")
         return self._line
 
     def _bifurcation(self, event: int | None) -> int:
