@@ -205,7 +205,9 @@ class Tracer:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
         part, own = near.rest.part, self.options
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
-        result = solve_once(whole, target="stationary", tolerance=own.tolerance, backend=own.backend)
+        result = solve_once(
+            whole, "newton", target="stationary", tolerance=own.tolerance, backend=own.backend
+        )
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
