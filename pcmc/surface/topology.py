@@ -87,6 +87,13 @@ class Topology:
         return self.valence >= 3
 
     @cached_array
+    def neighbours(self) -> Ints:
+        """(k,2) the two sides at each edge of exactly two triangles: 3 f + the corner of face f opposite."""
+        edge = self.edge_of_face.ravel()
+        sides = np.flatnonzero(self.valence[edge] == 2)
+        return sides[np.argsort(edge[sides], kind="stable")].reshape(-1, 2)
+
+    @cached_array
     def seam_edge(self) -> Bools:
         """(e,) bool: edges between two triangles of different patches, with no wall between them."""
         patches = np.repeat(self.patch_of_face, 3)
