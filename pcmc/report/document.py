@@ -22,7 +22,7 @@ from ..plot import draw, families, reactions
 from ..plot.figure import png
 from ..surface import Surface, expect_surface
 from . import tables
-from .chapters import cutting_chapter, under_load_chapter
+from .chapters import at_rest_chapter, cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
@@ -32,7 +32,7 @@ SUFFIXES = (".pdf",)
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
     from ..cloth import CuttingPattern
-    from ..structure import Analysis
+    from ..structure import Analysis, StructuralModel
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -56,6 +56,7 @@ class RoofReport:
     targets: pd.DataFrame | None = None
     margins: Sequence[Statement] = ()
     analysis: Analysis | None = None
+    model: StructuralModel | None = None
     pattern: CuttingPattern | None = None
     files: Mapping[str, str] = field(default_factory=dict)
 
@@ -115,6 +116,8 @@ class RoofReport:
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
             yield from under_load_chapter(self.analysis, units)
+        elif self.model is not None:
+            yield from at_rest_chapter(self.model, units)
         if self.pattern is not None:
             yield from cutting_chapter(self.pattern, units)
         if self.schedule is not None:
@@ -150,7 +153,8 @@ def roof_report(
     certificate, schedule, figures : of the surface, where they are known; otherwise computed.
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
-        of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``;
+        of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``, or the
+        structural ``model``, for the forces of its members at rest;
         ``pattern``, of ``pcmc.cutting_pattern``; ``files``, the name of each file and what it is.
 
     Raises
