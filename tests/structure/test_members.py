@@ -21,9 +21,9 @@ from pcmc.plot import member_forces
 from pcmc.report.tables import Picture, Table
 from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
-from pcmc.structure.member_forces import forces_on_members, members_at_rest
-from pcmc.structure.member_keys import members_of
+from pcmc.structure.member_forces import forces_on_members, member_tables, members_at_rest, weak_members
 from pcmc.structure.pulls import balancing_force, turns
+from pcmc.structure.section import members_of
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 STEEL = Material(2.1e8, density=7.85)
@@ -109,6 +109,23 @@ def test_a_rim_carries_the_pull_of_its_sheet_as_a_ring():
         off.append(abs(ring.within[:, 0].mean() / exact - 1.0))
     assert np.polyfit(np.log([0.2, 0.1, 0.05]), np.log(off), 1)[0] > 0.9
     assert off[-1] < 0.05
+    # a ring whose load keeps its direction buckles in its plane at q = 4 E I/R³, N = -q R
+    assert ring.buckling == pytest.approx(-4.0 * 2.1e8 * TUBE.upright / ring.within[:, 0].mean(), rel=0.01)
+
+
+def test_a_member_that_buckles_is_told_with_what_would_hold_it():
+    cap, wire = pcmc.solve(spherical_cap(0.2, alpha=0.6)).surface, Profile.circle(0.005)
+    rim = Member(circle([0, 0], 1.0), wire, STEEL, propped=True, name="rim")
+    model = model_of(cap, members=[rim], anyway=True)
+    rings = members_at_rest(model)
+    table, _ = member_tables([("rest", rings)])
+    assert 0.01 < table["buckling"][0] < 0.1
+    [line] = [line for line in weak_members(model, [("rest", rings)], Units()) if "buckles" in line]
+    assert line.startswith("rest: rim buckles at ")
+    factor = float(line.split("; ")[1].split(" times")[0])
+    assert factor == pytest.approx(1.0 / table["buckling"][0], rel=0.05)
+    stiff = replace(rim, profile=wire.scaled(1.01 * factor))
+    assert 1.0 < members_at_rest(model_of(cap, members=[stiff], anyway=True))[0].buckling < 1.1
 
 
 def sail_with_hole():
