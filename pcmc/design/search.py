@@ -27,6 +27,7 @@ from ..solvers import solve_once
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
+from ..surface.values import of_both_sheets
 from .outcome import Design, DesignStatus, NoStart
 from .sensitivity import slopes
 from .steps import StepPlan, Trial
@@ -101,6 +102,12 @@ def meet(
         measure(surface, target)
     for parameter in parameters:
         parameter.check(surface)
+    pressed = {name: p for p in parameters if p.kind == "pressure" for name in p.names}
+    for name, parameter in pressed.items():
+        for sheet in of_both_sheets(surface, {name: 0.0}):
+            if (other := pressed.get(sheet, parameter)) is not parameter:
+                text = f"{parameter.label} and {other.label}: both sheets of a cushion have one pressure"
+                raise OptionError(f"{text}; leave out one", what="vary", found=other.label)
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a row")
     validate.positive("tolerance", tolerance)

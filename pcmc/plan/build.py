@@ -9,6 +9,7 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
@@ -21,7 +22,7 @@ from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
-from ..surface.pieces import Piece, to_space
+from ..surface.pieces import Piece, point_text, to_space
 from ..surface.values import BELOW
 from .draft import Draft, Roof, drafted, rooms_of, upright_planes, walls_of
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
@@ -36,6 +37,7 @@ FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper a
 SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room
 REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
+FAR = 0.1  # of the size of the outline: of a divider that ends farther beyond it a warning tells
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
@@ -44,6 +46,7 @@ def build_surface(plan: Plan) -> Surface:
     if plan.cushion is not None:
         _check_cushion(plan)
     draft = drafted(plan)
+    _warn_of_long_dividers(draft)
     mesh, drawn = draft.mesh, draft.drawn
     fixed, sliding = _supports(draft)
     held = fixed | sliding
@@ -159,6 +162,18 @@ def _supports(draft: Draft) -> tuple[Bools, Bools]:
             fixed[chain.vertices] = True
     fixed[draft.drawn.required] = True
     return fixed, sliding & ~fixed
+
+
+def _warn_of_long_dividers(draft: Draft) -> None:
+    """Warn of dividers drawn far beyond the outline: what is outside is left out, and may be a slip."""
+    outline = shapely.Polygon(draft.lines[0].xy)
+    for line in draft.lines:
+        if line.kind is Kind.DIVIDER and not line.curve.closed:
+            away = shapely.distance(outline, shapely.points(line.xy[[0, -1]]))
+            end = int(away.argmax())
+            if away[end] > FAR * bounding_size(draft.lines[0].xy):
+                text = f"{line.name} ends at {point_text(line.xy[-end])}, {away[end]:.3g} beyond the outline;"
+                warnings.warn(f"{text} what is outside is left out", PlanWarning, stacklevel=4)
 
 
 def _warn_of_free_edges(draft: Draft, held: Bools) -> None:

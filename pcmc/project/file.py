@@ -20,8 +20,7 @@ from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..structure.member_keys import members_of
-from ..structure.section import Structure
+from ..structure.section import Structure, members_of
 from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of

@@ -17,8 +17,7 @@ from ..cloth.settings import CuttingOptions
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.member_keys import MemberSection
-from ..structure.section import PatchMaterial, Structure, Zone
+from ..structure.section import MemberSection, PatchMaterial, Structure, Zone
 from ..surface import Plane
 from ..surface.curve_data import CURVES
 from .settings import PATCH_KEYS, AccuracyWanted, MeshFile, Output, Remeshing

@@ -3,32 +3,41 @@
 from __future__ import annotations
 
 import warnings
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ..base.errors import LostWarning, OptionError
 from ..structure.drawn import DrawnMember, drawn_members
-from ..structure.member_keys import members_of
+from ..structure.section import members_of
 
 if TYPE_CHECKING:
     from ..certificate import Certificate
+    from ..structure import StructuralModel
     from ..surface import Surface
     from .outcome import Outcome
+
+
+def model_with_members(
+    outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
+) -> StructuralModel | None:
+    """The structural model of what is shown, or of another surface of the project; None without members, or
+    where one cannot be there, as in a mirror plane."""
+    project = outcome.project
+    if project is None or project.structure is None or not has_members(outcome):
+        return None
+    try:
+        if surface is None:
+            return outcome.model(project.structure, anyway=True)
+        return project.structure.model(surface, True, certificate, outcome.units, project.plan)
+    except OptionError:
+        return None
 
 
 def members_drawn(
     outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
 ) -> tuple[DrawnMember, ...]:
-    """The members on what is shown, or on another surface of the project; none where one cannot be there, as
-    in a mirror plane."""
-    project = outcome.project
-    if project is None or project.structure is None or not has_members(outcome):
-        return ()
-    make = partial(project.structure.model, surface, True, certificate, outcome.units, project.plan)
-    try:
-        return drawn_members(outcome.model(project.structure, anyway=True) if surface is None else make())
-    except OptionError:
-        return ()
+    """The members of that model, as files and drawings have them."""
+    model = model_with_members(outcome, surface, certificate)
+    return () if model is None else drawn_members(model)
 
 
 def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:

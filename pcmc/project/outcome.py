@@ -249,7 +249,9 @@ class Outcome:
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
         from ..report import roof_report
+        from .members import model_with_members
 
+        analysis = self.analysis(anyway)
         return roof_report(
             self.shown.surface,
             self.units,
@@ -257,7 +259,8 @@ class Outcome:
             mesh_check=self.mesh_check,
             mesh_failure=self.mesh_failure,
             margins=self.margins,
-            analysis=self.analysis(anyway),
+            analysis=analysis,
+            model=model_with_members(self) if analysis is None else None,
             pattern=None if (wanted := self.pattern_wanted) is None else self.cutting_pattern(wanted, anyway),
             theorem=self.theorem if self.project is not None and self.project.verify else None,
             targets=None if self.design is None else self.design.targets,

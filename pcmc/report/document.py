@@ -25,7 +25,7 @@ from . import tables
 from .cutting import cutting
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .under_load import chapter
+from .under_load import at_rest, chapter
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
 SUFFIXES = (".pdf",)
@@ -33,7 +33,7 @@ SUFFIXES = (".pdf",)
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
     from ..cloth import CuttingPattern
-    from ..structure import Analysis
+    from ..structure import Analysis, StructuralModel
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -57,6 +57,7 @@ class RoofReport:
     targets: pd.DataFrame | None = None
     margins: Sequence[Statement] = ()
     analysis: Analysis | None = None
+    model: StructuralModel | None = None
     pattern: CuttingPattern | None = None
     files: Mapping[str, str] = field(default_factory=dict)
 
@@ -116,6 +117,8 @@ class RoofReport:
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
             yield from chapter(self.analysis, units)
+        elif self.model is not None:
+            yield from at_rest(self.model, units)
         if self.pattern is not None:
             yield from cutting(self.pattern, units)
         if self.schedule is not None:
@@ -151,7 +154,8 @@ def roof_report(
     certificate, schedule, figures : of the surface, where they are known; otherwise computed.
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
-        of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``;
+        of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``, or the
+        structural ``model``, for the forces of its members at rest;
         ``pattern``, of ``pcmc.cutting_pattern``; ``files``, the name of each file and what it is.
 
     Raises

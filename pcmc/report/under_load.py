@@ -1,4 +1,4 @@
-"""The chapter of a report on a roof under load."""
+"""The chapter of a report on a roof under load, and that on its members at rest."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 from ..base.units import Units
 from ..plot import member_forces, under_load
 from ..plot.figure import png
-from ..structure.columns import column_answers
-from ..structure.member_forces import sentences
+from ..structure.columns import column_answers, columns_at_rest
+from ..structure.member_forces import member_tables, members_at_rest, sentences
 from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from ..structure import Analysis
+    from ..structure.model import StructuralModel
 
 PIXELS = 1300  # width of a picture
 ABOUT = (
@@ -26,12 +29,16 @@ ABOUT = (
 )
 SIGNS = (
     "N is above 0 in tension. V and M are the largest shear force and moment, in whichever direction. The "
-    "pull of the sheets is the load, in the deformed shape. Buckling is not checked."
+    "pull of the sheets is the load, in the deformed shape. Buckling is "
+    "the factor on the forces along a member at which it buckles alone, without the sheets that hold it."
 )
 
+AT_REST = "These are the forces under the form-finding load alone; no load cases were run."
+
 ABOUT_COLUMNS = (
-    "They follow from the forces of the supports by statics; N is above 0 in tension. Euler's load is that "
-    "of a column with hinged ends. Their own weight is left out."
+    "They follow from the forces of the supports by statics; N is above 0 in tension. A stay that would be "
+    "pressed is left out, with N = 0. Euler's load is that of a column with hinged ends. Their own weight is "
+    "left out."
 )
 
 
@@ -64,15 +71,26 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     if len(table):
         columns = columns_in(table, ["least", "largest"], force)
         yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)
-    if len(analysis.members):
-        yield from _members(analysis, units)
-    if len(analysis.columns):
-        yield from _columns(analysis, units)
+    pictures = [member_forces(analysis, units=units, width=PIXELS)] if len(analysis.members) else []
+    yield from _members(analysis.model, analysis.members, units, *map(png, pictures))
+    yield from _columns(analysis.model, analysis.columns, units)
 
 
-def _columns(analysis: Analysis, units: Units) -> Iterator[Block]:
+def at_rest(model: StructuralModel, units: Units) -> Iterator[Block]:
+    """The forces of members under the form-finding load, where no load cases were run."""
+    rest = model.steps[0].name, members_at_rest(model)
+    if model.beams or model.bars:
+        yield Heading("Members at rest", new_page=True)
+        yield AT_REST
+    yield from _members(model, member_tables([rest])[0], units)
+    yield from _columns(model, columns_at_rest(model), units)
+
+
+def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Iterator[Block]:
     """The forces of columns and stays, and what they leave to others."""
-    table, profiles = analysis.columns, {bar.name: bar.member.profile for bar in analysis.model.bars}
+    if not len(table):
+        return
+    profiles = {bar.name: bar.member.profile for bar in model.bars}
     sections = {name: p.label if p.shape else f"A = {p.area:.4g}" for name, p in profiles.items()}
     words: Columns = {"case": table["case"], "member": table["member"], "kind": table["kind"]}
     words[f"section, {units.length}"] = [sections[name] for name in table["member"]]
@@ -84,13 +102,15 @@ def _columns(analysis: Analysis, units: Units) -> Iterator[Block]:
         columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
     yield text_table("Forces of columns and stays", words, columns)
     yield ABOUT_COLUMNS
-    lines = column_answers(analysis.model, table, units)
+    lines = column_answers(model, table, units)
     yield from (f"{line[:1].upper()}{line[1:]}." for line in lines)
 
 
-def _members(analysis: Analysis, units: Units) -> Iterator[Block]:
+def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *pictures: bytes) -> Iterator[Block]:
     """What the members are, the forces along them, and what they carry at rest."""
-    force, length, beams = units.force or "force", units.length, analysis.model.beams
+    if not len(table):
+        return
+    force, length, beams = units.force or "force", units.length, model.beams
     profiles = [line.member.profile for line in beams]
     words: Columns = {
         "member": [line.name for line in beams],
@@ -102,12 +122,12 @@ def _members(analysis: Analysis, units: Units) -> Iterator[Block]:
         columns[f"I {where}, {length}⁴"] = [f"{profile.moments[k]:.4g}" for profile in profiles]
     columns[f"E, {units.pressure}"] = [f"{line.member.material.young:.4g}" for line in beams]
     yield text_table("Members", words, columns)
-    table = analysis.members
     columns = columns_in(table, ["least_N", "largest_N", "V"], force)
     columns |= columns_in(table, ["M"], f"{force}·{length}")
     columns |= columns_in(table, ["moved"], length)
     columns["span over it"] = [f"{over:.3g}" if over < 1e4 else f"{over:.0f}" for over in table["span_over"]]
+    columns["buckling"] = [f"{factor:.3g}" if factor < 1e4 else "" for factor in table["buckling"]]
     yield text_table("Forces of members", {"case": table["case"], "member": table["member"]}, columns)
     yield SIGNS
-    yield Picture("", png(member_forces(analysis, units=units, width=PIXELS)))
-    yield from (f"{line}." for line in sentences(analysis.model, units))
+    yield from (Picture("", picture) for picture in pictures)
+    yield from (f"{line}." for line in sentences(model, units))

@@ -5,10 +5,9 @@ from .drawn import DrawnMember, drawn_members
 from .gas import Gas
 from .inp import write_structure
 from .loads import SelfWeight, Snow, Step, Wind
-from .material import Material
+from .material import Material, Profile
 from .members import Member
 from .model import StructuralModel
-from .profile import Profile
 from .results import StepResults, read_results
 
 __all__ = [

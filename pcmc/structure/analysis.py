@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -248,7 +249,8 @@ class Analysis:
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
-        members = [self.members.to_string(index=False, float_format="{:.4g}".format)] * bool(self.model.beams)
+        look: dict[str, Any] = {"index": False, "float_format": "{:.4g}".format, "na_rep": "-"}
+        members = [self.members.to_string(**look)] * bool(self.model.beams)
         about = [*sentences(self.model, self.model.units), *cable_offers(self.model)]
         bars = [column_text(self.model, self.columns, self.model.units)] * bool(self.model.bars)
         return "\n".join([*units, numbers, *members, *about, *bars, *self.answers()])

@@ -3,11 +3,11 @@
 A point that holds the roof exerts the force R on it. Bars from there to their feet, in the directions d_i of
 length 1, with the forces N_i, tension above 0, pull the point with Σ N_i d_i. So
 
-    Σ N_i d_i = R
+    Σ N_i d_i = R,    N_i ≥ 0 of stays,
 
-has one solution for three bars that are not in one plane. One or two bars leave the part of R that is across
-them; the forces are those of least squares then. Their own weight is left out. A column, hinged at both ends,
-buckles under Euler's load π² E I / L², I the smaller second moment.
+has one solution for three bars that are not in one plane, if it leaves no stay in compression. Fewer bars, or
+a stay that is slack, leave a part of R; the forces are those of least squares then. Their own weight is left
+out. A column, hinged at both ends, buckles under Euler's load π² E I / L², I the smaller second moment.
 """
 
 from __future__ import annotations
@@ -17,26 +17,27 @@ from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import lsq_linear
 
 from ..base.arrays import Floats
 from ..base.units import Units
 from ..surface.pieces import point_text
 from .member_forces import forces_on_members, frame_of
-from .members import Bar
 from .model import StructuralModel
 
-LEAST = 0.01  # of the force at a point: a smaller part that bars leave is not told
+LEAST = 0.01  # of the force at a point: a smaller part that bars leave is not told, nor a smaller thrust
 COLUMNS = ["case", "member", "kind", *"xyz", "length", "N", "stress", "utilisation", "euler", "euler_over"]
-COLUMNS += [f"left_{axis}" for axis in "xyz"]
+COLUMNS += ["slack", *(f"left_{axis}" for axis in "xyz")]
 
 
-def reactions_at_rest(model: StructuralModel) -> Floats:
-    """(n,3) the forces of supports on the roof at rest; at the ends of beams with what these carry there."""
-    found: Floats = model.certificate.reactions.copy()
-    if model.beams:
+def columns_at_rest(model: StructuralModel) -> pd.DataFrame:
+    """The table of columns and stays under the form-finding load, without CalculiX; at the ends of beams with
+    what these carry there."""
+    reactions: Floats = model.certificate.reactions.copy()
+    if model.beams and model.bars:
         frame, vertices = frame_of(model, model.standing.vertices)
-        found[vertices] = frame.solved(forces_on_members(model, model.steps[0])[vertices]).reactions
-    return found
+        reactions[vertices] = frame.solved(forces_on_members(model, model.steps[0])[vertices]).reactions
+    return column_table(model, [(model.steps[0].name, reactions)])
 
 
 def column_table(model: StructuralModel, cases: Iterable[tuple[str, Floats]]) -> pd.DataFrame:
@@ -45,61 +46,56 @@ def column_table(model: StructuralModel, cases: Iterable[tuple[str, Floats]]) ->
     Columns: ``case``, ``member``, ``kind``, column or stay; ``x``, ``y``, ``z`` of the point that it holds;
     ``length``; ``N``, tension above 0; ``stress`` N/A; ``utilisation``, |stress| over the strength, NaN where
     that is not given; ``euler``, the load under which a column buckles, and ``euler_over``, that over the
-    thrust, NaN without one; ``left_x``, …, the force that the bars at the point leave to others.
+    thrust, NaN without one; ``slack``, whether it is a stay that would be pressed and is left out;
+    ``left_x``, …, the force that the bars at the point leave to others.
     """
     rows = list[list[object]]()
     for case, reactions in cases:
         for vertex in dict.fromkeys(bar.vertex for bar in model.bars):
             own = [bar for bar in model.bars if bar.vertex == vertex]
             directions, force = np.array([bar.direction for bar in own]), reactions[vertex]
-            forces = np.linalg.lstsq(directions.T, force, rcond=None)[0]
+            stays = np.array([bar.kind == "stay" for bar in own])
+            all_of_them = np.linalg.lstsq(directions.T, force, rcond=None)[0]
+            pressed = (stays & (all_of_them < -LEAST * np.linalg.norm(force))).any()
+            forces = lsq_linear(directions.T, force, (np.where(stays, 0.0, -np.inf), np.inf), method="bvls").x
             left = force - forces @ directions
-            rows += [_row(case, bar, N, left) for bar, N in zip(own, forces.tolist(), strict=True)]
+            for bar, N in zip(own, forces.tolist(), strict=True):
+                member, column = bar.member, bar.kind == "column"
+                stress, EI = N / member.profile.area, member.material.young * min(member.profile.moments)
+                euler = math.pi**2 * EI / bar.length**2 if column else math.nan
+                used = abs(stress) / member.strength if member.strength else math.nan
+                over = euler / -N if N < 0.0 else math.nan
+                about = [case, bar.name, bar.kind, *bar.points[0], bar.length]
+                slack = pressed and not column and N <= 0.0
+                rows.append([*about, N, stress, used, euler, over, slack, *left])
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(case: str, bar: Bar, N: float, left: Floats) -> list[object]:
-    stress, strength, euler = N / bar.member.profile.area, bar.member.strength, euler_load(bar)
-    used = abs(stress) / strength if strength else math.nan
-    over = euler / -N if N < 0.0 else math.nan
-    return [case, bar.name, bar.kind, *bar.points[0], bar.length, N, stress, used, euler, over, *left]
-
-
-def euler_load(bar: Bar) -> float:
-    """π² E I / L² of a column with hinged ends; NaN of a stay."""
-    member = bar.member
-    stiffness = member.material.young * min(member.profile.moments)
-    return math.pi**2 * stiffness / bar.length**2 if bar.kind == "column" else math.nan
-
-
-def columns_at_rest(model: StructuralModel) -> pd.DataFrame:
-    """The table of columns and stays under the form-finding load, without CalculiX."""
-    return column_table(model, [(model.steps[0].name, reactions_at_rest(model))] if model.bars else [])
-
-
 def column_answers(model: StructuralModel, table: pd.DataFrame, units: Units) -> list[str]:
-    """A line for each column or stay that cannot be, in its worst case, and for each force left."""
+    """A line for each column that buckles and stay that is slack, in the worst case, and each force left."""
     lines, force = list[str](), units.behind("force")
     for bar in model.bars:
         own = table[table["member"] == bar.name]
         row = own.iloc[int(own["N"].to_numpy().argmin())]
-        thrust = f"{row['case']}: {bar.name} is pressed with {-row['N']:.3g}{force}"
-        if bar.kind == "stay" and row["N"] < 0.0:
-            lines.append(f"{thrust}, but a stay can only pull; move its anchor, or make it a column")
+        if own["slack"].any():
+            cases = ", ".join(own["case"][own["slack"]])
+            text = f"{cases}: {bar.name} is slack and left out, as a stay can only pull"
+            lines.append(text + "; move its anchor, or make it a column" * bool(own["slack"].all()))
         if row["euler_over"] < 1.0:
+            thrust = f"{row['case']}: {bar.name} is pressed with {-row['N']:.3g}{force}"
             stiffer = f"it needs {1.0 / row['euler_over']:.2g} times its E I, without any safety"
             lines.append(f"{thrust} and buckles under {row['euler']:.3g}{force}; {stiffer}")
-        if (worst := own["utilisation"].max()) > 1.0:
+        if (used := own["utilisation"].max()) > 1.0:
             case = own["case"].iloc[int(np.nanargmax(own["utilisation"]))]
-            lines.append(f"{case}: {bar.name} has {worst:.2g} times the stress of its strength")
+            lines.append(f"{case}: {bar.name} has {used:.2g} times the stress of its strength")
     for _, own in table.groupby([*"xyz"], sort=False):
         left = own[["left_x", "left_y", "left_z"]].to_numpy()
         sizes = np.linalg.norm(left, axis=1)
         far = int(sizes.argmax())
-        row, names = own.iloc[far], list(dict.fromkeys(own["member"]))
+        case, N, names = own["case"].iloc[far], own["N"].iloc[far], list(dict.fromkeys(own["member"]))
         if sizes[far] > LEAST * (np.abs(own["N"]).max() + sizes[far]):
-            text = f"{row['case']}: across {' and '.join(names)} {sizes[far]:.3g}{force} are left,"
-            lines.append(f"{text} {_vector(left[far])}; {_hint(model, names, row['N'], left[far])}")
+            text = f"{case}: across {' and '.join(names)} {sizes[far]:.3g}{force} are left,"
+            lines.append(f"{text} {_vector(left[far])}; {_hint(model, names, N, left[far])}")
     return lines
 
 

@@ -1,28 +1,37 @@
-"""Frames of straight bars with bending: displacements and forces within the bars, linear in the loads.
+"""Frames of straight bars with bending: displacements, forces within the bars, and loads that buckle them.
 
-Each bar from a to b has twelve coordinates: the displacements and turns of both ends. In its axes (x along
-it, z upright, y across) its stiffness is that of Euler and Bernoulli: E A / L along it, G J / L in torsion,
-and in each of the planes of bending, with the displacements w and the slopes φ of both ends,
+All N, V and M of members are from here: CalculiX, which has their displacements, expands a beam to a brick
+and prints no forces of sections. Each bar from a to b has twelve coordinates: the displacements and turns of
+both ends. In its axes (x along it, z upright, y across) its stiffness K is that of Euler and Bernoulli: E A/L
+along it, G J/L in torsion, and in each of the planes of bending, with the displacements w and the slopes φ,
 
-    E I / L³ [[12, 6 L, -12, 6 L], [6 L, 4 L², -6 L, 2 L²], [-12, -6 L, 12, -6 L], [6 L, 2 L², -6 L, 4 L²]].
+    E I/L³ [[12, 6 L, -12, 6 L], [6 L, 4 L², -6 L, 2 L²], [-12, -6 L, 12, -6 L], [6 L, 2 L², -6 L, 4 L²]].
 
-With loads at the ends of bars alone its forces at the ends are exact.
+With loads at the ends of bars alone its forces at the ends are exact. A force N along it adds, with the same
+cubics between the ends, the stiffness G(N), N (I + I')/(A L) in torsion and in each of these planes
+
+    N/30 L [[36, 3 L, -36, 3 L], [3 L, 4 L², -3 L, -L²], [-36, -3 L, 36, -3 L], [3 L, -L², -3 L, 4 L²]].
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import null_space
 from scipy.sparse import block_array, coo_array, csr_array
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from ..base.arrays import Floats, Ints
+from ..surface.geometry import unit_vectors
 from ..surface.topology import components
 
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
 LOOSE = 1e-9  # a rigid motion that supports hold less than so moves freely
+BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
+PULLED = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]], dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,46 +46,93 @@ class BarFrame:
 
     def solved(self, forces: Floats) -> FrameForces:
         """Under forces (n,3) on the points. Where a part is not held, what is out of balance is left out."""
-        n, B = len(self.points), self.stiffness
-        axes, length = bar_axes(self.points, self.bars, self.up)
-        local = _local(B, length)
-        turn = np.zeros((len(B), 12, 12))
-        for k in range(4):
-            turn[:, 3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = axes
-        K = turn.transpose(0, 2, 1) @ local @ turn
-        place = (6 * self.bars[:, :, None] + np.arange(6)).reshape(-1, 12)
-        rows, columns = np.repeat(place, 12, axis=1).ravel(), np.tile(place, (1, 12)).ravel()
-        whole = csr_array(coo_array((K.ravel(), (rows, columns)), shape=(6 * n, 6 * n)))
-        scale = float(whole.diagonal().mean())
-        loose = self._rigid_motions()
-        held = csr_array(scale * np.vstack([self.holds, loose]))
-        system = block_array([[whole, held.T], [held, None]], format="csc")
-        load = np.concatenate([np.pad(forces, ((0, 0), (0, 3))).ravel(), np.zeros(held.shape[0])])
-        found = splu(system).solve(load)
+        n = len(self.points)
+        factor, scale = self._factor
+        load = np.pad(np.pad(forces, ((0, 0), (0, 3))).ravel(), (0, factor.shape[0] - 6 * n))
+        found = factor.solve(load)
         u = found[: 6 * n]
-        ends = np.einsum("bij,bjk,bk->bi", local, turn, u[place])
+        ends = np.einsum("bij,bjk,bk->bi", self._own, self._turn, u[self._place])
         reactions = -scale * (self.holds.T @ found[6 * n : 6 * n + len(self.holds)]).reshape(n, 6)
         u = u.reshape(n, 6)
         return FrameForces(u[:, :3], ends, reactions[:, :3], reactions[:, 3:])
 
-    def _rigid_motions(self) -> Floats:
-        """(k,6n) the motions of parts as rigid bodies that nothing holds, as rows."""
-        n = len(self.points)
-        label = components(self.bars, n)
-        motions = []
+    def buckling(self, N: Floats) -> float:
+        """The factor on forces N (b,) along the bars, tension above 0, at which these buckle, loads keeping
+        their directions: the least λ > 0 with (K + λ G(N)) u = 0 for a motion u that is free; else inf.
+
+        A column of two bars with hinged ends, to 0.7 % of π² E I/L²:
+
+        >>> X, up = np.array([[0.0, 0, 0], [0, 0, 1], [0, 0, 2]]), np.eye(3)[2]
+        >>> held = np.eye(18)[[0, 1, 2, 5, 12, 13]]
+        >>> column = BarFrame(X, np.array([[0, 1], [1, 2]]), np.tile([1e6, 4.0, 4.0, 3.0], (2, 1)), held, up)
+        >>> round(column.buckling(np.array([-1.0, -1.0])) / np.pi**2, 3)
+        1.008
+        """
+        if not (N < 0.0).any():
+            return np.inf
+        (EA, EI, across, _), L, n = self.stiffness.T, self._axes[1], 6 * len(self.points)
+        G = self._assembled(
+            _blocks(L, 0.0 * N, N / (30 * L), N / (30 * L), N * (EI + across) / (EA * L), PULLED)
+        )
+        factor = self._factor[0]
+
+        def bent(u: Floats) -> Floats:  # the largest eigenvalue of -K⁻¹ G is 1/λ
+            return np.asarray(factor.solve(np.pad(-(G @ u.ravel()), (0, factor.shape[0] - n)))[:n])
+
+        start = np.random.default_rng(0).standard_normal(n)  # no mode is square to it, as to an even vector
+        most = float(eigs(LinearOperator((n, n), bent), 1, which="LR", v0=start)[0][0].real)
+        return 1.0 / most if most > 0.0 else np.inf
+
+    @cached_property
+    def _axes(self) -> tuple[Floats, Floats]:
+        return bar_axes(self.points, self.bars, self.up)
+
+    @cached_property
+    def _turn(self) -> Floats:
+        """(b,12,12) from the coordinates of space to those of the bars."""
+        turn = np.zeros((len(self.bars), 12, 12))
+        for k in range(0, 12, 3):
+            turn[:, k : k + 3, k : k + 3] = self._axes[0]
+        return turn
+
+    @cached_property
+    def _place(self) -> Ints:
+        """(b,12) the places of their coordinates in a vector 6n."""
+        return np.asarray((6 * self.bars[:, :, None] + np.arange(6)).reshape(-1, 12))
+
+    @cached_property
+    def _own(self) -> Floats:
+        """(b,12,12) the stiffness of bars in their axes."""
+        (EA, EI, across, GJ), L = self.stiffness.T, self._axes[1]
+        return _blocks(L, EA / L, EI / L**3, across / L**3, GJ / L, BENDING)
+
+    def _assembled(self, own: Floats) -> csr_array:
+        """(6n,6n) the sum of matrices (b,12,12) in the bars' axes."""
+        K, size = self._turn.transpose(0, 2, 1) @ own @ self._turn, 6 * len(self.points)
+        rows, columns = np.repeat(self._place, 12, axis=1).ravel(), np.tile(self._place, (1, 12)).ravel()
+        return csr_array(coo_array((K.ravel(), (rows, columns)), shape=(size, size)))
+
+    @cached_property
+    def _factor(self) -> tuple[Any, float]:
+        """The factors of K with what is held and the rigid motions of parts that nothing holds; the scale of
+        these rows."""
+        n, label, motions = len(self.points), components(self.bars, len(self.points)), []
         for part in np.unique(label[self.bars]):
             mine = label == part
             arms = self.points - self.points[mine].mean(axis=0)
-            size = float(np.abs(arms[mine]).max())
+            size, still = float(np.abs(arms[mine]).max()), np.zeros_like(self.points)
             for axis in np.eye(3):
-                still = np.zeros_like(self.points)
                 motions += [
                     np.hstack([still + axis, still]) * mine[:, None],
                     np.hstack([np.cross(axis, arms), still + axis]) / size * mine[:, None],
                 ]
         R = np.array([motion.ravel() for motion in motions]).T
         free = null_space(self.holds @ R, rcond=LOOSE) if len(self.holds) else np.eye(R.shape[1])
-        return np.asarray(np.linalg.qr(R @ free)[0].T if free.shape[1] else np.zeros((0, 6 * n)))
+        loose = np.linalg.qr(R @ free)[0].T if free.shape[1] else np.zeros((0, 6 * n))
+        K = self._assembled(self._own)
+        scale = float(K.diagonal().mean())
+        held = csr_array(scale * np.vstack([self.holds, loose]))
+        return splu(block_array([[K, held.T], [held, None]], format="csc")), scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,19 +178,18 @@ def bar_axes(X: Floats, bars: Ints, up: Floats) -> tuple[Floats, Floats]:
     across = np.cross(up, along)
     stands = np.linalg.norm(across, axis=1) <= UPRIGHT
     across[stands] = np.cross(np.eye(3)[np.abs(up).argmin()], along[stands])
-    across /= np.linalg.norm(across, axis=1)[:, None]
+    across = unit_vectors(across)
     return np.stack([along, across, np.cross(along, across)], axis=1), length
 
 
-def _local(B: Floats, L: Floats) -> Floats:
-    """(b,12,12) the stiffness of bars in their axes."""
-    K = np.zeros((len(B), 12, 12))
-    for at, value in ((0, B[:, 0] / L), (3, B[:, 3] / L)):
+def _blocks(L: Floats, along: Floats, up: Floats, across: Floats, twist: Floats, unit: Floats) -> Floats:
+    """(b,12,12) matrices of bars in their axes, with factors (b,) of ``unit`` in the planes of bending."""
+    K = np.zeros((len(L), 12, 12))
+    for at, value in ((0, along), (3, twist)):
         K[:, at, at] = K[:, at + 6, at + 6] = value
         K[:, at, at + 6] = K[:, at + 6, at] = -value
-    unit = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
-    for inertia, place, slope in ((B[:, 1], [2, 4, 8, 10], -1.0), (B[:, 2], [1, 5, 7, 11], 1.0)):
-        lengths = np.stack([np.ones_like(L), slope * L, np.ones_like(L), slope * L], axis=1)
-        block = (inertia / L**3)[:, None, None] * unit * lengths[:, :, None] * lengths[:, None, :]
+    for factor, place, slope in ((up, [2, 4, 8, 10], -L), (across, [1, 5, 7, 11], L)):
+        lengths = np.stack([np.ones_like(L), slope, np.ones_like(L), slope], axis=1)
+        block = factor[:, None, None] * unit * lengths[:, :, None] * lengths[:, None, :]
         K[:, np.array(place)[:, None], place] += block
     return K

@@ -20,6 +20,7 @@ from .loads import Step
 from .material import Material
 from .member_forces import forces_on_members, held_turns
 from .model import StructuralModel, expect_model
+from .pulls import axes_along
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
 POINTS, CABLE_POINTS = 2, 8  # integration points: one above the other; a truss is expanded to a brick
@@ -143,7 +144,9 @@ def _beams(model: StructuralModel) -> Iterator[str]:
     for v, node in zip(vertices.tolist(), number[vertices].tolist(), strict=True):
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
         if v in turns or stops not in ("", "123"):
-            axes = _completed(turns[v]) if v in turns else model.axes[v]
+            axes = model.axes[v]
+            if v in turns:  # those that are held first
+                axes = axes_along(turns[v])[0] if len(turns[v]) == 1 else turns[v]
             yield f"*NSET, NSET=BEAM_{node}\n{node}\n*TRANSFORM, NSET=BEAM_{node}, TYPE=R\n"
             yield ",".join(FIELD % c for c in axes[:2].ravel()) + "\n"
         yield "".join(f"*BOUNDARY\n{node},{axis},{axis}\n" for axis in stops)
@@ -152,14 +155,6 @@ def _beams(model: StructuralModel) -> Iterator[str]:
         for axis in sorted({"1", "2", "3"} - set(stops)):
             yield f"*EQUATION\n2\n{node},{axis},1.,{v + 1},{axis},-1.\n"
     yield _set("ENDS", number[vertices[model.held[vertices]]] - 1)
-
-
-def _completed(rows: Floats) -> Floats:
-    """(3,3) right-handed axes that begin with rows (k,3) at right angles."""
-    if len(rows) == 1:
-        second = np.cross(rows[0], np.eye(3)[np.abs(rows[0]).argmin()])
-        rows = np.vstack([rows, second / np.linalg.norm(second)])
-    return np.vstack([rows[:2], np.cross(rows[0], rows[1])])
 
 
 def _material(name: str, material: Material) -> str:

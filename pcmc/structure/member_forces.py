@@ -38,6 +38,7 @@ class MemberForces:
     within: Floats  # (k,6) N, V, V across, T, M, M across; see ``FrameForces.within``
     displacements: Floats  # (k,3)
     pulls: Floats  # (k,3) forces of the sheets and loads on it
+    buckling: float  # the factor on N along it at which it buckles alone; see ``BarFrame.buckling``
 
     @cached_array
     def along(self) -> Floats:
@@ -104,35 +105,32 @@ class MemberForces:
 
 def members_at_rest(model: StructuralModel) -> tuple[MemberForces, ...]:
     """The beams of a model under the pull of the sheets at rest, with the displacements of beams alone."""
-    if not model.beams:
-        return ()
-    X, forces = model.standing.vertices, forces_on_members(model, model.steps[0])
-    return _along_lines(model, X, forces, None)
+    return _along_lines(model, model.steps[0])
 
 
 def members_in(results: StepResults) -> tuple[MemberForces, ...]:
     """The beams at the end of a step of the analysis, in the shape that the roof has there."""
-    model = results.model
-    if not model.beams:
-        return ()
-    moved = np.nan_to_num(results.displacements)
-    forces = forces_on_members(model, results.step, results)
-    return _along_lines(model, model.standing.vertices + moved, forces, moved)
+    return _along_lines(results.model, results.step, results)
 
 
 def _along_lines(
-    model: StructuralModel, X: Floats, forces: Floats, moved: Floats | None
+    model: StructuralModel, step: Step, results: StepResults | None = None
 ) -> tuple[MemberForces, ...]:
-    frame, vertices = frame_of(model, X)
+    if not model.beams:
+        return ()
+    X, forces = model.standing.vertices, forces_on_members(model, step, results)
+    moved = np.zeros_like(X) if results is None else np.nan_to_num(results.displacements)
+    frame, vertices = frame_of(model, X + moved)
     solved = frame.solved(forces[vertices])
-    if moved is None:
-        moved = np.zeros_like(X)
+    if results is None:
         moved[vertices] = solved.displacements
     found, first = list[MemberForces](), 0
     for line in model.beams:
         v, bars = line.vertices, first + np.arange(len(line.pairs))
-        within = solved.within(bars, line.closed)
-        found.append(MemberForces(line, model.standing.vertices[v], within, moved[v], forces[v]))
+        within, N = solved.within(bars, line.closed), np.zeros(len(frame.bars))
+        N[bars] = 0.5 * (solved.ends[bars, 6] - solved.ends[bars, 0])
+        buckling = frame.buckling(N)
+        found.append(MemberForces(line, X[v], within, moved[v], forces[v], buckling))
         first += len(bars)
     return tuple(found)
 
@@ -229,8 +227,9 @@ def supports_with_members(model: StructuralModel, reactions: Floats) -> pd.DataF
 def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
-    over it. And a row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``;
-    ``pull`` and ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``.
+    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, NaN where it pulls. And a
+    row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
+    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``.
     """
     rows, along = list[dict[str, object]](), list[pd.DataFrame]()
     for case, beams in cases:
@@ -239,6 +238,7 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
             over = beam.span / moved.max() if moved.any() else np.inf
             about = {"case": case, "member": beam.line.name}
             rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
+            rows[-1]["buckling"] = beam.buckling if beam.buckling < np.inf else np.nan
             columns = about | {"s": beam.along} | dict(zip("xyz", beam.points.T, strict=True))
             columns |= dict(zip(COLUMNS, beam.within.T, strict=True))
             columns |= dict(zip(("pull", "pull_unbent"), beam.wall_tensions.T, strict=True))
@@ -258,6 +258,7 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         about += f", M/N = {beam.eccentricity:.2g}{length}" if np.isfinite(beam.eccentricity) else ""
         about += f"; {beam.enough:.3g} times its E A and E I keep the"
         about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
+        about += f"; alone it buckles at {beam.buckling:.3g} times this" if beam.buckling < np.inf else ""
         if beam.line.wall:
             about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
             low, high = np.nanmin(beam.wall_tensions[:, 1]), np.nanmax(beam.wall_tensions[:, 1])
@@ -287,9 +288,16 @@ def cable_offers(model: StructuralModel) -> list[str]:
 def weak_members(
     model: StructuralModel, cases: Iterable[tuple[str, tuple[MemberForces, ...]]], units: Units
 ) -> list[str]:
-    """A line for each beam that moves by more than a 300th of its span in a case, or would without the
-    sheets, which carry a good part in its place; with the stiffness that it would need to carry all alone."""
+    """A line for each beam that buckles in a case if no sheets hold it; and each that moves by more than a
+    300th of its span, or would without the sheets, which carry a good part in its place; with the stiffness
+    that it would need to carry all alone."""
     lines, listed = list[str](), list(cases)
+    for case, beam in ((case, beam) for case, beams in listed for beam in beams if beam.buckling < 1.0):
+        text = (
+            f"{case}: {beam.line.name} buckles at {100.0 * beam.buckling:.2g} % of its thrust, if no sheets"
+        )
+        text += f" hold it; {1.0 / beam.buckling:.2g} times its E I carries it alone, without any safety"
+        lines.append(text)
     for k, rest in enumerate(members_at_rest(model)):
         case, worst = max(((name, beams[k]) for name, beams in listed), key=lambda one: one[1].deflection)
         share = max(0.0, 1.0 - listed[0][1][k].pulled / rest.pulled)

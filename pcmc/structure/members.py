@@ -20,8 +20,7 @@ from ..surface import Surface
 from ..surface.curves import Curve
 from ..surface.geometry import segment_lengths
 from ..surface.pieces import point_text, to_space
-from .material import Material
-from .profile import Profile
+from .material import Material, Profile
 
 KINDS = ("beam", "cable")
 ENDS = ("hinged", "clamped")

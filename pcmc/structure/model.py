@@ -18,7 +18,7 @@ from ..forces.cables import directions
 from ..forces.pinching import standing_part
 from ..forces.triangles import effective_tensions
 from ..surface import Surface, expect_surface
-from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.geometry import area_vectors, face_areas, segment_lengths, unit_vectors, vertex_sums
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports
@@ -35,7 +35,7 @@ from .loads import (
 )
 from .material import Material
 from .members import Bar, Member, MemberLine, bars_on, lines_on
-from .pulls import at_vertices, balancing_force, corner_forces, in_planes
+from .pulls import at_vertices, axes_along, balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
@@ -162,8 +162,7 @@ class StructuralModel:
         warp stands across a triangle."""
         mine = self.active[self.standing.patch_of_face[self.active] == patch]
         P = self.standing.vertices[self.standing.faces[mine]]
-        normal = area_vectors(P)
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        normal = unit_vectors(area_vectors(P))
         direction = np.array(self.materials[patch].warp)
         direction /= np.linalg.norm(direction) or 1.0
         warp = direction - (normal @ direction)[:, None] * normal
@@ -329,10 +328,7 @@ class StructuralModel:
         first = np.where((self.freedom[guided] == 2)[:, None, None], np.eye(3) - along, along)
         longest = np.linalg.norm(first, axis=1).argmax(axis=1)  # all columns are multiples of one direction
         first = np.take_along_axis(first, longest[:, None, None], axis=2)[:, :, 0]
-        first /= np.linalg.norm(first, axis=1)[:, None]
-        second = np.cross(np.eye(3)[np.abs(first).argmin(axis=1)], first)
-        second /= np.linalg.norm(second, axis=1)[:, None]
-        axes[guided] = np.stack([first, second, np.cross(first, second)], axis=1)
+        axes[guided] = axes_along(unit_vectors(first))
         return axes
 
     @cached_property

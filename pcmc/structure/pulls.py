@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..surface.geometry import area_vectors
+from ..surface.geometry import area_vectors, edge_vectors, unit_vectors
 
 
 def in_planes(P: Floats) -> Floats:
@@ -25,8 +25,7 @@ def in_planes(P: Floats) -> Floats:
     >>> (in_planes(np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])) + 0.0).tolist()
     [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]]
     """
-    normal = area_vectors(P)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = unit_vectors(area_vectors(P))
     return np.eye(3) - normal[:, :, None] * normal[:, None]
 
 
@@ -38,10 +37,14 @@ def corner_forces(P: Floats, tensors: Floats) -> Floats:
     >>> (corner_forces(P, np.diag([3.0, 0, 0])[None]) + 0.0).tolist()
     [[[3.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 0.0, 0.0]]]
     """
-    normal = area_vectors(P)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    side = np.roll(P, 1, axis=1) - np.roll(P, -1, axis=1)
-    return -0.5 * np.einsum("eij,ekj->eki", tensors, np.cross(normal[:, None], side))
+    normal = unit_vectors(area_vectors(P))
+    return -0.5 * np.einsum("eij,ekj->eki", tensors, np.cross(normal[:, None], edge_vectors(P)))
+
+
+def axes_along(first: Floats) -> Floats:
+    """(k,3,3) right-handed axes, rows, the first along unit vectors (k,3)."""
+    second = unit_vectors(np.cross(np.eye(3)[np.abs(first).argmin(axis=1)], first))
+    return np.stack([first, second, np.cross(first, second)], axis=1)
 
 
 def at_vertices(forces: Floats, faces: Ints, n: int) -> Floats:
@@ -52,8 +55,7 @@ def at_vertices(forces: Floats, faces: Ints, n: int) -> Floats:
 def turns(P: Floats, closed: bool) -> Floats:
     """(k,3) at each point of a polyline (k,3) the direction of the next edge less that of the one before; at
     ends that of the one edge, outward turned."""
-    edges = (np.roll(P, -1, axis=0) if closed else P[1:]) - (P if closed else P[:-1])
-    t = edges / np.linalg.norm(edges, axis=1)[:, None]
+    t = unit_vectors((np.roll(P, -1, axis=0) if closed else P[1:]) - (P if closed else P[:-1]))
     if closed:
         return t - np.roll(t, 1, axis=0)
     return np.vstack([t[:1], np.diff(t, axis=0), -t[-1:]])

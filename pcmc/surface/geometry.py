@@ -133,6 +133,15 @@ def segment_lengths(X: Floats, ends: Ints) -> Floats:
     return np.asarray(np.linalg.norm(X[ends[:, 1]] - X[ends[:, 0]], axis=1))
 
 
+def unit_vectors(v: Floats) -> Floats:
+    """(…,d) vectors of length 1 along vectors (…,d), none of them zero.
+
+    >>> unit_vectors(np.array([[0.0, 3.0, 4.0]])).tolist()
+    [[0.0, 0.6, 0.8]]
+    """
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
 def edge_vectors(P: Floats) -> Floats:
     """(…,m,3,3) edges of triangles; edge k is opposite corner k.
 

@@ -34,6 +34,11 @@ class EdgeCurve:
         order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
         return np.stack([order[:-1], order[1:]], axis=1)
 
+    @property
+    def ends(self) -> tuple[Ints, ...]:
+        """(2,) each end with the vertex beside it; none of a closed curve."""
+        return () if self.closed else (self.vertices[:2], self.vertices[:-3:-1])
+
 
 @dataclass(frozen=True, eq=False)
 class Topology:
@@ -80,6 +85,13 @@ class Topology:
     def junction_edge(self) -> Bools:
         """(e,) bool: edges where three or more triangles meet."""
         return self.valence >= 3
+
+    @cached_array
+    def neighbours(self) -> Ints:
+        """(k,2) the two sides at each edge of exactly two triangles: 3 f + the corner of face f opposite."""
+        edge = self.edge_of_face.ravel()
+        sides = np.flatnonzero(self.valence[edge] == 2)
+        return sides[np.argsort(edge[sides], kind="stable")].reshape(-1, 2)
 
     @cached_array
     def seam_edge(self) -> Bools:

@@ -16,6 +16,7 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.tolerances import AT_REST
 from pcmc.design import DesignStatus
 from pcmc.design.targets import as_parameters, measure
+from pcmc.plan import Plan
 
 # Bad requests
 
@@ -103,6 +104,19 @@ def test_parameters_and_walls_of_no_tension():
         measure(surface, Target("curvature", "wall"))
     with refused(OptionError, what="low", where="tension of wall", found=-1.0):
         Parameter("wall", low=-1.0, high=1.0).bounds(surface)
+
+
+def test_the_two_sheets_of_a_cushion_are_no_two_pressures_of_a_search():
+    edges = {"edge_length": 1.0, "tension": 4.0, "cushion": 1.2}
+    cushion = pcmc.solve(Plan([[0, 0], [6, 0], [6, 4], [0, 4]], **edges).surface()).surface
+    sheets, aim = ["patch 1", "patch 1 below"], [Target("apex", "patch 1", 0.6)]
+    with refused(OptionError, what="vary", found="pressure of patch 1 below"):
+        meet(cushion, aim, [Parameter(name, "pressure") for name in sheets])
+    found = meet(cushion, aim, [Parameter("patch 1", "pressure")]).surface.pressures
+    assert found[0] == found[1] != 1.0
+    assert meet(cushion, aim, [Parameter(sheets, "pressure")]).surface.pressures == pytest.approx(
+        found, rel=1e-4
+    )
 
 
 def test_a_tension_may_be_0_only_where_nothing_presses_or_weighs():

@@ -302,6 +302,16 @@ def test_twenty_thousand_triangles():
     assert minimum_angle(surface) > 20.0
 
 
+def test_a_divider_drawn_far_beyond_the_outline_is_told_and_one_that_passes_it_a_little_is_not():
+    box, line = [[0, 0], [8, 0], [8, 4], [0, 4]], [[4, -0.5], [4, 4.5]]
+    silent = Plan(box, [line], tension=2.0, edge_length=1.0).surface()
+    with pytest.warns(
+        PlanWarning, match=r"^divider 'wall 1' ends at \(4, 40\), 36 beyond the outline; what is"
+    ):
+        told = Plan(box, [[line[0], [4, 40]]], tension=2.0, edge_length=1.0).surface()
+    np.testing.assert_allclose(told.vertices, silent.vertices, atol=1e-12)
+
+
 def test_a_cushion_is_two_caps():
     """Over a circle, of the radii 2α/p, to the second order in the edge."""
     circle, off = {"circle": {"centre": [0, 0], "radius": 3.0}}, []

@@ -15,11 +15,11 @@ from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, polyline
 from pcmc.report.tables import Table
-from pcmc.report.under_load import chapter
+from pcmc.report.under_load import at_rest, chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.columns import column_answers, column_table, column_text, columns_at_rest
 from pcmc.structure.member_forces import members_at_rest
-from pcmc.structure.member_keys import members_of
+from pcmc.structure.section import members_of
 
 TUBE, STEEL = Profile.tube(0.1143, 0.005), Material(2.1e8, density=7.85)
 ROPE, NONE = Profile(3e-4, 1e-9), Units()
@@ -100,6 +100,35 @@ def test_a_case_with_other_reactions_has_its_own_rows():
     assert column_text(model, table, NONE).splitlines()[-1].startswith("two: across mast ")
 
 
+def test_a_stay_that_would_be_pressed_is_left_out_and_the_others_solved_again():
+    """With stays along (-1, ∓1, -1) a force (-1, y, 5) needs tensions in the ratio 1 - y to 1 + y: beyond
+    y = 1 the first is slack, and the second, T/√3 = (1 + y)/2, is of least squares across the mast."""
+    model = sail_on(column([0, 0], [0, 0]), stay([0, 0], [-4, -4]), stay([0, 0], [-4, 4]))
+    cases = []
+    for name, y in (("calm", 0.5), ("gust", 3.0)):
+        reactions = np.zeros((len(sail().surface.vertices), 3))
+        reactions[model.bars[0].vertex] = -1.0, y, 5.0
+        cases.append((name, reactions))
+    table = column_table(model, cases)
+    root = np.sqrt(3.0)
+    assert table["N"].to_numpy() == pytest.approx([-6.0, root / 4, 3 * root / 4, -7.0, 0.0, 2.0 * root])
+    assert table["slack"].tolist() == [False] * 4 + [True, False]
+    np.testing.assert_allclose(table[["left_x", "left_y", "left_z"]][3:], [[1.0, 1.0, 0.0]] * 3, atol=1e-12)
+    lines = column_answers(model, table, NONE)
+    assert lines[0] == "gust: stay-1 is slack and left out, as a stay can only pull"
+    assert lines[1].startswith("gust: across mast and stay-1 and stay-2 1.41 are left, (1, 1);")
+
+
+def test_the_report_has_the_forces_of_columns_where_no_load_cases_were_run():
+    model = sail_on(column([0, 0], [0, 0]), stay([0, 0], [-3, -1]), stay([0, 0], [-1, -3]))
+    blocks = list(at_rest(model, Units("m", "kN")))
+    [table] = [block for block in blocks if isinstance(block, Table)]
+    assert (table.title, len(table.rows)) == ("Forces of columns and stays", 3)
+    assert table.rows[0][:3] == ["form pressure", "mast", "column"]
+    assert any("no load cases were run" in block for block in blocks if isinstance(block, str))
+    assert list(at_rest(sail_on(), Units("m", "kN"))) == []
+
+
 @pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 def test_each_case_and_the_report_have_the_forces_of_columns():
     """By CalculiX at rest as by the certificate, and other ones under snow."""
@@ -125,7 +154,7 @@ def test_what_gives_way_is_told():
     N = columns_at_rest(model).set_index("member")["N"]
     factor = -N["mast"] / (np.pi**2 * 2.1e8 * np.pi * 0.02**4 / 64.0 / 16.0)
     assert any(f"it needs {factor:.2g} times its E I" in line for line in lines)
-    assert any("stay-2 is pressed with" in line and "a stay can only pull" in line for line in lines)
+    assert any("stay-2 is slack and left out" in line and "move its anchor" in line for line in lines)
     used = N["stay-1"] / ROPE.area / 1e4
     assert any(f"stay-1 has {used:.2g} times the stress of its strength" in line for line in lines)
 

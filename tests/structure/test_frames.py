@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from pcmc.base.errors import OptionError
 from pcmc.structure.frames import BarFrame, bar_axes
-from pcmc.structure.profile import Profile
+from pcmc.structure.material import Profile
 from pcmc.structure.pulls import balancing_force
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -51,6 +52,47 @@ def test_a_straight_beam_has_the_moment_and_the_deflection_of_the_tables(axis, c
         np.testing.assert_allclose(solved.reactions.sum(axis=0), -forces.sum(axis=0), atol=1e-9)
         off.append(1.0 + solved.displacements[n // 2, axis] / (5 * 3.0 * 1e4 / 384.0 / inertia))
     assert np.polyfit(np.log([4, 8, 16]), np.log(off), 1)[0] == pytest.approx(-2.0, abs=0.01)
+
+
+def test_a_column_buckles_under_eulers_load_to_the_fourth_order():
+    """π² E I/L² about the weaker axis with hinged ends, four times that with clamped ones."""
+    euler, bars = np.pi**2 * 500.0 / 100.0, [2, 4, 8]
+    off = [frame_along(straight(n), hinged(3)).buckling(-np.ones(n)) / euler - 1.0 for n in bars]
+    assert np.polyfit(np.log(bars), np.log(off), 1)[0] == pytest.approx(-4.0, abs=0.1)
+    clamped = frame_along(straight(16), [(end, k) for end in (0, -1) for k in range(6)])
+    assert clamped.buckling(np.full(16, -2.0)) == pytest.approx(4.0 * euler / 2.0, rel=1e-4)
+    assert clamped.buckling(np.ones(16)) == np.inf
+
+
+def buckling_of_an_arc(half):
+    """q R³/E I of an arc of the angle 2 ``half`` with hinged ends under an even radial load that keeps its
+    direction, in its plane: with v along it, θ = v'' + v and k = q R³/E I the conditions (θ'' + k θ)'' +
+    θ'' + k θ = 0 and v = v' = θ' = 0 at the ends, for v even, which is w = -v' odd."""
+
+    def unsolvable(k):
+        root, (s, c) = np.sqrt(k), (np.sin(half), np.cos(half))
+        a, b = np.cos(root * half), -root * np.sin(root * half)
+        return np.linalg.det(
+            [[a / (1 - k), half * s / 2, c], [b / (1 - k), (s + half * c) / 2, -s], [b, -s, 0.0]]
+        )
+
+    shallow = (np.pi / half) ** 2 - 1.0  # of a pressure that turns with it: Timoshenko and Gere, 7.4
+    return brentq(unsolvable, 0.9 * shallow, 1.2 * shallow), shallow
+
+
+@pytest.mark.parametrize("half", [0.5, 1.0])
+def test_an_arch_buckles_in_its_plane_under_the_load_of_the_closed_form(half):
+    off, bars = [], [16, 32, 64]
+    exact, following = buckling_of_an_arc(half)
+    for n in bars:
+        at = np.linspace(-half, half, n + 1)
+        X = 10.0 * np.stack([np.sin(at), 0.0 * at, np.cos(at)], axis=1)
+        held = [(end, k) for end in (0, -1) for k in (0, 2)]
+        held += [(point, k) for point in range(n + 1) for k in (1, 3, 5)]  # it stays in its plane
+        arch = frame_along(X, held, stiffness=(1e9, 2000.0, 500.0, 300.0))
+        off.append(arch.buckling(np.full(n, -2000.0 / 10.0**2)) / exact - 1.0)
+    assert np.polyfit(np.log(bars), np.log(off), 1)[0] == pytest.approx(-2.0, abs=0.1)
+    assert exact == pytest.approx(following + 1.0, rel=0.03)  # as shallow arches have it
 
 
 def test_clamped_ends_take_a_twelfth():

@@ -11,8 +11,8 @@ from typing import Any
 import pandas as pd
 
 from ...base import validate
-from ...base.errors import MissingExtra, OptionError, SurfaceError
-from ...surface import Surface
+from ...base.errors import MissingExtra, OptionError
+from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
 from ..result import Callback
 from .boundary_motion import BoundaryMotion
@@ -168,10 +168,8 @@ class Branch:
 
     def _known_line(self, what: str) -> ParameterLine:
         if self._line is None:
-            message = (
-                f"{what}: this branch was put together from tables; only one that follow gave can {what}"
-            )
-            raise OptionError(message, what="branch")
+            message = f"{what}: this branch was put together from tables; only one that follow gave can"
+            raise OptionError(f"{message} {what}", what="branch")
         return self._line
 
     def _bifurcation(self, event: int | None) -> int:
@@ -276,8 +274,7 @@ def follow(
     >>> float((branch.points.parameter.iloc[-1] * 3 / 2**0.5).round(9)), len(branch.events)
     (1.0, 0)
     """
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     expect_flat(surface, "follow")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")
