@@ -9,14 +9,5 @@ from .margins import Margin, MarginEnd, margin
 from .mesh_check import MeshCheck, check_mesh
 from .persistence import MeshVerdict
 
-__all__ = [
-    "AccuracyStatus",
-    "AccurateResult",
-    "Margin",
-    "MarginEnd",
-    "MeshCheck",
-    "MeshVerdict",
-    "check_mesh",
-    "margin",
-    "solve_to_accuracy",
-]
+__all__ = ["AccuracyStatus", "AccurateResult", "Margin", "MarginEnd", "MeshCheck", "MeshVerdict"]
+__all__ += ["check_mesh", "margin", "solve_to_accuracy"]

@@ -86,7 +86,7 @@ def evenness(shares: Floats) -> float:
     return float(np.sqrt(shares).sum() ** 2 / (len(shares) * total)) if total > 0.0 else 1.0
 
 
-def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
+def size_field(surface: Surface, shares: Floats, triangles: float) -> Floats:
     """(n,) edge lengths for a mesh of about so many triangles whose shares (m,) ≥ 0 in the error are equal.
 
     >>> from pcmc import Patch
@@ -103,9 +103,9 @@ def size_field(surface: Surface, shares: Floats, triangles: float, growth: float
     count = np.maximum(np.bincount(F.ravel(), minlength=surface.n), 1)
     wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
     for _ in range(6):  # limits to growth make edges shorter and triangles more
-        size = limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
+        size = limit_growth(surface.vertices, surface.topology.edges, wanted, GROWTH)
         wanted *= sqrt(triangles_for(areas, size[F].mean(axis=1)).sum() / triangles)
-    return limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
+    return limit_growth(surface.vertices, surface.topology.edges, wanted, GROWTH)
 
 
 def _edge_shares(coarse: Surface, fine: Surface, goals: Iterable[Goal]) -> Iterator[Floats]:
@@ -172,14 +172,10 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
 
 def _held_vertices(surface: Surface, of: str) -> Ints:
     """The vertices of the held boundary, or of its curves with the name of a patch."""
-    held, patch = np.zeros(surface.n, dtype=bool), of.split(" near (")[0]
-    held[surface.topology.edges[held_boundary(surface)]] = True
-    chosen = [
-        curve.vertices[held[curve.vertices]]
-        for curve in surface.topology.boundary_loops
-        if names_of(surface, curve.sheets) == patch
-    ]
-    return np.unique(np.concatenate(chosen)) if chosen else np.flatnonzero(held)
+    topo, patch = surface.topology, of.split(" near (")[0]
+    held = np.unique(topo.edges[held_boundary(surface)])
+    curves = [c.vertices for c in topo.boundary_loops if names_of(surface, c.sheets) == patch]
+    return np.intersect1d(held, np.concatenate(curves)) if curves else held
 
 
 def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
@@ -204,9 +200,8 @@ def _along(surface: Surface, field: Floats, second: bool = False) -> Floats:
         return np.zeros_like(field)
     step = (sqrt(STEP) if second else STEP) * surface.size / most
     shifts = (step, -step, 0.0) if second else (step, -step)
-    ahead, back, *here = (
-        energy_and_gradient(surface, surface.vertices + s * field, supports=False)[1] for s in shifts
-    )
+    places = (surface.vertices + s * field for s in shifts)
+    ahead, back, *here = (energy_and_gradient(surface, X, supports=False)[1] for X in places)
     if not second:
         return np.asarray((ahead - back) / (2.0 * step))
     return np.asarray((ahead + back - 2.0 * here[0]) / step**2)

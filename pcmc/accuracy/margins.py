@@ -206,11 +206,7 @@ class Margin:
         holds = f"stays a saddle of index {self.index}" if self.index else "holds"
         none_now = math.isnan(self.factor)
         number = self.value if none_now else self.factor
-        many = {
-            "tension": "tensions",
-            "cable": "tensions of the cables",
-            "cable_weight": "weights of cables",
-        }
+        many = {"tension": "tensions", "cable": "tensions of the cables", "cable_weight": "weights of cables"}
         of = many.get(self.what, self.what)
         at_least, mesh = self.ends_by in OPEN, " on this mesh" * (self.ends_by is MarginEnd.MESH)
         shown = f"{number:.4g}" if at_least else with_bar(number, self.bar)

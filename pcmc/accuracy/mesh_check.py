@@ -196,9 +196,7 @@ def check_mesh(
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
     doubts = _curve_doubts(first, sharp, found, callback) if boundary == "smooth" else {}
     table = _table(found, shape_order(surfaces) if order is None else order, doubts)
-    return MeshCheck(
-        finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces), doubts
-    )
+    return MeshCheck(*finding, table, tuple(surfaces), doubts)
 
 
 def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:

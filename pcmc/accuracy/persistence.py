@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,10 +29,7 @@ MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no t
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
 FURTHER = 3  # meshes ahead at which an eigenvalue that only falls is foreseen
-RUNNING_AWAY = {
-    Status.DIVERGED: "it inflates without bound",
-    Status.VANISHED: "it shrinks to nothing",
-}
+RUNNING_AWAY = {Status.DIVERGED: "it inflates without bound", Status.VANISHED: "it shrinks to nothing"}
 
 
 class MeshVerdict(Enum):
@@ -43,8 +40,7 @@ class MeshVerdict(Enum):
     HELD_BY_MESH = "held by the mesh: finer meshes do not hold this surface"
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """A verdict, its reason, the place it speaks of (or None), and what to type (or nothing)."""
 
     verdict: MeshVerdict
@@ -82,11 +78,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             place = _where_softest(surface, certificate)
             becomes = "stable" if certificate.index == 0 else f"a saddle of index {certificate.index}"
             was = "stable" if first.index == 0 else f"of index {first.index}"
-            reason = (
-                f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest near"
-                f" {_text(place)}"
-            )
-            return _at(MeshVerdict.CHANGES, surface, reason, place)
+            reason = f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest"
+            return _at(MeshVerdict.CHANGES, surface, f"{reason} near {_text(place)}", place)
     size = max(float(np.ptp(surfaces[0].plane.height(surfaces[0].vertices))), FLAT * surfaces[0].size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
@@ -99,10 +92,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
     if _order(surfaces, moves) < 0.0:
         before, last = (_mean(move) for move in moves[-2:])
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
-        reason = (
-            f"each finer surface is farther from the last one (by {before:.2g}, then {last:.2g} in the"
-            f" mean), most near {_text(place)}"
-        )
+        moved = f"by {before:.2g}, then {last:.2g} in the mean"
+        reason = f"each finer surface is farther from the last one ({moved}), most near {_text(place)}"
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
     return _stability(surfaces, certificates)
 
@@ -193,10 +184,10 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> F
     X, sliding = surface.vertices, standing_part(surface).walls.sliding
     nearest, advice, ending = np.inf, "", ""
     for curve in surface.topology.junctions:
-        ends = [v for v in curve.vertices[[0, -1]] if surface.fixed[v] and not curve.closed]
+        ends = [end for end, _ in curve.ends if surface.fixed[end]]
         if not ends or not sliding[list(curve.sheets)].any():
             continue
-        length = segment_lengths(X, np.stack([curve.vertices[:-1], curve.vertices[1:]], axis=1)).sum()
+        length = segment_lengths(X, curve.pairs).sum()
         distance = np.linalg.norm(X[curve.vertices] - place, axis=1).min() / length
         if distance <= min(nearest, REACH):
             nearest, end = distance, X[min(ends, key=lambda v: np.linalg.norm(X[v] - place))]

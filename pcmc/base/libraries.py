@@ -180,9 +180,8 @@ def read_arrays(script: str, function: str, path: Path) -> dict[str, Any]:
         if process is None or not process.alive:
             process = _processes[os.getpid()] = ChildProcess()
         try:
-            arrays: dict[str, Any] = process.call(
-                place, function, str(path.absolute()), limit=limit, memory=MEMORY * size
-            )
+            name, memory = str(path.absolute()), MEMORY * size
+            arrays: dict[str, Any] = process.call(place, function, name, limit=limit, memory=memory)
             return arrays
         except ChildError as error:
             reason = str(error)

@@ -7,14 +7,5 @@ from .certificate import Certificate, certify
 from .proof import Attempt, Overload, UnbalancedJunction, Unheld, WeakCable
 from .verdict import Evidence, Verdict
 
-__all__ = [
-    "Attempt",
-    "Certificate",
-    "Evidence",
-    "Overload",
-    "UnbalancedJunction",
-    "Unheld",
-    "Verdict",
-    "WeakCable",
-    "certify",
-]
+__all__ = ["Attempt", "Certificate", "Evidence", "Overload", "UnbalancedJunction", "Unheld", "Verdict"]
+__all__ += ["WeakCable", "certify"]

@@ -13,6 +13,7 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.geometry import cross_2d
+from ..surface.pieces import two_digits
 from ..surface.symmetry import mirrored
 from .forces import cable_parts
 from .proof import WeakCable
@@ -48,8 +49,7 @@ def too_long(surface: Surface) -> str:
         chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
         tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
         if chord * tension > widest:
-            step = 10.0 ** (math.floor(math.log10(chord * tension)) - 1)  # two digits, rounded up
-            enough = math.ceil(chord * tension / step) * step  # an arc of 60°, 0.13 of its chord high
+            enough = two_digits(chord * tension, math.ceil)  # an arc of 60°, 0.13 of its chord high
             return (
                 f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g}, the"
                 f" diameter of the arc along a flat edge; raise its tension, well beyond"

@@ -77,18 +77,9 @@ class Certificate:
     tried: tuple[Attempt, ...] = ()
     FILED: ClassVar = (
         *("verdict", "detail", "residual", "scale", "energy", "volume", "index", "eigenvalues", "modes"),
-        *(
-            "curvature_error",
-            "quality",
-            "walls_quality",
-            "patches",
-            "junctions",
-            "load",
-            "support",
-            "pinched",
-        ),
-        *("load_ratio", "proofs", "tried", "cables", "cable_ends", "rooms", "symmetric_in", "leaning"),
-        *("supports", "balance", "reactions"),
+        *("curvature_error", "quality", "walls_quality", "patches", "junctions", "load", "support"),
+        *("pinched", "load_ratio", "proofs", "tried", "cables", "cable_ends", "rooms", "symmetric_in"),
+        *("leaning", "supports", "balance", "reactions"),
     )
 
     @property

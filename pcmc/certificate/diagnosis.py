@@ -205,19 +205,14 @@ def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> b
         return True
     held = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
     for curve in topo.junctions:
-        if near[curve.vertices].any() and pinchable[list(curve.sheets)].any() and not curve.closed:
-            for end, beside in (curve.vertices[:2], curve.vertices[:-3:-1]):
-                if surface.fixed[end] and _along(X, held, int(end), int(beside)):
+        if near[curve.vertices].any() and pinchable[list(curve.sheets)].any():
+            for end, beside in curve.ends:
+                sides = X[held[(held == end).any(axis=1)].sum(axis=1) - end] - X[end]
+                edge = X[beside] - X[end]
+                lengths = np.linalg.norm(sides, axis=1) * np.linalg.norm(edge)
+                if surface.fixed[end] and (sides @ edge > np.cos(np.radians(ALONG)) * lengths).any():
                     return True
     return False
-
-
-def _along(X: Floats, held: Ints, end: int, beside: int) -> bool:
-    """Whether the edge from ``end`` to ``beside`` lies along one of the held edges (k,2) there."""
-    sides = X[held[(held == end).any(axis=1)].sum(axis=1) - end] - X[end]
-    edge = X[beside] - X[end]
-    lengths = np.linalg.norm(sides, axis=1) * np.linalg.norm(edge)
-    return bool((sides @ edge > np.cos(np.radians(ALONG)) * lengths).any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +235,8 @@ def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
     largest = float(motion.max(initial=0.0))
     ends = []
     for curve in surface.topology.junctions:
-        for end, beside in (curve.vertices[:2], curve.vertices[:-3:-1]):
-            if curve.closed or not surface.fixed[end] or motion[beside] < SLIPS * largest or largest == 0.0:
+        for end, beside in curve.ends:
+            if not surface.fixed[end] or motion[beside] < SLIPS * largest or largest == 0.0:
                 continue
             walls = tuple(surface.patches[i].name for i in curve.sheets if surface.walls[i])
             names, share = names_of(surface, curve.sheets), float(motion[beside] / largest)

@@ -150,9 +150,8 @@ def coordinates(space: MotionSpace, value: Floats, radius: Floats) -> tuple[Floa
         x, r = value[v], radius[v]
         force = ((x[0], r[0]), (x[1], r[1]), (x[2], r[2]))
         for c in range(space.dimension[v]):
-            out[space.start[v] + c], error[space.start[v] + c] = balls.dot(
-                balls.row(space.basis[v], c), force
-            )
+            at = space.start[v] + c
+            out[at], error[at] = balls.dot(balls.row(space.basis[v], c), force)
     return out, error
 
 

@@ -277,16 +277,12 @@ def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
 
 def cable_ends(surface: Surface) -> list[CableEnd]:
     """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it."""
-    return [
-        (
-            cable,
-            int(pair[0]),
-            -pull_along(surface, cable, pair[:1]) * directions(surface.vertices, pair[None])[0][0],
-        )
-        for cable, curve in cable_parts(surface)
-        if not curve.closed
-        for pair in (curve.vertices[:2], curve.vertices[:-3:-1])
-    ]
+    found = []
+    for cable, curve in cable_parts(surface):
+        for pair in curve.ends:
+            pull = pull_along(surface, cable, pair[:1]) * directions(surface.vertices, pair[None])[0][0]
+            found.append((cable, int(pair[0]), -pull))
+    return found
 
 
 def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Bools, Floats, Floats]:

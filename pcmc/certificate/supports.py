@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -208,22 +208,19 @@ def _sources(acting: Forces) -> Iterator[_Source]:
             kind = "ground" if k == 0 else of_plane[k - 1]
             where = ", at rest" if k == 0 else f", {kind.split()[0]}"
             where = f" in the {plane}" if plane.name else where
-            listed = np.where(
-                acting.lengths[:, None] > 0.0, acting.by_plane_ends[k], 0.0
-            )  # as ends of cables
-            pull = np.where(inside[:, None], acting.by_plane[k] - listed, 0.0)
+            ends = np.where(acting.lengths[:, None] > 0.0, acting.by_plane_ends[k], 0.0)  # of cables: below
+            pull = np.where(inside[:, None], acting.by_plane[k] - ends, 0.0)
             parts = _on_plane(acting, mask, inside, kind, where)
             yield _Source(pull, parts, (mask & inside, f"single points{where}", kind))
 
     X, names = surface.vertices, dict[int, list[str]]()
-    yield _Source(
-        acting.points, [_Part("", "point", v, X[v[0]]) for v in np.flatnonzero(acting.single)[:, None]]
-    )
+    single = np.flatnonzero(acting.single)[:, None]
+    yield _Source(acting.points, [_Part("", "point", v, X[v[0]]) for v in single])
     for cable, vertex, _ in acting.cable_ends:
         if acting.lengths[vertex] > 0.0 and acting.points[vertex].any():
             names.setdefault(vertex, []).append(cable.name)
-    ends = [_Part(" + ".join(names[v]), "cable end", np.array([v]), X[v]) for v in sorted(names)]
-    yield _Source(acting.points, ends)
+    cables = [_Part(" + ".join(names[v]), "cable end", np.array([v]), X[v]) for v in sorted(names)]
+    yield _Source(acting.points, cables)
 
 
 def _on_plane(acting: Forces, mask: Bools, inside: Bools, kind: str, where: str) -> list[_Part]:
@@ -251,10 +248,8 @@ def _on_plane(acting: Forces, mask: Bools, inside: Bools, kind: str, where: str)
     return parts
 
 
-def _line(
-    surface: Surface, kind: str, curve: EdgeCurve, where: str = "", pulls: Floats | None = None
-) -> _Part:
-    """A support along a curve."""
+def _line(surface: Surface, kind: str, curve: EdgeCurve, where: str = "", pulls: Any = None) -> _Part:
+    """A support along a curve, with its pulls (j,3) where they are not those of its lines."""
     place, edges = np.array(list(middle(surface, curve).values())), surface.topology.edge_numbers(curve.pairs)
     name = names_of(surface, dict.fromkeys(curve.sheets)) + where
     return _Part(name, kind, curve.vertices, place, edges, pulls)

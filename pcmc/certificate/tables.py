@@ -76,10 +76,8 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     for curve in surface.topology.junctions:
         lengths, sums, along = _along_curve(surface, curve, left[curve.vertices])
         mean = float(sums @ lengths) / (along["length"] or 1.0)
-        names = names_of(surface, curve.sheets)
-        rows.append(
-            {"junction": names, **along, "sum_alpha_n_mean": mean, "sum_alpha_n_max": float(sums.max())}
-        )
+        own = {"junction": names_of(surface, curve.sheets), **along}
+        rows.append(own | {"sum_alpha_n_mean": mean, "sum_alpha_n_max": float(sums.max())})
     return pd.DataFrame(rows)
 
 

@@ -200,11 +200,8 @@ def _refuse(part: StandingPart, space: MotionSpace, rigid: Floats) -> None:
     if surface.cable_edges.weight.any():
         raise _Unproved("a cable has a weight, for which no bounds are known")
     n = np.array(surface.plane.normal)
-    level = (
-        not len(rigid)
-        or max(np.abs(rigid[:, 0] @ n).max(), np.abs(np.cross(rigid[:, 1], n)).max()) < PARALLEL
-    )
-    if len(rigid) and (surface.uncancelled.any() or (surface.weights.any() and not level)):
+    rises = np.abs(rigid[:, 0] @ n).max(initial=0.0), np.abs(np.cross(rigid[:, 1], n)).max(initial=0.0)
+    if len(rigid) and (surface.uncancelled.any() or (surface.weights.any() and max(rises) >= PARALLEL)):
         raise _Unproved("its weight or pressure pushes along rigid motions that no support resists")
 
 
@@ -258,8 +255,6 @@ def _rests(
     spare = (capacity * (1.0 - 1e-12) - lost - np.abs(pull) - off * SAFE)[resting]
     worst = int(spare.argmin())
     if not spare[worst] > 0.0:
-        vertex = int(np.flatnonzero(resting)[worst])
-        raise _Unproved(
-            f"resting vertex {vertex} is on the verge of lifting off, so which rest is not certain"
-        )
+        why = f"resting vertex {np.flatnonzero(resting)[worst]} is on the verge of lifting off"
+        raise _Unproved(f"{why}, so which rest is not certain")
     return float((spare / capacity[resting]).min())

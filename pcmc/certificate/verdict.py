@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -22,6 +22,7 @@ from .proof import Attempt, Overload, Proof
 
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
 NO_TENSION = "no patch has a tension: every shape is at rest"
+FREE = "nothing resists {} rigid motions; every change of shape at these volumes raises E"
 
 
 class Verdict(Enum):
@@ -90,7 +91,7 @@ class Findings:
         settled, load = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED), self.overload
         if load and not settled and load.ratio <= 1.0 + coarseness(self.surface):
             load = None
-        return _theorems(self.surface, self.pinchable, load)
+        return theorems(self.surface, self.pinchable, load)
 
     @property
     def lost(self) -> bool:
@@ -119,7 +120,7 @@ class Findings:
         return self.collapsed and held_wall_down(self.surface, self.pinchable)
 
 
-def _theorems(surface: Surface, pinchable: Bools, load: Overload | None) -> tuple[Proof, ...]:
+def theorems(surface: Surface, pinchable: Bools, load: Overload | None = None) -> tuple[Proof, ...]:
     """What rules out a smooth surface at rest, with an overload if one is given."""
     found = unbalanced(surface, pinchable), load, unheld(surface), weak_cable(surface)
     return tuple(proof for proof in found if proof is not None)
@@ -127,28 +128,23 @@ def _theorems(surface: Surface, pinchable: Bools, load: Overload | None) -> tupl
 
 def only_coarse(surface: Surface, pinchable: Bools) -> str:
     """Why no smooth surface is at rest where this mesh is; empty if nothing is known against one."""
-    why = "; ".join(map(str, _theorems(surface, pinchable, overload(surface))))
+    why = "; ".join(map(str, theorems(surface, pinchable, overload(surface))))
     return why and f"only a mesh as coarse as this is at rest here, no smooth surface is: {why}"
 
 
-def judge(findings: Findings) -> tuple[Verdict, str]:
+def judge(f: Findings) -> tuple[Verdict, str]:
     """The verdict on the findings and its reason, by the first of ``RULES`` that applies; with notes."""
-    verdict, reason = next((verdict, reason) for verdict, applies, reason in RULES if applies(findings))
-    parts = reason(findings)
-    parts = [parts] if isinstance(parts, str) else parts
-    return verdict, "; ".join(str(part) for part in (*parts, *_notes(findings)) if part)
-
-
-def _notes(f: Findings) -> Iterator[str]:
-    """What is to be known whatever the verdict is."""
+    verdict, reason = next((verdict, reason) for verdict, applies, reason in RULES if applies(f))
+    parts = reason(f)
+    told = [parts] if isinstance(parts, str) else [*parts]
     if not f.moving and f.quality > COLLAPSED and f.surface.tensions.any():
-        yield only_coarse(f.surface, f.pinchable)
-    if len(f.pulled):
-        yield (
+        told.append(only_coarse(f.surface, f.pinchable))
+    if f.pulled:
+        text = (
             f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than the"
-            " wall can hold: the wall will stand there once solved"
         )
-    yield f.left_over
+        told.append(f"{text} wall can hold: the wall will stand there once solved")
+    return verdict, "; ".join(str(part) for part in (*told, f.left_over) if part)
 
 
 def _disproved(f: Findings) -> list[object]:
@@ -207,7 +203,7 @@ def _hidden_stability(f: Findings) -> list[object]:
     )
     reason = f"the forces balance (relative residual {f.residual:.1e}), but {hidden}"
     tensions = f.surface.tensions[f.surface.tensions > 0.0]
-    factor = tensions.max() / tensions.min() if len(tensions) else 1.0
+    factor = tensions.max(initial=0.0) / tensions.min(initial=np.inf)
     return [reason, f"the tensions differ by a factor of {factor:.0e}" if factor > FACTOR else ""]
 
 
@@ -236,8 +232,7 @@ def _compressed(f: Findings) -> str:
 
 
 def _saddle(f: Findings) -> list[object]:
-    ways = describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode)
-    return [ways, _near_fold(f)]
+    return [describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode), _near_fold(f)]
 
 
 def _near_fold(f: Findings) -> str:
@@ -251,14 +246,8 @@ def _near_fold(f: Findings) -> str:
     return f"at a fold or a branching, or near one: {modes} within ±{band:g} α/size², {signs}"
 
 
-def _free_motions(f: Findings) -> str:
-    return f"nothing resists {f.rigid} rigid motions; every change of shape at these volumes raises E"
-
-
-Rule = tuple[Verdict, Callable[[Findings], object], Callable[[Findings], str | list[object]]]
-"""A verdict, when it applies, and the reason, or its parts."""
-
-RULES: tuple[Rule, ...] = (
+# a verdict, when it applies, and the reason, or its parts
+RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], str | list[object]]], ...] = (
     (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: NO_TENSION),
     (Verdict.NO_EQUILIBRIUM, lambda f: f.proofs, _disproved),
     (Verdict.NONE_FOUND, lambda f: f.lost and f.tried, _none_found),
@@ -272,7 +261,7 @@ RULES: tuple[Rule, ...] = (
     (Verdict.SADDLE, lambda f: compressed_cables(f.surface).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
-    (Verdict.NEUTRAL, lambda f: f.rigid > 0, _free_motions),
+    (Verdict.NEUTRAL, lambda f: f.rigid > 0, lambda f: FREE.format(f.rigid)),
     (Verdict.NEUTRAL, lambda f: f.spectrum.soft, _near_fold),
     (Verdict.STABLE, lambda f: True, _near_fold),
 )

@@ -122,8 +122,8 @@ def panels_(
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    prices = None if cost is None else arguments.numbers(cost, "--cost", TWO)
-    if prices is not None and (len(prices) != 2 or min(prices) < 0.0 or change is None):
+    prices = None if cost is None else arguments.numbers(cost, "--cost", TWO, 2)
+    if prices is not None and (min(prices) < 0.0 or change is None):
         validate.refuse("--cost", cost, TWO, hint="; it needs --change" if change is None else "")
     outputs = Output(picture=picture, view=seen).paths
     for path in files:
@@ -217,9 +217,7 @@ def draw_(
     """
     arguments.output_of(file, drawings=output)
     heights = None if height is None else [parsed_number(text) for text in height]
-    points = [arguments.numbers(text, "--line", FOUR) for text in line or ()]
-    if wrong := [text for text, ends in zip(line or (), points, strict=True) if len(ends) != 4]:
-        validate.refuse("--line", wrong[0], FOUR)
+    points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
     lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)

@@ -56,9 +56,8 @@ class Design:
     result : of the solve that gave ``surface``. If the search was stopped before any equilibrium was
         found, ``surface`` is the one given.
     targets : a row per target: ``value``, its ``dimension`` (the unit, as a name of ``Units``), ``wanted``,
-        relative ``misfit``, ``met``, and ``limit``, the
-        nearest reachable value (at a fold, which is only approached, extrapolated; NaN where the search
-        stopped before it was known).
+        relative ``misfit``, ``met``, and ``limit``, the nearest reachable value (at a fold, which is only
+        approached, extrapolated; NaN where the search stopped before it was known).
     parameters : a row per parameter: ``start``, ``value``, ``dimension``, ``low``, ``high``.
     solves : number of solves.
     history : a row per point tried: parameters, quantities, status, misfit. The status is the solve's
@@ -77,11 +76,11 @@ class Design:
 
     def __repr__(self) -> str:
         """How the search ended, what it reached and with what, above the surface."""
-        values = "\n".join(
-            f"  {name}: {values_text(table)}"
-            for name, table in (("targets", self.targets), ("parameters", self.parameters))
+        targets, parameters = (
+            f"targets: {values_text(self.targets)}",
+            f"parameters: {values_text(self.parameters)}",
         )
-        return f"{self.message}\n{values}\n  {self.solves} solves\n{self.surface!r}"
+        return f"{self.message}\n  {targets}\n  {parameters}\n  {self.solves} solves\n{self.surface!r}"
 
     @property
     def met(self) -> bool:

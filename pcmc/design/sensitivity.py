@@ -95,17 +95,15 @@ def slopes(
     surface: Surface, targets: Sequence[Target], parameters: Sequence[Parameter]
 ) -> list[tuple[Floats, Floats, Floats]]:
     """dq/dλ (parameters,) of each target: of one branch, and of those leading while λ falls and grows."""
-    at = Equilibrium.of(surface)
-    rates = [_rates(at.surface, parameter, parameters) for parameter in parameters]
+    at, rates = Equilibrium.of(surface), list[Floats]()
+    for (
+        parameter
+    ) in parameters:  # each patch's, cable's or room's own; walls follow unless they are parameters
+        alike = (one for one in parameters if one.kind == parameter.kind)
+        named = {name: float(name in parameter.names) for one in alike for name in one.names}
+        rates.append(rates_of(at.surface, parameter.key, named))
     motions = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
     return [_slopes(at.surface, measure(at.surface, t), parameters, rates, motions) for t in targets]
-
-
-def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-    """(k,) d/dλ of each patch's, cable's or room's own number; walls follow unless they are parameters."""
-    alike = (one for one in parameters if one.kind == parameter.kind)
-    named = {name: float(name in parameter.names) for one in alike for name in one.names}
-    return rates_of(surface, parameter.key, named)
 
 
 def _slopes(
@@ -146,11 +144,10 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         raise SurfaceError(AT_FOLD, what="surface") from None
     surface, space = at.surface, at.space
     count, units = space.size, at.volume_units
-    walls_follow = bool(at.part.standing.any())
 
     def motion(s: Floats) -> Floats:  # walls that hang from their junction follow it, as in the solver
         d = space.to_vectors(s)
-        if not walls_follow:
+        if not at.part.standing.any():
             return d
         return at.part.follow(at.X + d, space) - at.part.follow(at.X, space)
 

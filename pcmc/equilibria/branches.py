@@ -64,10 +64,8 @@ class TracedParameter:
     def _half(self, surface: Surface, sign: float, watch: Callable[[Progress], None]) -> Branch:
         """One way; again in short steps where contact and index change on one, which hides a bifurcation."""
         for largest in LARGEST:
-            step, callback = sign * min(FIRST, largest), self._within(watch)
-            branch = follow(
-                surface, self.parameter, step=step, largest=largest, steps=STEPS, callback=callback
-            )
+            step, within = sign * min(FIRST, largest), self._within(watch)
+            branch = follow(surface, self.parameter, step=step, largest=largest, steps=STEPS, callback=within)
             events = self._ended(branch).events
             contacts = events.arclength[events.kind == "contact"]
             if not events.arclength[events.kind == "index"].isin(contacts).any():
@@ -154,12 +152,11 @@ def joined(back: Branch, forth: Branch) -> Branch:
     events = back.events.assign(arclength=-back.events.arclength, **swapped)[::-1]
     surfaces = {last - row: surface for row, surface in back.surfaces.items()}
     at_events = {len(events) - 1 - row: surface for row, surface in back.event_surfaces.items()}
+    frames = [frame for frame in (events, forth.events) if len(frame)] or [events]
     return replace(
         forth,
         points=pd.concat([points, forth.points[1:]], ignore_index=True),
-        events=pd.concat(
-            [frame for frame in (events, forth.events) if len(frame)] or [events], ignore_index=True
-        ),
+        events=pd.concat(frames, ignore_index=True),
         surfaces=surfaces | {last + row: surface for row, surface in forth.surfaces.items()},
         event_surfaces=at_events | {len(events) + row: s for row, s in forth.event_surfaces.items()},
     )

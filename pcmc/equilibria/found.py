@@ -159,9 +159,8 @@ class Equilibria:
         """
         validate.choice("start", str(start), [str(k) for k in self.stable])
         if to is None:
-            return min(
-                (b.energy for b in self.barriers if b.start == start and b.to != start), default=math.inf
-            )
+            ways = (b.energy for b in self.barriers if b.start == start and b.to != start)
+            return min(ways, default=math.inf)
         validate.choice("to", str(to), [str(k) for k in self.stable])
         reached: set[int | None]
         reached, top = {start}, -math.inf

@@ -25,8 +25,7 @@ from .branches import Span, TracedParameter
 from .deflation import deflated_newton
 from .found import Equilibria, FoundEquilibrium, WayDown
 from .shapes import Shape
-from .triangles import with_good_triangles
-from .ways_down import pass_between, way_down
+from .ways_down import pass_between, way_down, with_good_triangles
 
 MODES = 8  # of the lowest modes a start is displaced along
 FAR = (0.05, 0.3)  # of the size: how far a start is displaced
@@ -166,9 +165,7 @@ class _Search:
         self.on_branch: set[int] = set()  # those that a branch has led to
         self.ways: list[WayDown] = []
         self.branches: dict[str, list[Branch]] = {line.name: [] for line in lines}
-        self.left: dict[str, list[Shape]] = {
-            line.name: [] for line in lines
-        }  # bifurcations that were left there
+        self.left: dict[str, list[Shape]] = {line.name: [] for line in lines}  # by ways at bifurcations
         self.tried: set[tuple[int, int]] = set()  # pairs of minima
         self.failed: list[str] = []
         self.starts = self.arrived = 0
@@ -238,16 +235,14 @@ class _Search:
         def watch(_: Progress) -> None:
             self.tell(f"following the {line.name} from equilibrium {number + 1}")
 
-        start = self.found[number].surface
+        start, how = self.found[number].surface, self.found[number].found
         if isinstance(line.parameter, BoundaryMotion) and start.pinned.sum() != self.surface.pinned.sum():
-            text = f"The equilibrium {self.found[number].found} has a new mesh; no branch in {line.name}"
-            self.failed.append(f"{text} was followed from it, as that moves the vertices of the boundary.")
+            text = f"The equilibrium {how} has a new mesh; no branch in {line.name} was followed from it"
+            self.failed.append(f"{text}, as that moves the vertices of the boundary.")
             return
         branch = line.trace(start, watch)
         if branch is None:
-            self.failed.append(
-                f"No branch in {line.name} starts at the equilibrium {self.found[number].found}."
-            )
+            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}.")
             return
         level, how = [branch], f"on a branch in {line.name}"
         for depth in range(self.options.depth + 1):
@@ -329,17 +324,12 @@ class _Search:
 
     def connect(self) -> None:
         """Try the straight way between minima that no saddle joins."""
-        joined = {
-            k: {way.to for way in self.ways if way.saddle == k} for k in {way.saddle for way in self.ways}
-        }
+        joined = [{w.to for w in self.ways if w.saddle == k} for k in {w.saddle for w in self.ways}]
         minima = [k for k, one in enumerate(self.found) if one.index == 0]
         for pair in combinations(minima, 2):
             one, other = (self.found[k].surface for k in pair)
-            if (
-                set(pair) in joined.values()
-                or pair in self.tried
-                or not np.array_equal(one.faces, other.faces)
-            ):
+            known = set(pair) in joined or pair in self.tried
+            if known or not np.array_equal(one.faces, other.faces):
                 continue
             self.tried.add(pair)
             self.tell("looking for a pass between two minima")

@@ -39,12 +39,12 @@ class Mesh(NamedTuple):
 
 def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
     """All elements of a surface, with its own tensions and pressures (k,) or with others."""
+    of_elements = shapes(surface.order)
     tension = surface.tensions if tension is None else read_only(tension)
     pressure = surface.net_pressures if pressure is None else read_only(pressure)
     plane = np.array(surface.plane.point), np.array(surface.plane.normal)
     patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
-    weights = tension, pressure, surface.weights
-    return Mesh(surface.nodes, patch, surface.origin, *weights, *plane, shapes(surface.order))
+    return Mesh(surface.nodes, patch, surface.origin, tension, pressure, surface.weights, *plane, of_elements)
 
 
 class Points(NamedTuple):

@@ -279,22 +279,14 @@ def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
     return np.asarray(chord)
 
 
-def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
+def force_scale(surface: Surface, of: VertexClasses | Surface, X: Floats) -> float:
     """The norm of the single forces that cancel at rest: ½ α |e| of triangles, τ of cable edges, force.
 
-    With a weight, α + w z stands for α.
+    Of the active triangles, or of all; with a weight, α + w z stands for α; 1 without tension.
     """
-    return _tension_forces(surface, X, classes.faces, classes.patch_of_face) or 1.0
-
-
-def tension_forces(surface: Surface) -> float:
-    """The same norm for all triangles and cables of a surface, force; 0 without tension."""
-    return _tension_forces(surface, surface.vertices, surface.faces, surface.patch_of_face)
-
-
-def _tension_forces(surface: Surface, X: Floats, F: Ints, patch: Ints) -> float:
-    sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
-    return sqrt(sheets**2 + squared_cable_forces(surface, X).sum()) if surface.cables else sheets
+    F = of.faces
+    sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, of.patch_of_face))
+    return (sqrt(sheets**2 + squared_cable_forces(surface, X).sum()) if surface.cables else sheets) or 1.0
 
 
 @inlined

@@ -176,13 +176,27 @@ class StandingPart:
     @classmethod
     def of(cls, whole: Surface, walls: Walls, resting: Bools) -> StandingPart:
         """The part that stands where the given vertices rest; CurvedContactError if elements are curved."""
+        surface = whole
         if whole.order > 1 and resting.any():
-            message = (
-                f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only flat"
-            )
-            message += " triangles have contact; give order=1"
+            message = f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only"
+            message += " flat triangles have contact; give order=1"
             raise CurvedContactError(message, what="order", found=whole.order, expected=1)
-        surface = _without_pinched_walls(whole, walls, resting)
+        if resting.any():  # vertices of the walls left out belong to no face
+            X, held = _put_down(whole, walls, whole.vertices, resting), resting & walls.held
+            owner, given = _owners(whole.n, walls, resting), whole.given_supports
+            F, left = _standing_faces(whole, walls, resting, owner)
+            F, patch = read_only(np.ascontiguousarray(F[left])), read_only(whole.patch_of_face[left])
+            on_plane = whole.on_ground | (resting & ~held)
+            rests = given._replace(fixed=given.fixed | held, on_plane=on_plane)
+            surface = whole._with(
+                vertices=X[owner],
+                faces=F,
+                patch_of_face=patch,
+                topology=topology(F, patch, whole.n),
+                cables=tuple(filter(None, (cable.carried(owner) for cable in whole.cables))),
+                curves=(),
+                **rests.resolved(whole.plane, whole.on_planes),
+            )
         links, beside = resting_links(walls, resting), beside_resting(walls, resting)
         return cls(whole, walls, resting, surface, vertex_classes(surface, links, beside))
 
@@ -282,27 +296,6 @@ def _put_down(surface: Surface, walls: Walls, X: Floats, down: Bools) -> Floats:
     X[down] -= surface.plane.height(X[down])[:, None] * np.array(surface.plane.normal)
     X[held] = X[walls.foot[held]]
     return X
-
-
-def _without_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surface:
-    """``StandingPart.surface``; vertices of the walls left out belong to no face."""
-    if not resting.any():
-        return surface
-    X, held = _put_down(surface, walls, surface.vertices, resting), resting & walls.held
-    owner = _owners(surface.n, walls, resting)
-    F, left = _standing_faces(surface, walls, resting, owner)
-    F, patch = read_only(np.ascontiguousarray(F[left])), read_only(surface.patch_of_face[left])
-    given = surface.given_supports
-    rests = given._replace(fixed=given.fixed | held, on_plane=surface.on_ground | (resting & ~held))
-    return surface._with(
-        vertices=X[owner],
-        faces=F,
-        patch_of_face=patch,
-        topology=topology(F, patch, surface.n),
-        cables=tuple(filter(None, (cable.carried(owner) for cable in surface.cables))),
-        curves=(),
-        **rests.resolved(surface.plane, surface.on_planes),
-    )
 
 
 @kept_with_owner

@@ -118,10 +118,8 @@ def refuse_varied_pressure(surface: Surface, patches: Iterable[int]) -> None:
     for k in patches:
         for room in np.flatnonzero(surface.room_signs[:, k]):
             name, patch = surface.rooms[room].name, surface.patches[k].name
-            message = f"the pressure of {patch!r} follows from the volume of room {name!r}"
-            raise OptionError(
-                f"{message}: vary that volume, or remove the room", what="parameter", where=patch
-            )
+            message = f"the pressure of {patch!r} follows from the volume of room {name!r}: vary that volume,"
+            raise OptionError(f"{message} or remove the room", what="parameter", where=patch)
 
 
 def check_rooms(surface: Surface) -> None:
@@ -139,12 +137,10 @@ def check_rooms(surface: Surface) -> None:
             message = f"room {room.name!r}: no motion changes its volume, as supports hold all its vertices"
             raise SurfaceError(f"{message}; free some, or remove the room", what="rooms", where=room.name)
     for room, row, volume in zip(surface.rooms, surface.room_signs, room_volumes(surface), strict=True):
-        slack = [
-            patch for patch, sign in zip(surface.patches, row, strict=True) if sign and not patch.tension
-        ]
-        for patch in slack:
-            message = f"room {room.name!r}: patch {patch.name!r} has no tension and takes no pressure"
-            raise SurfaceError(f"{message}; give it one", what="rooms", where=patch.name, found=0.0)
+        for patch, sign in zip(surface.patches, row, strict=True):
+            if sign and not patch.tension:
+                message = f"room {room.name!r}: patch {patch.name!r} has no tension and takes no pressure"
+                raise SurfaceError(f"{message}; give it one", what="rooms", where=patch.name, found=0.0)
         if _left_over(surface, row).any():
             continue  # the room lies on either side of Π or of its fixed boundary
         if room.volume < 0.0:

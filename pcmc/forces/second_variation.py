@@ -45,21 +45,24 @@ def hessian(surface: Surface) -> csr_array:
     expect_surface(surface)
     every = MotionSpace.of(np.tile(np.eye(3), (surface.n, 1, 1)), np.full(surface.n, 3))
     pattern = hessian_pattern(surface, every)
-    data = _assembled(surface, energy_mesh(surface), every, pattern, surface.vertices)
-    return pattern.symmetric(data)
+    return pattern.symmetric(assemble(surface, None, every, pattern, surface.vertices))
 
 
 def assemble(
     surface: Surface,
-    classes: VertexClasses,
+    classes: VertexClasses | None,
     space: MotionSpace,
     pattern: Pattern,
     X: Floats,
     hessian: float = 1.0,
     stiffness: float = 0.0,
 ) -> Floats:
-    """Values of hessian · Bᵀ(∂²E)B + stiffness · BᵀLB in the pattern."""
-    data = _assembled(surface, classes.mesh(surface), space, pattern, X, hessian, stiffness)
+    """Values of hessian · Bᵀ(∂²E)B + stiffness · BᵀLB in the pattern; without classes of all elements."""
+    mesh = energy_mesh(surface) if classes is None else classes.mesh(surface)
+    data = np.zeros(len(pattern.indices))
+    fill = _assemble_curved if mesh.curved else _assemble_triangles
+    fill(mesh, X, space, pattern, hessian, stiffness, data)
+    add_blocks(elements(surface, X), space, pattern, hessian, stiffness, data)
     if hessian:
         rows, factor = circle_curvatures(surface, space, X)
         data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
@@ -88,22 +91,6 @@ def add_products(surface: Surface, mesh: Mesh, X: Floats, d: Floats, change: Flo
     (add_element_products if mesh.curved else _add_triangle_products)(mesh, X, d, change)
     add_hessian_products(elements(surface, X), d, change)
     return change
-
-
-def _assembled(
-    surface: Surface,
-    mesh: Mesh,
-    space: MotionSpace,
-    pattern: Pattern,
-    X: Floats,
-    hessian: float = 1.0,
-    stiffness: float = 0.0,
-) -> Floats:
-    data = np.zeros(len(pattern.indices))
-    fill = _assemble_curved if mesh.curved else _assemble_triangles
-    fill(mesh, X, space, pattern, hessian, stiffness, data)
-    add_blocks(elements(surface, X), space, pattern, hessian, stiffness, data)
-    return data
 
 
 @inlined

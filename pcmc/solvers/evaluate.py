@@ -12,7 +12,7 @@ from ..base.compiled import blocks, compiled, threads
 from ..base.tolerances import FORCE_ROUNDING
 from ..forces import triangles
 from ..forces.functional import add_forces, elements, total
-from ..forces.motion_space import tension_forces
+from ..forces.motion_space import force_scale
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, bounding_size, dot, point, scaled, vector
@@ -47,7 +47,7 @@ def converged_below(surface: Surface, tolerance: float | None) -> float:
     """
     if not tolerance:
         return 0.0
-    forces = tension_forces(surface)
+    forces = force_scale(surface, surface, surface.vertices)
     return max(tolerance * min(1.0, forces) ** 2, (FORCE_ROUNDING * forces) ** 2)
 
 

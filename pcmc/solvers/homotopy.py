@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -76,10 +76,14 @@ class LimitReached(Exception):
 
 @dataclass
 class Solves:
-    """Solves and branches in a row, with the same ``options``; one callback counts their steps on."""
+    """Solves and branches in a row, with the same ``options``; one callback counts their steps on.
+
+    The results have the history ``before`` all of them, and count the steps and evaluations from its start.
+    """
 
     callback: Callback | None
     options: Mapping[str, Any]
+    before: Sequence[Mapping[str, Any]] = ()
     steps: int = 0
     evaluations: int = 0
 
@@ -96,7 +100,8 @@ class Solves:
         if result.status is Status.STOPPED:
             raise StopIteration
         rows = [{**row, "iteration": before + row["iteration"]} for row in result.rows]
-        result = replace(result, rows=rows)
+        steps, evaluations = self.steps - 1, self.evaluations
+        result = replace(result, rows=[*self.before, *rows], iterations=steps, evaluations=evaluations)
         if result.status is Status.ITERATION_LIMIT and "iterations" in self.options:
             raise LimitReached(result)
         return result
@@ -253,9 +258,8 @@ def relax_tensions(low: Surface, strongest: float, ratio: float) -> Homotopy | N
         equal = raised * needed
         given = {name: equal if name in pressed else min(t, most * equal) for name, t in asked.items()}
         change = {name: asked[name] - given[name] for name in asked if asked[name] != given[name]}
-        return HomotopyStart(
-            low.retensioned(given), Direction(change, relative=True) if change else None, 0.0
-        )
+        direction = Direction(change, relative=True) if change else None
+        return HomotopyStart(low.retensioned(given), direction, 0.0)
 
     starts = (start(raised, most) for raised, most in product(RAISED, WALLS))
     note = "along the branch from equal tensions"

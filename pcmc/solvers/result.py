@@ -104,7 +104,7 @@ class Result:
         return self.status is Status.CONVERGED
 
     def certify(
-        self, *, modes: int = 1, tolerance: float | None = None, whole: bool | Sequence[str | Plane] = False
+        self, *, modes: int = 1, tolerance: float = AT_REST, whole: bool | Sequence[str | Plane] = False
     ) -> Certificate:
         """The certificate of ``surface``, which also takes into account how the solver ended.
 
@@ -119,7 +119,6 @@ class Result:
             Status.VANISHED: Evidence.VANISHED,
             Status.DEGENERATE: Evidence.COLLAPSED,
         }.get(first)
-        tolerance = AT_REST if tolerance is None else tolerance
         return certify(
             self.surface,
             modes=modes,

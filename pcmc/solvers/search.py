@@ -16,12 +16,10 @@ from ..certificate.balance import (
     load_name,
     load_ratio,
     overload,
-    unbalanced,
-    unheld,
 )
-from ..certificate.cables import weak_cable
 from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
+from ..certificate.verdict import theorems
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from .homotopy import (
@@ -52,27 +50,22 @@ def search(surface: Surface, first: Result, callback: Callback | None, options: 
     level = first.rows[-1]["level"]
     start = first.surface if level else surface
     remaining = {**options, "levels": options.get("levels", 0) - level}
-    solves = Solves(callback, remaining, first.iterations + 1, first.evaluations)
+    solves = Solves(callback, remaining, first.rows, first.iterations + 1, first.evaluations)
     try:
-        found = _search(start, first, solves)
+        return _search(start, first, solves)
     except LimitReached as reached:
-        found = reached.result
+        return reached.result
     except (StopIteration, KeyboardInterrupt) as error:
         stop_requested(error)
         return replace(first, status=Status.STOPPED, evaluations=solves.evaluations)
-    if isinstance(found, Result):  # its steps come after those of the first
-        rows = [*first.rows, *found.rows]
-        return replace(found, rows=rows, iterations=solves.steps - 1, evaluations=solves.evaluations)
-    return _failed(first, *found, solves.evaluations)
 
 
-def _search(start: Surface, first: Result, solves: Solves) -> Result | tuple[list[Proof], list[Attempt]]:
-    """The result of the first homotopy that leads to rest, or what was proved and tried."""
+def _search(start: Surface, first: Result, solves: Solves) -> Result:
+    """The result of a homotopy that leads to rest, or else the first one with what was proved and tried."""
     minimum = solves.options.get("target", "minimum") == "minimum"
     pinchable = standing_part(start).walls.pinchable
     load = overload(start) if first.status in (Status.DIVERGED, Status.DEGENERATE) else None
-    found = unbalanced(start, pinchable), unheld(start), weak_cable(start)
-    proofs: list[Proof] = [proof for proof in found if proof is not None]
+    proofs = theorems(start, pinchable)
     growing = growing_part(start) if minimum and not proofs else None
     tried, given = [Attempt("given start", _name(first))], _name(first).replace("_", " ")
     ways = _further_ways(start, pinchable) if growing is None and not proofs else ()
@@ -91,7 +84,8 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result | tuple[lis
         tried.append(outcome.attempt or Attempt(outcome.way, _name(result)))
         if tried[-1].folds:
             break
-    return ([] if load is None else [load]) + proofs, tried
+    failed = _failed(first, (*filter(None, [load]), *proofs), tried)
+    return replace(failed, evaluations=solves.evaluations)
 
 
 def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome | Homotopy]:
@@ -121,11 +115,11 @@ def _name(result: Result) -> str:
     return result.status.name.lower()
 
 
-def _failed(first: Result, proofs: list[Proof], tried: list[Attempt], evaluations: int) -> Result:
+def _failed(first: Result, proofs: tuple[Proof, ...], tried: list[Attempt]) -> Result:
     """The first result, with the proofs or what was tried."""
     neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
     if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
-        proofs = []
+        proofs = ()
     status, folds = first.status, [attempt for attempt in tried if attempt.folds]
     if proofs:
         status = Status.NO_EQUILIBRIUM
@@ -134,11 +128,5 @@ def _failed(first: Result, proofs: list[Proof], tried: list[Attempt], evaluation
     growing = growing_part(first.surface) if status is Status.NONE_FOUND else None
     reasons = (*proofs, *(folds if proofs else tried), first.note, neck or "")
     notes = ["" if growing is None else describe_growing(growing), *map(str, reasons)]
-    return replace(
-        first,
-        status=status,
-        evaluations=evaluations,
-        note="; ".join(filter(None, notes)),
-        proofs=tuple(proofs),
-        tried=tuple(tried),
-    )
+    note = "; ".join(filter(None, notes))
+    return replace(first, status=status, note=note, proofs=proofs, tried=tuple(tried))

@@ -360,9 +360,7 @@ class SecondVariation:
     @cached_property
     def added_matrix(self) -> csr_array | None:
         """(N,N) what was added to a singular matrix; None if nothing was."""
-        if not self.added:
-            return None
-        return self.pattern.symmetric(self.of.matrix(0.0, self.added))
+        return self.pattern.symmetric(self.of.matrix(0.0, self.added)) if self.added else None
 
     @cached_property
     def bordered(self) -> Inverse:

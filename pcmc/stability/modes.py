@@ -145,9 +145,8 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
     while True:
         values, vectors = _dense(system, k) if max(2 * k, DENSE) >= size else _nearest(system, k)
         # one more than are wanted, and all negative ones: these may be farther from zero than positive ones
-        whole = (
-            len(values) <= count or values[-1] - values[count - 1] > SAME_EIGENVALUE * np.abs(values).max()
-        )
+        rounding = SAME_EIGENVALUE * np.abs(values).max(initial=0.0)
+        whole = len(values) <= count or values[-1] - values[count - 1] > rounding
         if len(values) < k or (whole and np.count_nonzero(values < 0.0) >= system.negative):
             break
         k *= 2

@@ -201,9 +201,8 @@ def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bo
 
 def lying(height: Floats, X: Floats) -> Bools:
     """(n,) whether vertices at these heights over Π lie on it, to rounding of their coordinates."""
-    return np.abs(height) <= max(
-        RESTING * bounding_size(X), RESTING_ROUNDED * float(np.abs(X).max(initial=0.0))
-    )
+    rounding = RESTING_ROUNDED * float(np.abs(X).max(initial=0.0))
+    return np.abs(height) <= max(RESTING * bounding_size(X), rounding)
 
 
 def _first_double(key: Ints) -> list[tuple[int, int]]:
@@ -269,19 +268,22 @@ def refuse_rows(
     raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)
 
 
-def refuse_snow(snow: float, patch: str, free: int, edge: Ints, other: str = "") -> NoReturn:
-    """Refuse snow as a change of pressure where edges are free; ``edge`` is the first of them.
-
-    ``other`` is the patch beyond them if they are a seam and not free.
-    """
-    i, j = edge.tolist()
-    if other:
+def refuse_snow(surface: Any, edges: Ints) -> NoReturn:
+    """Refuse the snow of a Surface that ends at some edges (k,), as there it is no change of pressure."""
+    topo = surface.topology
+    i, j = topo.edges[edges[0]].tolist()
+    beside = np.unique(surface.patch_of_face[(topo.edge_of_face == edges[0]).any(axis=1)])
+    seam = (topo.seam_edge & ~topo.one_way_edge)[edges].all() and not surface.walls[beside].any()
+    some = [surface.patches[k] for k in beside] if seam else surface.patches
+    most, *others = sorted(some, key=lambda patch: -abs(patch.snow))
+    snow, patch = most.snow, most.name
+    if seam:
+        other = others[0].name
         text = f"snow differs between {patch!r} and {other!r}, and no wall stands there; give both the same:"
         text += f" {other!r} = {{snow = {snow:g}}} under patches in a project, or --snow {other!r}={snow:g},"
         text += f" or retensioned(snows={{{other!r}: {snow:g}}})"
-        raise SurfaceError(text, what="snow", where=(i, j))
-    text = f"snow: {free} edges are free or the end of it, the first from vertex {i} to {j},"
-    text += " and there a change"
-    text += f" of pressure is not the same as snow; give a weight instead (--weight {patch!r}={snow:g}, or"
-    text += f" retensioned(weights={{{patch!r}: {snow:g}}}))"
+    else:
+        text = f"snow: {len(edges)} edges are free or the end of it, the first from vertex {i} to {j}, and"
+        text += " there a change of pressure is not the same as snow; give a weight instead"
+        text += f" (--weight {patch!r}={snow:g}, or retensioned(weights={{{patch!r}: {snow:g}}}))"
     raise SurfaceError(text, what="snow", where=(i, j))

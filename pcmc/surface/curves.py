@@ -312,9 +312,8 @@ def ellipse(centre: npt.ArrayLike, axes: npt.ArrayLike, sweep: float = 360.0) ->
     >>> ellipse([0, 0], [[3, 0], [0, 1]], 90).at([1.0]).round(12).tolist()
     [[0.0, 1.0]]
     """
-    P = np.concatenate(
-        [checked_points([centre], "ellipse", 1), checked_points(axes, "ellipse", 2, exactly=True)]
-    )
+    middle = checked_points([centre], "ellipse", 1)
+    P = np.concatenate([middle, checked_points(axes, "ellipse", 2, exactly=True)])
     u, v = P[1:]
     if (u @ u) * (v @ v) - (u @ v) ** 2 <= 1e-24 * max(u @ u, v @ v) ** 2:
         raise curve_error("ellipse", "its axes lie on one line; use a polyline", found=P[1:].tolist())
@@ -334,9 +333,8 @@ def join(*curves: Curve) -> Curve:
         raise curve_error("join", "give at least one curve")
     closed = [number for number, curve in enumerate(curves) if curve.closed]
     if closed and len(curves) > 1:
-        raise curve_error(
-            "join", f"curve {closed[0]} is closed; only open curves can be joined", where=closed[0]
-        )
+        fault = f"curve {closed[0]} is closed; only open curves can be joined"
+        raise curve_error("join", fault, where=closed[0])
     if len({curve.pieces[0].points.shape[1] for curve in curves}) > 1:
         raise curve_error("join", "some curves are plane and some in space; give all in space")
     tolerance = ON * max(curve.length for curve in curves)

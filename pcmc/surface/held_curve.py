@@ -149,12 +149,8 @@ def _fault(part: HeldCurve, X: Floats, topo: Topology, fixed: Bools, taken: Bool
     V, t = np.asarray(part.vertices), np.asarray(part.at)
     shaped = V.ndim == 1 and len(V) > 1 and t.shape == V.shape
     typed = V.dtype.kind in "iu" and t.dtype.kind == "f"
-    if (
-        not shaped
-        or not typed
-        or not isinstance(part.curve, Curve)
-        or part.curve.pieces[0].points.shape[1] != 3
-    ):
+    in_space = isinstance(part.curve, Curve) and part.curve.pieces[0].points.shape[1] == 3
+    if not (shaped and typed and in_space):
         return "needs a curve in space, and two or more vertices with a parameter each"
     if V.min() < 0 or V.max() >= len(X):
         return f"has vertices outside 0..{len(X) - 1}"

@@ -53,19 +53,12 @@ def section(surface: Surface, point: Floats, normal: Floats) -> list[Polyline]:
         nodes, local = np.unique(links, return_inverse=True)
         nowhere = np.zeros(len(nodes), dtype=bool)
         for chain, closed, _ in joined(local.reshape(-1, 2), nowhere, len(nodes)):
-            points = without_repeats(at[nodes[chain]], closed)
-            if len(points) > 1:
-                lines.append(Polyline(points, closed, patch))
+            points = at[nodes[chain]]  # the same one twice where the plane goes through a vertex
+            new = (points != np.roll(points, 1, axis=0)).any(axis=1)
+            new[0] |= not closed
+            if new.sum() > 1:
+                lines.append(Polyline(points[new], closed, patch))
     return lines
-
-
-def without_repeats(points: Floats, closed: bool) -> Floats:
-    """The points without those that repeat the one before: the plane goes through a vertex there."""
-    before = np.roll(points, 1, axis=0)
-    new = (points != before).any(axis=1)
-    if not closed:
-        new[0] = True
-    return points[new]
 
 
 def curves_by_kind(surface: Surface, without: Collection[str] = ()) -> Iterator[tuple[str, EdgeCurve]]:

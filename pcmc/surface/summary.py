@@ -12,17 +12,13 @@ NAMED = 6  # patches, cables or rooms that are named
 
 def summary(surface: Any) -> str:
     """Of a Surface: size, patches, walls, cables, rooms, supports and heights, a line each."""
-    patches = {
-        wall: [
-            f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g}{f', snow {p.snow:g}' * bool(p.snow)})"
-            for p, is_wall in zip(surface.patches, surface.walls.tolist(), strict=True)
-            if is_wall == wall
-        ]
-        for wall in (False, True)
-    }
+    patches = [
+        f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g}{f', snow {p.snow:g}' * bool(p.snow)})"
+        for p in surface.patches
+    ]
     parts = {
-        "patches": patches[False],
-        "walls": patches[True],
+        "patches": [patches[k] for k in np.flatnonzero(~surface.walls)],
+        "walls": [patches[k] for k in np.flatnonzero(surface.walls)],
         "cables": [
             f"{cable.name} (tension {cable.tension:g}{f', weight {cable.weight:g}' * bool(cable.weight)})"
             for cable in surface.cables
@@ -30,17 +26,14 @@ def summary(surface: Any) -> str:
         "rooms": [f"{room.name} (volume {room.volume:g})" for room in surface.rooms],
         "planes": [str(plane) for plane, _ in surface.on_planes],
     }
-    height = surface.plane.height(surface.vertices)
-    fixed = np.count_nonzero(surface.pinned)
-    sliding = np.count_nonzero(surface.held & ~surface.pinned)
-    return "\n".join(
-        [
-            f"Surface of {surface.m} triangles and {surface.n} vertices, {surface.size:.4g} across",
-            *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts),
-            f"  supports: {fixed} vertices fixed, {sliding} sliding",
-            f"  heights over the plane: {height.min():.4g} to {height.max():.4g}",
-        ]
-    )
+    height, fixed = surface.plane.height(surface.vertices), surface.pinned.sum()
+    lines = [
+        f"Surface of {surface.m} triangles and {surface.n} vertices, {surface.size:.4g} across",
+        *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts),
+        f"  supports: {fixed} vertices fixed, {surface.held.sum() - fixed} sliding",
+        f"  heights over the plane: {height.min():.4g} to {height.max():.4g}",
+    ]
+    return "\n".join(lines)
 
 
 def listed(texts: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, cast
 
@@ -24,15 +24,7 @@ from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
 from .summary import summary
 from .topology import Topology, topology
-from .values import part_index, with_values
-from .walls import wall_patches
-
-PARTS = (
-    *("vertices", "faces", "patch_of_face", "patches"),
-    *("fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "curves", "order"),
-)
-FIELDS = (*PARTS, "given_supports")
-GROUND = Plane()
+from .values import part_index, wall_patches, with_values
 
 
 def _of_patches(field: str) -> cached_property[Any]:
@@ -91,8 +83,7 @@ class Surface(supports.Supported):
 
     Raises
     ------
-    SurfaceError
-        Naming the first offending index, for arrays that are not such a mesh.
+    SurfaceError : with the first offending index, for arrays that are not such a mesh.
 
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
@@ -106,7 +97,7 @@ class Surface(supports.Supported):
     patches: tuple[Patch, ...]
     fixed: Bools = field(default=cast(Bools, ()))
     on_plane: Bools = field(default=cast(Bools, ()))
-    plane: Plane = field(default=GROUND)
+    plane: Plane = field(default=Plane())
     on_line: tuple[tuple[Guide, Bools], ...] = ()
     on_planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
@@ -194,8 +185,7 @@ class Surface(supports.Supported):
 
         Warns
         -----
-        CurveWarning
-            Where fixed vertices were moved otherwise than by an affine map: their curves are left out.
+        CurveWarning : fixed vertices were moved otherwise than by an affine map; their curves are left out.
         """
         return followed(self.curves, self.vertices, self.size)
 
@@ -347,8 +337,7 @@ class Surface(supports.Supported):
 
         Raises
         ------
-        SurfaceError
-            Where an edge of these patches is free; there ``retensioned(weights={"roof": s})`` can do.
+        SurfaceError : an edge of these patches is free; there ``retensioned(weights={"roof": s})`` can do.
 
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         >>> roof = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0, 1.0)], fixed=range(3))
@@ -367,13 +356,7 @@ class Surface(supports.Supported):
         """The surface itself; SurfaceError where its snow ends at a free edge, as in ``with_snow``."""
         edges = np.flatnonzero(self._uncancelled(self.snows))
         if len(edges):
-            topo = self.topology
-            beside = np.unique(self.patch_of_face[(topo.edge_of_face == edges[0]).any(axis=1)])
-            seam = (topo.seam_edge & ~topo.one_way_edge)[edges].all() and not self.walls[beside].any()
-            some = [self.patches[k] for k in beside] if seam else self.patches
-            most, *others = sorted(some, key=lambda patch: -abs(patch.snow))
-            step = others[0].name if seam else ""
-            checks.refuse_snow(most.snow, most.name, len(edges), topo.edges[edges[0]], step)
+            checks.refuse_snow(self, edges)
         return self
 
     def __copy__(self, memo: object = None) -> Surface:
@@ -409,3 +392,7 @@ class Surface(supports.Supported):
         if "faces" not in changes:
             hand_over(self, other, "nodes")
         return other
+
+
+PARTS = tuple(each.name for each in fields(Surface) if each.init)  # as they are given
+FIELDS = (*PARTS, "given_supports")

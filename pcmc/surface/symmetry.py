@@ -263,20 +263,17 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
     for image in images:  # which grow meanwhile
         for reflection, numbers in zip(reflections, next_to, strict=True):
             new = image.after(reflection)
-            same = [
-                np.abs(new.R - old.R).max() <= PARALLEL
-                and np.abs(new.t - old.t).max() <= 1e3 * ON * surface.size
-                for old in images
-            ]
-            if not any(same):
+            turned = np.array([np.abs(new.R - old.R).max() for old in images])
+            shifted = np.array([np.abs(new.t - old.t).max() for old in images])
+            same = np.flatnonzero((turned <= PARALLEL) & (shifted <= 1e3 * ON * surface.size))
+            numbers.append(int(same[0]) if len(same) else len(images))
+            if not len(same):
                 images.append(new)
-                same.append(True)
-            numbers.append(same.index(True))
         if len(images) > MOST_IMAGES:
-            text = (
-                "the images in the mirror planes never end: some planes are parallel, or no whole number of"
+            text = "the images in the mirror planes never end: some planes are parallel, or no whole number"
+            text += (
+                " of images fits around their line; name those to unfold at: mirrored(surface, planes=[…])"
             )
-            text += " images fits around their line; name those to unfold at: mirrored(surface, planes=[…])"
             raise SurfaceError(text, what="planes", found=len(images))
     for image in images:
         for plane in planes:
@@ -385,10 +382,7 @@ def _rooms(
         for part in np.unique(label[:, r]):
             images = np.flatnonzero(label[:, r] == part)
             name = room.name if part == label[0, r] else _unused(room.name, taken)
-            patches = {
-                names[patch[image, surface.patch_index(of)]][1]: sign
-                for image in images
-                for of, sign in room.patches
-            }
+            signs = [(surface.patch_index(of), sign) for of, sign in room.patches]
+            patches = {names[patch[image, k]][1]: sign for image in images for k, sign in signs}
             rooms.append(Room(name, tuple(patches.items()), len(images) * room.volume))
     return tuple(rooms)

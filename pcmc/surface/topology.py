@@ -34,6 +34,11 @@ class EdgeCurve:
         order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
         return np.stack([order[:-1], order[1:]], axis=1)
 
+    @property
+    def ends(self) -> tuple[Ints, ...]:
+        """(2,) each end with the vertex beside it; none of a closed curve."""
+        return () if self.closed else (self.vertices[:2], self.vertices[:-3:-1])
+
 
 @dataclass(frozen=True, eq=False)
 class Topology:

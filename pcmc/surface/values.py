@@ -1,4 +1,5 @@
-"""The values of a surface by name: tensions, pressures, weights, snow, pulls of cables, volumes of rooms.
+"""The values of a surface by name: tensions, pressures, weights, snow, pulls of cables, volumes of rooms;
+and which patches are walls.
 
 Those of a wall follow from its neighbours': its pressure is the difference of its two rooms', its snow that
 of the snow over them, and its tension must balance theirs. The two sheets of a cushion have one pressure.
@@ -14,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
-from ..base.tolerances import SAME_PRESSURE
+from ..base.tolerances import ON, SAME_PRESSURE
 
 
 class ValueKind(NamedTuple):
@@ -87,9 +88,8 @@ def with_values(
             for patches in (surface.patches, changed["patches"])
         )
         change = wall_changes(surface, new - old, {surface.patch_index(name) for name in of_patches[field]})
-        following[field] = {
-            surface.patches[k].name: float(old[k] + change[k]) for k in np.flatnonzero(change)
-        }
+        pairs = ((surface.patches[k].name, float(old[k] + change[k])) for k in np.flatnonzero(change))
+        following[field] = dict(pairs)
     following["wall"] = dict.fromkeys((*following["pressure"], *following["snow"]), True)
     return changed | {"patches": _replaced(changed["patches"], "patch", following)}
 
@@ -123,6 +123,56 @@ def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, fl
         if name in present and present.get(other) == present[name]:
             both.setdefault(other, value)
     return both
+
+
+def wall_patches(surface: Any) -> Bools:
+    """(k,) bool: the patches that are walls.
+
+    These are the patches with ``wall=True``, and those without pressure that stand between two rooms of
+    prescribed volume or hang below a junction of the roof. A patch hangs below a junction where it goes down
+    to Π more steeply than two others do, along most of its edges at junctions with a patch that carries
+    pressure or weight. Any other patch without pressure is a sail: part of the roof. If no patch carries
+    anything, as with soap films, only declared walls are walls.
+
+    >>> from . import Patch, Surface
+    >>> X = [[0, 0, 2], [0, 4, 2], [0, 2, 0], [3, 2, 3], [-3, 2, 3]]
+    >>> patches = [Patch("wall", 1.0, 0.0), Patch("cushion", 2.0), Patch("sail", 2.0, 0.0)]
+    >>> roof = Surface(X, [[0, 1, 2], [1, 0, 3], [0, 1, 4]], [0, 1, 2], patches, fixed=range(5))
+    >>> wall_patches(roof).tolist()
+    [True, False, False]
+    """
+    declared = np.array([patch.wall for patch in surface.patches])
+    open_ones = surface.auxiliary & ~declared
+    carrying = ~surface.auxiliary | (surface.weights != 0.0) & ~declared
+    if not open_ones.any() or not carrying.any():
+        return declared
+    signs = surface.room_signs
+    between = (signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0)
+    return declared | open_ones & (between | _hanging(surface, carrying))
+
+
+def _hanging(surface: Any, carrying: Bools) -> Bools:
+    """(k,) bool: which patches go down below two others along most of their edges at junctions."""
+    topo, X, count = surface.topology, surface.vertices, len(surface.patches)
+    of_roof = np.zeros(len(topo.edges), dtype=bool)
+    of_roof[topo.edge_of_face[carrying[surface.patch_of_face]]] = True
+    sides = np.flatnonzero((topo.junction_edge & of_roof)[topo.edge_of_face].ravel())
+    edge, patch = topo.edge_of_face.ravel()[sides], surface.patch_of_face[sides // 3]
+    start, end = X[topo.edges[edge]].transpose(1, 0, 2)
+    length = np.linalg.norm(end - start, axis=1)
+    along = (end - start) / np.where(length > 0.0, length, 1.0)[:, None]
+    inward = X[surface.faces.ravel()[sides]] - start  # to the corner opposite the edge
+    inward -= np.einsum("ij,ij->i", inward, along)[:, None] * along
+    depth = np.linalg.norm(inward, axis=1)
+    away = np.where(surface.plane.height(0.5 * (start + end)) < -ON * surface.size, -1.0, 1.0)
+    thick = depth > ON * surface.size  # a wall whose junction rests on Π has no height left
+    slope = inward @ np.array(surface.plane.normal) / np.where(thick, depth, 1.0)
+    rise = np.where(thick, away * slope, -1.0)
+    order = np.lexsort((rise, edge))  # the sheets of an edge side by side, the lowest first
+    first = np.searchsorted(edge[order], edge[order])
+    below = np.arange(len(order)) - first < topo.valence[edge[order]] - 2
+    lower = np.bincount(patch[order], below * length[order], count)
+    return np.asarray(2.0 * lower > np.bincount(patch, length, count))
 
 
 def wall_changes(surface: Any, change: Floats, named: Collection[int] = ()) -> Floats:

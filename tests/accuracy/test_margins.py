@@ -13,6 +13,7 @@ from generators import barrel, catenoid, joined_caps, spherical_cap, two_caps, t
 from generators.catenary import FOLD
 from pcmc import Cable, Patch, Surface, certify, margin, solve
 from pcmc.accuracy import MarginEnd
+from pcmc.accuracy.margins import End
 from pcmc.accuracy.varied import named
 from pcmc.base.errors import OptionError, SurfaceError
 from studies.reference import evolver
@@ -22,7 +23,9 @@ def cap(alpha=0.75, edge_length=0.2):
     return solve(spherical_cap(edge_length, alpha=alpha)).surface
 
 
-@pytest.mark.parametrize(("what", "exact"), [("pressure", 1.5), ("tension", 1 / 1.5), ("cap", 1 / 1.5)])
+@pytest.mark.parametrize(
+    ("what", "exact"), [("pressure", 1.5), ("cap", 1 / 1.5), *at_night(("tension", 1 / 1.5))]
+)
 def test_a_cap_folds_as_a_hemisphere(what, exact):
     """At rest up to p R = 2 α."""
     found = margin(cap(), what)
@@ -60,9 +63,9 @@ def test_the_heaviest_rope():
     exact = 1.0 / (np.cosh(FOLD) / FOLD - 1.0)
     assert found.ends_by is MarginEnd.FOLD
     assert abs(found.factor - exact) <= found.bar <= 0.05 * exact
-    for what in ("cable_weight", "weight of cable rope"):
-        assert margin(rope, what, meshes=1).factor == pytest.approx(found.factor, rel=1e-6)
-    assert "times the weights of cables" in margin(rope, "cable_weight", meshes=1).text()
+    heavier = [margin(rope, what, meshes=1) for what in ("cable_weight", "weight of cable rope")]
+    assert [one.factor for one in heavier] == pytest.approx([found.factor] * 2, rel=1e-6)
+    assert "times the weights of cables" in heavier[0].text()
     light = solve(rope.retensioned(cable_weights={"rope": 0.0})).surface
     added = margin(light, "weight of cable rope", meshes=1)
     assert np.isnan(added.factor)
@@ -133,6 +136,36 @@ def test_ridges_that_come_to_rest_do_not_end_it():
     assert found.factor == 2.0
     assert "ridges come to rest" in found.detail
     assert found.text().startswith("holds at least up to 2 times the tension of wall (no end found")
+
+
+@pytest.mark.parametrize(
+    ("kind", "tension", "text"),
+    [
+        (MarginEnd.NONE, 1.5, "the pressures do not cancel: 2 is left over"),
+        (MarginEnd.MESH, 0.1, "only a mesh as coarse as this is at rest here"),
+    ],
+)
+def test_what_is_known_beside_the_end_is_told_in_units_of_what_is_added(monkeypatch, kind, tension, text):
+    """λ = 1 is snow as heavy as the pressure, 2."""
+    roof = cap().retensioned({"cap": 1.5}, {"cap": 2.0})
+    held = roof.fixed & ((roof.vertices[:, 0] > 0.0) | (kind is MarginEnd.MESH))
+    end = End(
+        kind,
+        0.5,
+        roof.retensioned({"cap": tension}).rebuilt(fixed=held),
+        np.zeros((roof.n, 3)),
+        contacts=(0.2,),
+    )
+    monkeypatch.setattr("pcmc.accuracy.margins.find_end", lambda *_, **__: end)
+    found = margin(roof, "snow", meshes=1)
+    assert found.value == 1.0
+    assert [told in found.detail for told in ("on the way: at 0.4", text)] == [True, True]
+    assert len(re.findall("do not cancel|only a mesh", found.detail)) == 1
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_sheet_that_moves_is_named(side):
+    assert margin(solve(two_squares(4)), f"pressure of {side}", meshes=1).where == f"'{side}' inflates"
 
 
 def test_names():

@@ -62,10 +62,8 @@ class BoundaryMotion:
             raise OptionError(message, what="parameter", found=0)
         if surface.rooms:
             name = surface.rooms[0].name
-            message = (
-                f"BoundaryMotion: room {name!r} prescribes a volume, which is not followed as the boundary"
-            )
-            message += " moves; remove the room, and give its pressure"
+            message = f"BoundaryMotion: room {name!r} prescribes a volume, which is not followed as the"
+            message += " boundary moves; remove the room, and give its pressure"
             raise OptionError(message, what="parameter", found=name)
         line = BoundaryLine(self.start, {}, {}, self.positions, int(surface.pinned.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.pinned], axis=1)

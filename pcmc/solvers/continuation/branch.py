@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from ...base import validate
-from ...base.errors import MissingExtra, OptionError, SurfaceError
-from ...surface import Surface
+from ...base.arrays import Floats
+from ...base.errors import MissingExtra, OptionError
+from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
 from ..result import Callback
 from .boundary_motion import BoundaryMotion
@@ -69,6 +71,20 @@ class Branch:
     def bifurcations(self) -> pd.DataFrame:
         """The events at which the index changes and λ does not turn; rows are numbered as in ``events``."""
         return self.events[(self.events.kind == "index") & (self.events.along_branch < ALONG)]
+
+    def pieces(self, x: str, y: str) -> list[tuple[bool, Floats]]:
+        """Lines (k,2) of column y against x, cut where the index passes 0: whether stable, and the points.
+
+        Events are points of them, too. A diagram draws them solid where stable, and dashed elsewhere.
+        """
+        columns = ["arclength", x, y]
+        events = self.events[columns].assign(index=self.events.index_after)
+        every = np.concatenate([self.points[[*columns, "index"]].to_numpy(float), events.to_numpy(float)])
+        every = every[np.argsort(every[:, 0], kind="stable")]
+        stable = every[:, 3] == 0.0
+        cuts = np.flatnonzero(stable[1:] != stable[:-1]) + 1
+        ends = zip([0, *cuts], [*cuts, len(every)], strict=True)
+        return [(bool(stable[i]), every[i : k + 1, 1:3]) for i, k in ends]
 
     def switch(
         self,
@@ -168,10 +184,8 @@ class Branch:
 
     def _known_line(self, what: str) -> ParameterLine:
         if self._line is None:
-            message = (
-                f"{what}: this branch was put together from tables; only one that follow gave can {what}"
-            )
-            raise OptionError(message, what="branch")
+            message = f"{what}: this branch was put together from tables; only one that follow gave can"
+            raise OptionError(f"{message} {what}", what="branch")
         return self._line
 
     def _bifurcation(self, event: int | None) -> int:
@@ -276,8 +290,7 @@ def follow(
     >>> float((branch.points.parameter.iloc[-1] * 3 / 2**0.5).round(9)), len(branch.events)
     (1.0, 0)
     """
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     expect_flat(surface, "follow")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")

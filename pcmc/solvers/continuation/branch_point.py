@@ -130,9 +130,8 @@ def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int
     except NotOnBranch as reason:
         raise OptionError(f"event {row}: {reason}", what="event", where=row) from None
     if len(values) > 1 and not abs(values[0]) <= NULL_MODE * abs(values[1]):
-        message = (
-            f"no mode turns at event {row}: the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"
-        )
+        nearest = f"the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"
+        message = f"no mode turns at event {row}: {nearest}"
         raise OptionError(message, what="event", where=row, found=float(values[0]), expected=0.0)
     weights, scale = at.area_weights, mesh.line.scale
     mode = modes[0] / np.sqrt(np.einsum("v,vi,vi->", weights, modes[0], modes[0]))

@@ -115,22 +115,18 @@ class Direction:
 
     def _common_value(self, surface: Surface) -> float:
         """λ of the surface; everything that is named must agree on it."""
-        given = [
-            (
-                f"{kind[:-1].replace('_', ' ')} of {part.name!r}",
-                getattr(part, KINDS[kind][1]) / weights[part.name],
-            )
-            for kind, weights in self.named.items()
-            for part in getattr(surface, KINDS[kind][0])
-            if part.name in weights
-        ]
+        given = []
+        for kind, weights in self.named.items():
+            parts, field, _ = KINDS[kind]
+            for part in getattr(surface, parts):
+                if part.name in weights:
+                    label = f"{kind[:-1].replace('_', ' ')} of {part.name!r}"
+                    given.append((label, getattr(part, field) / weights[part.name]))
         (first, value), *others = given
         for name, other in others:
             if abs(other - value) > ON_BRANCH * max(abs(value), abs(other)):
-                text = (
-                    f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give weights"
-                )
-                text += " in proportion to the surface's own values, or relative=True"
+                text = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give"
+                text += " weights in proportion to the surface's own values, or relative=True"
                 raise OptionError(text, what="parameter", where=name, found=other, expected=value)
         return float(value)
 
@@ -198,11 +194,6 @@ class ParameterLine:
             for kind, by_name in named.items()
             for name, x in by_name.items()
         }
-
-    @property
-    def volume_rates(self) -> Floats | float:
-        """(r,) dV̄/dλ, or 0."""
-        return self.rates.get("volumes", 0.0)
 
     def boundary(self, value: float) -> Floats | None:
         """The positions (k,3) of the fixed vertices at λ; None as none of them moves."""

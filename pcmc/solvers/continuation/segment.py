@@ -21,9 +21,8 @@ from .state import BranchState
 
 def crosses_goal(before: BranchState, after: BranchState, goals: Mapping[str, float]) -> bool:
     """Whether a goal lies between the quantities of two states."""
-    return any(
-        (getattr(before, name) - goal) * (getattr(after, name) - goal) < 0.0 for name, goal in goals.items()
-    )
+    off = (((getattr(at, name) - goal) for at in (before, after)) for name, goal in goals.items())
+    return any(one * other < 0.0 for one, other in off)
 
 
 @dataclass(frozen=True, eq=False)

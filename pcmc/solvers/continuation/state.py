@@ -101,7 +101,7 @@ class BranchState:
         change = rest.space.to_coordinates(line.gradient(rest.surface, self.X))
         if self.carried is not None:
             change = change + rest.jacobian.times(self.carried)
-        return np.append(change, -rest.volume_units * line.volume_rates)
+        return np.append(change, -rest.volume_units * line.rates.get("volumes", 0.0))
 
     @cached_property
     def carried(self) -> Floats | None:

@@ -203,11 +203,10 @@ class Tracer:
 
     def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        tolerance, backend = self.options.tolerance, self.options.backend
-        part = near.rest.part
-        X = part.landed(near.X, near.mesh.reaches_plane(near.X))
+        part, own = near.rest.part, self.options
+        whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
         result = solve_once(
-            part.whole_at(X), "newton", target="stationary", tolerance=tolerance, backend=backend
+            whole, "newton", target="stationary", tolerance=own.tolerance, backend=own.backend
         )
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
