@@ -76,11 +76,9 @@ class Design:
 
     def __repr__(self) -> str:
         """How the search ended, what it reached and with what, above the surface."""
-        targets, parameters = (
-            f"targets: {values_text(self.targets)}",
-            f"parameters: {values_text(self.parameters)}",
-        )
-        return f"{self.message}\n  {targets}\n  {parameters}\n  {self.solves} solves\n{self.surface!r}"
+        targets, parameters = values_text(self.targets), values_text(self.parameters)
+        text = f"{self.message}\n  targets: {targets}\n  parameters: {parameters}\n  {self.solves} solves"
+        return f"{text}\n{self.surface!r}"
 
     @property
     def met(self) -> bool:

@@ -96,9 +96,7 @@ def slopes(
 ) -> list[tuple[Floats, Floats, Floats]]:
     """dq/dλ (parameters,) of each target: of one branch, and of those leading while λ falls and grows."""
     at, rates = Equilibrium.of(surface), list[Floats]()
-    for (
-        parameter
-    ) in parameters:  # each patch's, cable's or room's own; walls follow unless they are parameters
+    for parameter in parameters:  # walls follow their neighbours unless they are parameters themselves
         alike = (one for one in parameters if one.kind == parameter.kind)
         named = {name: float(name in parameter.names) for one in alike for name in one.names}
         rates.append(rates_of(at.surface, parameter.key, named))
