@@ -95,6 +95,13 @@ def test_the_limit_and_its_bar_are_those_of_the_table(values, limit, bar):
     assert found.error[0] == pytest.approx(abs(limit - values[0]) + bar, rel=1e-12)
 
 
+def test_of_a_surface_that_settles_slowly_a_fast_quantity_is_not_believed_more():
+    """Of order 1, where the quantity shows 2: |d_1| / (S (S - 1)) less what is left by order 2, 3/16."""
+    found = extrapolate(np.array([[4.0], [6.25], [6.8125]]), np.array([1e-15]), shape_order=1.0)
+    assert found.limit[0] == pytest.approx(7.0, rel=1e-12)
+    assert found.limit_error[0] == pytest.approx(2.25 / 2.0 - 3.0 / 16.0, rel=1e-12)
+
+
 def test_two_meshes_of_one_value_leave_rounding():
     found = extrapolate(np.array([[2.0], [2.0 + 1e-13]]), np.array([1e-12]))
     assert (found.limit[0], found.limit_error[0]) == (2.0 + 1e-13, 1e-12)

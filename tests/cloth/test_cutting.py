@@ -201,6 +201,16 @@ def test_a_slit_that_reaches_no_rim_does_not_open():
         cutting_pattern(cap(), seams=[[[-0.5, -0.1], [0.5, -0.1]]])
 
 
+@pytest.mark.parametrize("turn", [1, -1], ids=["from the seam", "to the seam"])
+def test_a_line_may_begin_or_end_at_another(turn):
+    """Strips of 4 × 2, 2 × 1 and 2 × 1, whichever way the second line runs."""
+    flat = Plan([[0, 0], [6, 0], [6, 2], [0, 2]], edge_length=1.0, tension=2.0, pressure=0.0).surface()
+    for sign in (1, -1):
+        second = [[3 + sign, 1], [3 + 3 * sign, 1]]
+        pattern = cutting_pattern(flat, seams=[[[3 + sign, 0], [3 + sign, 2]], second[::turn]], anyway=True)
+        assert sorted(pattern.table["cut_area"]) == pytest.approx([2.0, 2.0, 8.0])
+
+
 def test_a_line_that_ends_inside_a_sheet_is_a_dart():
     pattern = cutting_pattern(cap(), seams=[[[0.0, -1.0], [0.0, 0.0]]])
     (strip,) = pattern.strips

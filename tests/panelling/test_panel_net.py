@@ -146,6 +146,21 @@ def test_panels_without_area_are_told_of(rectangle):
     assert "slivers" not in str(net)
 
 
+def test_tables_of_a_net_number_its_nodes_beams_and_panels_from_1(rectangle):
+    """A beam is as long as its nodes are apart, and every panel has as many beams as corners."""
+    net = panel_net(rectangle, 1.0)
+    for table, name in ((net.nodes, "node"), (net.beams, "beam"), (net.panels, "panel")):
+        assert table[name].tolist() == list(range(1, len(table) + 1))
+    P = net.nodes.set_index("node")[[*"xyz"]]
+    apart = P.loc[net.beams["node"]].to_numpy() - P.loc[net.beams["other"]].to_numpy()
+    assert net.beams["length"].to_numpy() == pytest.approx(np.linalg.norm(apart, axis=1))
+    beside = net.beams[["panel", "neighbour"]].to_numpy()
+    assert (beside[:, 0] != beside[:, 1]).all()
+    assert np.bincount(beside.ravel())[1:].tolist() == net.panels["corners"].tolist()
+    rim = net.beams[net.beams["neighbour"] == 0][["node", "other"]].to_numpy().ravel()
+    assert set(net.nodes["kind"][rim - 1]) == {"edge", "corner"}
+
+
 def test_quads_of_a_grid_stay_on_the_surface_and_are_worse_planar(rectangle):
     grid, planar = panel_net(rectangle, 1.0, "quads"), panel_net(rectangle, 1.0)
     assert grid.nodes["distance"].max() < 1e-12
