@@ -80,10 +80,8 @@ class Theorem:
     spare: float | None = None
     rigid: int = 0
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
-
-    __repr__ = __str__  # what a prompt and a notebook's cell show
 
     def brief(self, units: Units = NO_UNITS) -> str:
         """The theorem in a line: "proved: index 0, within 1.3e-09 m"."""

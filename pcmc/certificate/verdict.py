@@ -15,7 +15,7 @@ from ..forces.cables import compressed_cables
 from ..forces.triangles import compressed, effective_tensions
 from ..stability.modes import Spectrum
 from ..surface import Surface
-from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
+from .balance import coarseness, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
 from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
@@ -152,8 +152,7 @@ def _disproved(f: Findings) -> list[object]:
 
 
 def _none_found(f: Findings) -> list[object]:
-    vertex = growing_part(f.surface)
-    return ["" if vertex is None else describe_growing(vertex), *f.tried, f.neck, _compressed(f)]
+    return [growing_part(f.surface), *f.tried, f.neck, _compressed(f)]
 
 
 def _ran_away(f: Findings) -> str:

@@ -12,12 +12,13 @@ import pandas as pd
 
 from ...base import validate
 from ...base.errors import MissingExtra, OptionError
+from ...certificate.quantities import Parameter
 from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
 from ..result import Callback
 from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
-from .direction import Direction, Named, ParameterLine
+from .direction import Direction, ParameterLine
 from .options import Ending, FollowOptions
 from .state import QUANTITIES, BranchMesh
 from .tracing import Tracer
@@ -213,7 +214,7 @@ def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
 
 def follow(
     surface: Surface,
-    parameter: str | Named | Direction | BoundaryMotion,
+    parameter: str | Parameter | Direction | BoundaryMotion,
     stop: float | None = None,
     *,
     until: Mapping[str, float] | None = None,
@@ -283,7 +284,7 @@ def follow(
         raise MissingExtra("mmgpy", "remesh")
     goals = _goals(stop, until)
     direction: object = Direction({parameter: 1.0}) if isinstance(parameter, str) else parameter
-    if isinstance(parameter, Named):
+    if isinstance(parameter, Parameter):
         by_kind: dict[str, Any] = {parameter.key: dict.fromkeys(parameter.names, 1.0)}
         direction = Direction(**by_kind)
     if not isinstance(direction, Direction | BoundaryMotion):
