@@ -268,8 +268,9 @@ def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
             marked.add(str(kind))
-            size = 6.4 if kind == "fold" else 3.6  # a fold shows around the change of index that it often is
-            look = {"markersize": size, "markerfacecolor": "white", "markeredgewidth": 0.8}
+            # a fold shows around and behind the change of index that it often is
+            size, layer = (6.4, 2.5) if kind == "fold" else (3.6, 3.0)
+            look = {"markersize": size, "zorder": layer, "markerfacecolor": "white", "markeredgewidth": 0.8}
             axes.plot(rows[x], rows[y], EVENT_MARKERS[str(kind)], color=color, label=text, **look)
     return len(marked)
 

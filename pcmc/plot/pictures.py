@@ -215,7 +215,11 @@ def panel_planarity(net: PanelNet, path: Path | None = None, **options: Any) -> 
     """
     mesh, percent = net.mesh, 100.0 * net.panels["planarity"].to_numpy()
     look: dict[str, Any] = {"label": "distance of the diagonals over their length, %", "supports": False}
-    look |= {"edges": False, "limits": (0.0, max(FLAT_PERCENT, float(percent.max())))} | options
+    look |= {
+        "edges": False,
+        "limits": (0.0, max(FLAT_PERCENT, float(percent.max()))),
+        "cmap": "YlGnBu",
+    } | options
     return draw(mesh, path, scalars=percent[mesh.patch_of_face], **look)
 
 

@@ -36,6 +36,7 @@ def figure(folder: Folder) -> None:
             mine = mine[mine.status == "converged"]
             if bottom == "natural" and len(mine):  # on coarse meshes the polygon of the outline adds modes
                 mine = mine[mine["index"] == mine["index"].iloc[-1]]
+            mine = mine.sort_values("edge_length")  # where the wall rests, levels do not halve it
             if len(mine) > 1:
                 initial = sizes[case.name]
                 unit = initial.size**2 / initial.tensions.max()

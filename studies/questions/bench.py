@@ -229,8 +229,11 @@ def figure(folder: Folder) -> None:
         axes.set_xlabel("triangles", fontsize=SMALL)
         axes.set_ylabel("seconds", fontsize=SMALL)
         axes.set_title(f"{case}: from the start to rest", fontsize=SMALL)
+    canvas.axes[0].plot(
+        [], [], "o", markersize=5, color="black", markerfacecolor="white", label="not at rest"
+    )
     handles, labels = canvas.axes[0].get_legend_handles_labels()
-    canvas.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False)
+    canvas.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
     finish(canvas, folder.figure("bench"))
 
 

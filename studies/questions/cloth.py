@@ -201,18 +201,22 @@ def figure(folder: Folder) -> None:
     """How shape and stress come back as strips get narrower."""
     from pcmc.plot import lines
 
-    records = folder.read_table("records")
-    curves: dict[str, Any] = {}
-    for name, given in _series(records):
-        far = {f"{name}, away from its corner": "away_"} if name == CORNERED else {}
-        for label, before in ({name: ""} | far).items():
-            curves[f"{label}: shape"] = given["width"], given[f"{before}shape" if before else "moved"]
-            curves[f"{label}: stress"] = given["width"], given[f"{before}stress_rms"]
-    ends = np.array([0.045, 0.15])
-    curves["order 2"] = ends, 0.005 * (ends / ends[1]) ** 2
-    look: dict[str, Any] = {"x": "mean width of the strips, over the size", "y": "off, over the size or α/t"}
-    look |= {"xscale": "log", "yscale": "log", "markers": True}
-    lines(curves, folder.figure("sewn"), title="Strips sewn together again", **look)
+    records, ends = folder.read_table("records"), np.array([0.045, 0.15])
+    for what, column, away, off in (
+        ("shape", "moved", "away_shape", "distance over the size"),
+        ("stress", "stress_rms", "away_stress_rms", "rms of the difference from α/t, over α/t"),
+    ):
+        curves: dict[str, Any] = {}
+        for name, given in _series(records):
+            curves[name] = given["width"], given[column]
+            if name == CORNERED:
+                curves[f"{name}, away from its corner"] = given["width"], given[away]
+        curves["order 2"] = ends, 0.5 * curves["cap"][1].iloc[0] * (ends / ends[1]) ** 2
+        look: dict[str, Any] = {"x": "mean width of the strips, over the size", "y": off}
+        look |= {"xscale": "log", "yscale": "log", "markers": True}
+        lines(
+            curves, folder.figure(f"sewn-{what}"), title=f"The {what} of strips sewn together again", **look
+        )
 
 
 STUDY = Study(

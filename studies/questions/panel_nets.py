@@ -160,6 +160,7 @@ def figure(folder: Folder) -> None:
         titles=drawn,
         label="distance of the diagonals over their length, %",
         limits=(0.0, 1.0),
+        cmap="YlGnBu",
         edges=False,
         supports=False,
         one_scale=False,

@@ -13,6 +13,7 @@ from generators import barrel, catenoid, joined_caps, spherical_cap, two_caps, t
 from generators.catenary import FOLD
 from pcmc import Cable, Patch, Surface, certify, margin, solve
 from pcmc.accuracy import MarginEnd
+from pcmc.accuracy.margins import End
 from pcmc.accuracy.varied import named
 from pcmc.base.errors import OptionError, SurfaceError
 from studies.reference import evolver
@@ -133,6 +134,36 @@ def test_ridges_that_come_to_rest_do_not_end_it():
     assert found.factor == 2.0
     assert "ridges come to rest" in found.detail
     assert found.text().startswith("holds at least up to 2 times the tension of wall (no end found")
+
+
+@pytest.mark.parametrize(
+    ("kind", "tension", "text"),
+    [
+        (MarginEnd.NONE, 1.5, "the pressures do not cancel: 2 is left over"),
+        (MarginEnd.MESH, 0.1, "only a mesh as coarse as this is at rest here"),
+    ],
+)
+def test_what_is_known_beside_the_end_is_told_in_units_of_what_is_added(monkeypatch, kind, tension, text):
+    """λ = 1 is snow as heavy as the pressure, 2."""
+    roof = cap().retensioned({"cap": 1.5}, {"cap": 2.0})
+    held = roof.fixed & ((roof.vertices[:, 0] > 0.0) | (kind is MarginEnd.MESH))
+    end = End(
+        kind,
+        0.5,
+        roof.retensioned({"cap": tension}).rebuilt(fixed=held),
+        np.zeros((roof.n, 3)),
+        contacts=(0.2,),
+    )
+    monkeypatch.setattr("pcmc.accuracy.margins.find_end", lambda *_, **__: end)
+    found = margin(roof, "snow", meshes=1)
+    assert found.value == 1.0
+    assert [told in found.detail for told in ("on the way: at 0.4", text)] == [True, True]
+    assert len(re.findall("do not cancel|only a mesh", found.detail)) == 1
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_sheet_that_moves_is_named(side):
+    assert margin(solve(two_squares(4)), f"pressure of {side}", meshes=1).where == f"'{side}' inflates"
 
 
 def test_names():

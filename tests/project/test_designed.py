@@ -145,6 +145,9 @@ def test_the_cache_can_be_switched_off_and_need_not_be_writable(folder, monkeypa
     monkeypatch.setenv("PCMC_CACHE", str(folder / "roof.toml"))  # no folder
     assert designed("roof.toml").good
     assert not designed("roof.toml").cached
+
+
+def test_a_cache_that_is_off_has_no_roof(folder, monkeypatch):
     monkeypatch.setenv("PCMC_CACHE", "off")
     assert designed("roof.toml").good
     assert not designed("roof.toml").cached

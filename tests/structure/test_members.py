@@ -31,18 +31,19 @@ TUBE = Profile.tube(0.1, 0.005)
 
 
 @cache
-def hall():
-    """Two bays with a wall between them, at rest."""
-    bays = {name: {"tension": 1.5, "pressure": 0.3} for name in ("west", "east")}
-    line = {"curve": [[6, 0], [6, 8]], "wall": 0.6}
+def hall(scale=1.0, east=0.3, wall=0.6):
+    """Two bays with a wall between them, at rest; all forces times a scale."""
+    bays = {"west": (1.5, 0.3), "east": (1.5, east)}
+    bays = {name: {"tension": a * scale, "pressure": p * scale} for name, (a, p) in bays.items()}
+    line = {"curve": [[6, 0], [6, 8]], "wall": wall * scale}
     return pcmc.solve(
         Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [line], edge_length=1.2, patches=bays).surface()
     )
 
 
-def hall_with(member=None, **more):
+def hall_with(member=None, of=None, **more):
     member = member or Member("wall 1", TUBE, STEEL)
-    return StructuralModel(hall(), Material(5e5, 0.2, 1.2), 0.001, members=[member], **more)
+    return StructuralModel(of or hall(), Material(5e5, 0.2, 1.2), 0.001, members=[member], **more)
 
 
 @cache
@@ -240,13 +241,22 @@ def test_the_picture_of_forces_has_a_column_per_member_and_refuses_a_wrong_name(
         member_forces(analyse(model_of(square(4, tension=2.0), anyway=True)))
 
 
-def test_a_cable_in_the_place_of_a_wall_has_the_tension_that_balances_best():
-    model = hall_with(Member("wall 1", Profile(1e-4, 1e-9), STEEL, kind="cable"))
-    [cable], [beam] = model.standing.cables, members_at_rest(hall_with())
+@pytest.mark.parametrize("of", [{}, {"scale": 0.05, "east": 0.15}], ids=["even", "wall under pressure"])
+def test_a_cable_in_the_place_of_a_wall_has_the_tension_that_balances_best(of):
+    model = hall_with(Member("wall 1", Profile(1e-4, 1e-9), STEEL, kind="cable"), hall(**of))
+    [cable], [beam] = model.standing.cables, members_at_rest(hall_with(of=hall(**of)))
     assert cable.name == "wall 1"
-    assert cable.tension == pytest.approx(beam.balance[0], rel=0.05)
+    assert cable.tension == pytest.approx(beam.balance[0], rel=1e-4)
     assert model.cable_sections[0] == (1e-4, STEEL)
     assert not model.beams
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_taut_line_pulls_its_ends_as_it_pulls_the_points_between(closed):
+    """The forces of one tension add up to nothing, and have no moment."""
+    P = np.random.default_rng(0).normal(size=(6, 3))
+    forces = turns(P, closed)
+    np.testing.assert_allclose([forces.sum(axis=0), np.cross(P, forces).sum(axis=0)], 0.0, atol=1e-12)
 
 
 def test_a_member_that_cannot_be_is_refused_in_a_line():
@@ -258,6 +268,8 @@ def test_a_member_that_cannot_be_is_refused_in_a_line():
         hall_with(Member("wall 2", TUBE, STEEL))
     with refused(OptionError, what="members", found="west"):
         hall_with(Member("west", TUBE, STEEL))
+    with refused(OptionError, what="members", where="wall 1"):  # its junction rests, but for a third of it
+        hall_with(of=hall(wall=1.4))
     with refused(OptionError, what="members", where="member"):
         lines(cap, Member(polyline([[5, 5], [6, 6]]), TUBE, STEEL))
     with refused(OptionError, what="Member.propped"):

@@ -167,6 +167,18 @@ def test_cables_have_their_tension_and_need_an_area(tmp_path):
     np.testing.assert_allclose(cable[:, 2:5].sum(axis=1), 3e4)
 
 
+def test_elements_are_numbered_in_turn_faces_first_then_cable_after_cable(tmp_path):
+    sail = hypar_roof(4)
+    found = written(tmp_path, model_of(sail, cable_area=1e-4, anyway=True))
+    elements = [row for key, rows in found.items() if key.startswith("*ELEMENT") for row in rows]
+    assert [int(row[0]) for row in elements] == list(range(1, len(elements) + 1))
+    edges = [cable.edges for cable in sail.cables]
+    assert len(edges) > 1
+    np.testing.assert_array_equal(
+        [[int(v) - 1 for v in row[1:]] for row in elements[sail.m :]], np.concatenate(edges)
+    )
+
+
 @pytest.mark.parametrize(
     ("given", "what"),
     [
