@@ -24,7 +24,7 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..certificate.forces import Forces, held_boundary
 from ..certificate.measures import MEASURES, largest_pull
 from ..certificate.tables import names_of
@@ -158,11 +158,7 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
         return slope
     if quantity in ("area", "volume"):
         return MEASURES[quantity].measure(surface, of or None).by_position
-    # those of the held boundary, or of its curves with the name of a patch
-    acting, topo, patch = Forces.of(surface), surface.topology, of.split(" near (")[0]
-    vertices = np.unique(topo.edges[held_boundary(surface)])
-    curves = [c.vertices for c in topo.boundary_loops if names_of(surface, c.sheets) == patch]
-    vertices = np.intersect1d(vertices, np.concatenate(curves)) if curves else vertices
+    acting, vertices = Forces.of(surface), _held_vertices(surface, of)
     if quantity == "reaction per length":
         inside = np.isin(surface.topology.edges, vertices).all(axis=1)
         return largest_pull(acting, inside & acting.along_patch(None)).by_position
@@ -172,6 +168,14 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
         total = surface.plane.along(acting.along[vertices].sum(axis=0))
         pull[vertices] = total / (np.linalg.norm(total) or 1.0)
     return _reaction_slope(surface, pull)
+
+
+def _held_vertices(surface: Surface, of: str) -> Ints:
+    """The vertices of the held boundary, or of its curves with the name of a patch."""
+    topo, patch = surface.topology, of.split(" near (")[0]
+    held = np.unique(topo.edges[held_boundary(surface)])
+    curves = [c.vertices for c in topo.boundary_loops if names_of(surface, c.sheets) == patch]
+    return np.intersect1d(held, np.concatenate(curves)) if curves else held
 
 
 def _reaction_slope(surface: Surface, pull: Floats) -> Floats:

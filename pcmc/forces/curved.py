@@ -37,7 +37,7 @@ from ..surface.geometry import (
     vector,
 )
 from ..surface.lagrange import Shapes
-from .mesh import Mesh
+from .elements import Mesh
 
 
 @inlined

@@ -51,7 +51,7 @@ from ..surface.topology import (
     vertex_kind,
 )
 from .cables import laws_on, squared_cable_forces
-from .mesh import Mesh, energy_mesh
+from .elements import Mesh, energy_mesh
 from .triangles import effective_tensions
 
 

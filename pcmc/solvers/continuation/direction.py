@@ -17,7 +17,7 @@ from ...base import validate
 from ...base.arrays import Floats
 from ...base.errors import OptionError
 from ...base.tolerances import ON_BRANCH
-from ...forces.parameters import Rates, energy_by, gradient_by
+from ...forces.functional import Rates, energy_by, gradient_by
 from ...forces.rooms import refuse_varied_pressure
 from ...surface import Surface
 from ...surface.supports import apply_supports
