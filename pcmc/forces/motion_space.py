@@ -195,13 +195,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
 
 @compiled
 def _fill(
-    kind: Ints,
-    normal: Floats,
-    chord: Floats,
-    freedom: Ints,
-    axis: Floats,
-    basis: Floats,
-    dimension: Ints,
+    kind: Ints, normal: Floats, chord: Floats, freedom: Ints, axis: Floats, basis: Floats, dimension: Ints
 ) -> None:
     """The basis at each vertex, from the shape's normal or chord and what the supports admit."""
     none = (0.0, 0.0, 0.0)

@@ -9,13 +9,7 @@ from typing import Any
 from ..base.arrays import Bools
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
-from ..certificate.balance import (
-    growing_part,
-    hardly_balanced,
-    load_name,
-    load_ratio,
-    overload,
-)
+from ..certificate.balance import growing_part, hardly_balanced, load_name, load_ratio, overload
 from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..certificate.verdict import theorems
