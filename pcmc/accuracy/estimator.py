@@ -29,7 +29,7 @@ from ..certificate.forces import Forces, held_boundary
 from ..certificate.measures import MEASURES, largest_pull
 from ..certificate.tables import names_of
 from ..forces.functional import energy_and_gradient
-from ..meshing.sizes import limit_growth, triangles_for
+from ..meshing.curve_cutting import limit_growth, triangles_for
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest

@@ -242,12 +242,17 @@ def _value(text: str) -> Any:
     return number if isinstance(number, int | float) else text
 
 
-def numbers(text: str, flag: str, expected: str = "numbers, with commas between them") -> list[float]:
-    """The numbers in X,Y,..."""
+def numbers(
+    text: str, flag: str, expected: str = "numbers, with commas between them", size: int = 0
+) -> list[float]:
+    """The numbers in X,Y,..., which must be ``size`` if that is not 0."""
     try:
-        return [validate.parsed(part) for part in text.split(",")]
+        found = [validate.parsed(part) for part in text.split(",")]
     except ValueError:
+        found = []
+    if not found or (size and len(found) != size):
         validate.refuse(flag, text, expected)
+    return found
 
 
 def parsed_view(text: str) -> Any:

@@ -13,8 +13,9 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
+from ..drawings.drawing_set import table_paths
 from ..drawings.net_drawings import SUFFIXES as NETS
-from ..drawings.net_drawings import net_files, net_paths
+from ..drawings.net_drawings import TABLES, net_files
 from ..io import FORMATS, write
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
@@ -114,8 +115,8 @@ def panels_(
     validate.positive("--tolerance", tolerance)
     if change is not None:
         validate.positive("--change", change)
-    prices = None if cost is None else arguments.numbers(cost, "--cost", TWO)
-    if prices is not None and (len(prices) != 2 or min(prices) < 0.0 or change is None):
+    prices = None if cost is None else arguments.numbers(cost, "--cost", TWO, 2)
+    if prices is not None and (min(prices) < 0.0 or change is None):
         validate.refuse("--cost", cost, TWO, hint="; it needs --change" if change is None else "")
     outputs = Output(picture=picture, view=seen).paths
     for path in files:
@@ -171,7 +172,8 @@ def _net(
     """Lay out quads or hexagons and write them."""
     for path in files:
         suffix_of(path, NETS, "a net of panels")
-    outputs = Output(picture=picture, view=seen).paths + [one for path in files for one in net_paths(path)]
+    outputs = Output(picture=picture, view=seen).paths
+    outputs += [one for path in files for one in table_paths(path, TABLES)]
     check_outputs(outputs, inputs=files_of(file))
     size, pattern, direction = wanted
     with working() as progress:
@@ -208,9 +210,7 @@ def draw_(
     """
     arguments.output_of(file, drawings=output)
     heights = None if height is None else [parsed_number(text) for text in height]
-    points = [arguments.numbers(text, "--line", FOUR) for text in line or ()]
-    if wrong := [text for text, ends in zip(line or (), points, strict=True) if len(ends) != 4]:
-        validate.refuse("--line", wrong[0], FOUR)
+    points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
     lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
         roof = build.roof(arguments.load(file, units), progress)

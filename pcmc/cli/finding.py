@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from .. import project as projects
-from ..base.errors import OptionError
 from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
@@ -17,6 +16,7 @@ from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
 SPAN = "Least and largest factor on it; by default 0.5,1.5. Of what is 0 now, least and largest value."
+FACTORS = "LOW,HIGH such as 0.5,1.5"
 STARTS = "Starts of deflated Newton around each equilibrium."
 CHECK = "Check the mesh of each: whether finer meshes have it, too."
 VERTICAL = "Vertical axis of the diagram: height, energy or volume."
@@ -49,19 +49,18 @@ def equilibria(
     """
     from ..equilibria import find_equilibria
     from ..plot import equilibria as diagram
-    from ..plot.branches import SHOWN
+    from ..plot.uses import BRANCH_VALUES
 
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format
     check_outputs(files, inputs=files_of(file))
-    arguments.validate.choice("--axis", axis, SHOWN)
+    arguments.validate.choice("--axis", axis, BRANCH_VALUES)
+    ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
         roof = what.roof(load(file, units), progress, whole=False)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}
-        found = find_equilibria(
-            roof.surface, along or "pressure", callback=progress, span=_span(span), **options
-        )
+        found = find_equilibria(roof.surface, along or "pressure", callback=progress, span=ends, **options)
         jobs: list[Any] = []
         for path in files:
             if path.suffix.lower() in PICTURES:
@@ -78,15 +77,3 @@ def equilibria(
     if written:
         print(f"written: {', '.join(map(str, written))}")
     return OK
-
-
-def _span(text: str | None) -> tuple[float, float] | None:
-    """The numbers in LOW,HIGH."""
-    if text is None:
-        return None
-    try:
-        low, high = map(arguments.parsed_number, text.split(","))
-    except ValueError:
-        message = f"--span: expected LOW,HIGH such as 0.5,1.5, found {text!r}"
-        raise OptionError(message, what="--span", found=text) from None
-    return low, high

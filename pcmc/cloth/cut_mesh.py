@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -63,19 +64,18 @@ class CutMesh:
     def pieces(self) -> Pieces:
         """The pieces that it falls into, each with vertices of its own."""
         topo = self.topology
-        inner = np.flatnonzero(~self.cut_edge[topo.edge_of_face.ravel()])
-        one, other = inner[np.argsort(topo.edge_of_face.ravel()[inner], kind="stable")].reshape(-1, 2).T
+        uncut = ~self.cut_edge[topo.edge_of_face.ravel()[topo.neighbours[:, 0]]]
+        one, other = topo.neighbours[uncut].T
         start, end = (3 * (one // 3) + (one % 3 + step) % 3 for step in (1, 2))  # corners at its ends
         # both triangles have the same outside, so the neighbour runs along the edge the other way
         end_too, start_too = (3 * (other // 3) + (other % 3 + step) % 3 for step in (1, 2))
         pairs = np.stack([np.append(start, end), np.append(start_too, end_too)], axis=1)
         corner = self.F.ravel()
-        label = components(pairs, 3 * len(self.F)).astype(np.int64)
+        label = components(pairs, 3 * len(self.F))
         vertex = np.empty(label.max() + 1, dtype=np.int64)
         vertex[label] = corner
-        faces = label.reshape(-1, 3)
-        piece = components(np.stack([one // 3, other // 3], 1), len(self.F)).astype(np.int64)
-        return Pieces(faces, vertex, piece)
+        piece = components(np.stack([one // 3, other // 3], 1), len(self.F))
+        return Pieces(label.reshape(-1, 3), vertex, piece)
 
     def with_points(self, ends: Ints, points: Floats) -> CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
@@ -140,27 +140,16 @@ class CutMesh:
             raise OptionError(text, what="seams", where=number)
         if faces is not None and (wanted := np.isin(both, self.pieces.piece[faces])).any():
             both = both[wanted]
-        path, piece = self._geodesic(start, end, both)
-        place, share = self._on_edges(path, piece)
-        return self._along(place, share, path, number, name)
-
-    def _geodesic(self, start: int, end: int, candidates: Ints) -> tuple[Floats, int]:
-        """(k,3) points of the shortest path that edge flips find, and its piece, among the ``candidates``."""
-        library = load_library("potpourri3d", "cloth")
-        best: tuple[float, Floats, int] | None = None
-        for piece in candidates.tolist():
-            faces = self.pieces.faces[self.pieces.piece == piece]
-            used, local = np.unique(faces, return_inverse=True)
+        library, found = load_library("potpourri3d", "cloth"), list[tuple[float, Floats, int]]()
+        for piece in both.tolist():
+            used, local = np.unique(self.pieces.faces[self.pieces.piece == piece], return_inverse=True)
             vertex = self.pieces.vertex[used]
             solver = library.EdgeFlipGeodesicSolver(self.X[vertex], local.reshape(-1, 3))
-            for a in np.flatnonzero(vertex == start).tolist():
-                for b in np.flatnonzero(vertex == end).tolist():
-                    path = np.asarray(solver.find_geodesic_path(a, b))
-                    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-                    if best is None or length < best[0]:
-                        best = length, path, piece
-        assert best is not None
-        return best[1], best[2]
+            for ends in product(*(np.flatnonzero(vertex == v).tolist() for v in (start, end))):
+                path = np.asarray(solver.find_geodesic_path(*ends))
+                found.append((float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), path, piece))
+        _, path, piece = min(found, key=lambda one: one[0])
+        return self._along(*self._on_edges(path, piece), path, number, name)
 
     def _on_edges(self, path: Floats, piece: int) -> tuple[Ints, Floats]:
         """(k,2) the edge of the piece that each point of a path is on, and (k,) where: 0 to 1."""

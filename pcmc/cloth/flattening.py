@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, vstack
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Floats, Ints
@@ -59,10 +59,7 @@ def flattened(
     free[pins] = False
     gradient, root = _gradients(X[F]), np.sqrt(face_areas(X[F]))
     y = _conformal(F, gradient, root, pins, places, len(X)) if start is None else start
-    free[pins[1::4]], free[pins[2::4]] = (
-        False,
-        True,
-    )  # the second point may move along x
+    free[pins[2::4]] = True  # the second point may move along x
     lengths = np.linalg.norm(X[seams.one[:, 1]] - X[seams.one[:, 0]], axis=1)
 
     def misfit(y: Floats) -> tuple[Floats, csr_array]:
@@ -173,6 +170,4 @@ def _misfit(
     slopes = [weight[:, None] * c * stretch[side[:, 0]] for c, side in zip(cut, seams, strict=True)]
     rows = np.concatenate([-slopes[0], slopes[0], slopes[1], -slopes[1]], axis=1)
     B = _sparse(rows, _columns(np.concatenate(list(seams), axis=1)), y.size)
-    from scipy.sparse import vstack
-
     return np.concatenate([strain.ravel(), weight * (squares[0] - squares[1])]), vstack([A, B]).tocsr()

@@ -28,12 +28,7 @@ class ClothSheet:
     patch: str
     along: Floats  # (3,) unit vector of the warp
     across: Floats  # (3,) unit vector; the seams lie near to levels of x · across
-    levels: Floats  # (k,) ascending, with both ends: k - 1 strips
-
-    @property
-    def inner(self) -> Floats:
-        """The levels of seams."""
-        return self.levels[1:-1]
+    levels: Floats  # (k,) ascending, with both ends: k - 1 strips, seams between
 
 
 def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, Floats]:
@@ -94,7 +89,9 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: In
     for sheet in sheets:
         meet, mine = MEET * float(np.diff(sheet.levels).min()), sheet_of_source[mesh.source] == sheet.number
         height = mesh.X @ sheet.across  # a geodesic may cross the next level, so all ends come first
-        lines = [line for level in sheet.inner.tolist() for line in level_ends(mesh, mine, height, level)]
+        lines = [
+            line for level in sheet.levels[1:-1].tolist() for line in level_ends(mesh, mine, height, level)
+        ]
         for line in lines:
             vertices = []
             for point in line:
@@ -123,7 +120,19 @@ def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
     for number, line in enumerate(lines):
         name, previous = f"seam {number + 1}", -1
         for k, point in enumerate(line):
-            mesh, vertex = _with_drawn(mesh, point, plane, k in (0, len(line) - 1), name)
+            weights, f, away = _seen(mesh, point, plane)
+            reach = float(segment_lengths(mesh.X, mesh.topology.edges[mesh.topology.edge_of_face[f]]).max())
+            if away > reach:
+                text = f"{name}: its point {point_text(point)} is off the roof, {away:.3g} from it; move it"
+                raise OptionError(text, what="seams", found=point.tolist())
+            place = weights @ mesh.X[mesh.F[f]]
+            if k in (0, len(line) - 1):
+                rim = mesh.topology.edges[mesh.cut_edge]
+                on_rim, gap = nearest_places(mesh.X[np.column_stack([rim, rim[:, 1]])], place)
+                near = int(gap.argmin())
+                if gap[near] <= reach:
+                    place = on_rim[near] @ mesh.X[[*rim[near], rim[near, 1]]]
+            mesh, vertex = mesh.with_vertex(place, np.ones(len(mesh.F), dtype=bool))
             if k:
                 middle = _seen(mesh, 0.5 * (point + line[k - 1]), plane)[1]
                 faces = mesh.pieces.piece == mesh.pieces.piece[middle]
@@ -140,20 +149,3 @@ def _seen(mesh: CutMesh, point: Floats, plane: Plane) -> tuple[Floats, int, floa
     height = np.einsum("mi,mi->m", weights, plane.height(mesh.X)[mesh.F])
     f = int(np.where(away <= away.min() + ON * mesh.size, height, -np.inf).argmax())
     return weights[f], f, float(away[f])
-
-
-def _with_drawn(mesh: CutMesh, point: Floats, plane: Plane, end: bool, name: str) -> tuple[CutMesh, int]:
-    """The mesh with a vertex at a drawn point, and its number."""
-    weights, f, away = _seen(mesh, point, plane)
-    reach = float(segment_lengths(mesh.X, mesh.topology.edges[mesh.topology.edge_of_face[f]]).max())
-    if away > reach:
-        text = f"{name}: its point {point_text(point)} is off the roof, {away:.3g} from it; move it"
-        raise OptionError(text, what="seams", found=point.tolist())
-    place = weights @ mesh.X[mesh.F[f]]
-    if end:
-        rim = mesh.topology.edges[mesh.cut_edge]
-        gap = nearest_places(mesh.X[np.column_stack([rim, rim[:, 1]])], place)
-        k = int(gap[1].argmin())
-        if gap[1][k] <= reach:
-            place = gap[0][k] @ mesh.X[[*rim[k], rim[k, 1]]]
-    return mesh.with_vertex(place, np.ones(len(mesh.F), dtype=bool))

@@ -90,7 +90,12 @@ def cutting_pattern_of(
     widest: list[float] = []
     for _ in range(ROUNDS):
         mesh = with_levels(base, sheets, sheet_of_source)
-        _refuse_closed(surface, mesh)
+        piece = mesh.pieces.piece
+        opened = np.unique(piece[mesh.cut_edge[mesh.topology.edge_of_face].any(axis=1)])
+        for closed in np.setdiff1d(piece, opened).tolist():
+            name = surface.patches[surface.patch_of_face[mesh.source[piece == closed][0]]].name
+            text = f"patch {name!r} is closed, without a rim: no seam starts anywhere;"
+            raise SurfaceError(f"{text} draw seams that open it", what="surface", where=name)
         cloth = Cloth.of(surface, mesh, sheets, sheet_of_source, options)
         flat = cloth.laid_flat()
         moved = _moved_levels(cloth, flat, sheets, options, widest)
@@ -140,16 +145,6 @@ def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> tuple[l
             ClothSheet(len(sheets), name, along, across, np.linspace(low, high, max(number, 1) + 1))
         )
     return sheets, sheet_of_source
-
-
-def _refuse_closed(surface: Surface, mesh: CutMesh) -> None:
-    """SurfaceError for a piece that has no outline."""
-    piece = mesh.pieces.piece
-    opened = np.unique(piece[mesh.cut_edge[mesh.topology.edge_of_face].any(axis=1)])
-    for closed in np.setdiff1d(piece, opened).tolist():
-        name = surface.patches[surface.patch_of_face[mesh.source[piece == closed][0]]].name
-        text = f"patch {name!r} is closed, without a rim: no seam starts anywhere; draw seams that open it"
-        raise SurfaceError(text, what="surface", where=name)
 
 
 def _moved_levels(
@@ -211,7 +206,7 @@ def _pattern(
     flat: Flat,
     stretches: Sequence[tuple[float, float]],
 ) -> CuttingPattern:
-    """The strips and seams of a cloth laid flat."""
+    """The strips and seams of a cloth laid flat; OptionError for a strip that no cloth follows."""
     mesh, sides = cloth.mesh, cloth.sides
     local = np.empty(len(cloth.X), dtype=np.int64)
     strips = []
@@ -230,21 +225,15 @@ def _pattern(
             strain=flat.strain[mine],
             outlines=loops(local, sides, sides.strip == k),
         )
-        _refuse_folded(strip)
         strips.append(strip)
+        outline, *holes = (strip.cut[loop] for loop in strip.outlines)
+        strain, problem = float(np.abs(strip.strain).max()), ""
+        if strain > 0.5 * FOLDED or not load_library("shapely", "cloth").Polygon(outline, holes).is_valid:
+            problem = "lies over itself"
+        elif strain > MOST_STRAIN:
+            problem = f"stretches by {100.0 * strain:.0f} %"
+        if problem:
+            text = f"strip {strip.number} of patch {strip.patch!r} {problem} where it is laid flat: no cloth"
+            text += " follows it; make strips narrower, or draw a seam that opens it"
+            raise OptionError(text, what="width")
     return CuttingPattern(surface, certificate, options, strips, seams_of(cloth, local))
-
-
-def _refuse_folded(strip: Strip) -> None:
-    """OptionError for a strip that no cloth follows."""
-    outline, *holes = (strip.cut[loop] for loop in strip.outlines)
-    strain, problem = float(np.abs(strip.strain).max()), ""
-    if strain > 0.5 * FOLDED or not load_library("shapely", "cloth").Polygon(outline, holes).is_valid:
-        problem = "lies over itself"
-    elif strain > MOST_STRAIN:
-        problem = f"stretches by {100.0 * strain:.0f} %"
-    if problem:
-        text = (
-            f"strip {strip.number} of patch {strip.patch!r} {problem} where it is laid flat: no cloth follows"
-        )
-        raise OptionError(f"{text} it; make strips narrower, or draw a seam that opens it", what="width")

@@ -23,7 +23,7 @@ KINDS = ("seam", "junction", "rim")  # in the order of their numbers
 
 
 class StripSides(NamedTuple):
-    """StripSides of triangles along cuts, sorted by edge."""
+    """The sides of triangles along cuts, sorted by edge."""
 
     edge: Ints  # (b,) of the mesh
     ends: Ints  # (b,2) vertices of pieces, first the lower one in the mesh
@@ -123,27 +123,22 @@ class Cloth:
         none = SewnEdges(np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64))
         F, ones = self.mesh.pieces.faces, np.ones((len(self.X), 2))
         flat = flattened(self.X, F, self.strip_of_vertex, none, ones)
-        points = flat.points.copy()
+        points, angles = flat.points.copy(), np.radians(np.arange(0.0, 180.0, 0.5))
         for k, along in enumerate(self.along):
-            mine = self.strip_of_vertex == k
-            points[mine] = _turned(points[mine], self._warp(k, along, flat.points))
+            mine, faces = self.strip_of_vertex == k, F[self.strip_of_face == k]
+            if along is None:  # the direction across which it is narrowest
+                c, s = np.cos(angles), np.sin(angles)
+                narrow = np.ptp(points[mine] @ np.stack([-s, c]), axis=0).argmin()
+                c, s = c[narrow], s[narrow]
+            else:
+                P, Q = self.X[faces], flat.points[faces]
+                edges, flat_edges = P[:, 1:] - P[:, :1], Q[:, 1:] - Q[:, :1]
+                # along = share · edges, and a part normal to the triangle
+                share = np.linalg.solve(edges @ edges.transpose(0, 2, 1), (edges @ along)[:, :, None])
+                warp = (face_areas(P)[:, None] * (share * flat_edges).sum(axis=1)).sum(axis=0)
+                c, s = warp / (np.linalg.norm(warp) or 1.0)
+            points[mine] = points[mine] @ np.array([[c, -s], [s, c]])
         return flat._replace(points=points)
-
-    def _warp(self, k: int, along: Floats | None, points: Floats) -> Floats:
-        """(2,) where the direction of the warp lies on a flat strip."""
-        mine = self.strip_of_face == k
-        faces = self.mesh.pieces.faces[mine]
-        if along is None:
-            ends = points[np.unique(faces)]
-            angles = np.radians(np.arange(0.0, 180.0, 0.5))
-            axes = np.stack([-np.sin(angles), np.cos(angles)])
-            return np.array([axes[1], -axes[0]])[:, np.ptp(ends @ axes, axis=0).argmin()]
-        P, Q = self.X[faces], points[faces]
-        edges = np.stack([P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]], axis=1)
-        flat = np.stack([Q[:, 1] - Q[:, 0], Q[:, 2] - Q[:, 0]], axis=1)
-        gram = edges @ edges.transpose(0, 2, 1)
-        share = np.linalg.solve(gram, (edges @ along)[:, :, None])[:, :, 0]  # along = share · edges + normal
-        return (face_areas(P)[:, None] * np.einsum("mi,mij->mj", share, flat)).sum(axis=0)
 
     def sewn(self, flat: Flat, stretch: Sequence[tuple[float, float]]) -> Flat:
         """The strips with sides of seams that are equally long once they are cut."""
@@ -154,12 +149,6 @@ class Cloth:
         by_vertex = np.array(stretch)[self.strip_of_vertex]
         F = self.mesh.pieces.faces
         return flattened(self.X, F, self.strip_of_vertex, seams, by_vertex, flat.points)
-
-
-def _turned(points: Floats, axis: Floats) -> Floats:
-    """Points (v,2) turned so that ``axis`` lies along x, their longer half below."""
-    c, s = axis / (np.linalg.norm(axis) or 1.0)
-    return points @ np.array([[c, -s], [s, c]])
 
 
 def loops(local: Ints, sides: StripSides, mine: Bools) -> list[Ints]:

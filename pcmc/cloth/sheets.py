@@ -6,38 +6,29 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
-from ..base.files import suffix_of
 from ..base.libraries import load_library
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate.certificate import warning_mark
 from ..drawings import DrawingSet, Sheet
-from ..drawings.drawing_set import DECIMALS
+from ..drawings.drawing_set import CSV, DECIMALS, document_files
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import SheetLine, Text, add_frames, table_sheets
 from ..drawings.views import DrawnView, placed
-from ..surface.geometry import cross_2d
+from ..surface.geometry import cross_2d, unit_vectors
 from .strips import CuttingPattern, Seam, Side, Strip
 
-SUFFIXES = (*DRAWINGS, ".csv")
+SUFFIXES, TABLES = (*DRAWINGS, CSV), ("", "seams")  # tables of strips and of seams
 LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "rim": "PCMC-RIM"}
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
 MITRE = 3.0  # of an allowance: farther from its corner cloth is cut across
 ARROW = 0.3  # of a strip's length: the arrow of its warp
-
-
-class StripLabel(NamedTuple):
-    """A text beside an edge of a strip."""
-
-    at: Floats  # (2,)
-    text: str
-    inward: Floats  # (2,) unit vector away from the edge
 
 
 def pattern_drawings(
@@ -60,14 +51,12 @@ def pattern_drawings(
     """
     length = expect_length(as_units(units).length, "a cutting pattern")
     millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
-    curves, middles = _curves(pattern), _middles(pattern)
     size = sheet, millimetres, None, decimals
     sheets = [seam_sheet(pattern, *size)]
     for first in range(0, len(pattern.strips), PER_SHEET):
         group = pattern.strips[first : first + PER_SHEET]
         title = f"Strips {group[0].number} to {group[-1].number}, outside up"
-        views = [_strip_view(pattern, strip) for strip in group]
-        sheets.append(placed(views, title, *size))
+        sheets.append(placed([_strip_view(pattern, strip) for strip in group], title, *size))
     head = {"area": f"area, {length}²", "cut_area": f"cut area, {length}²", "strain_min": "strain from, %"}
     head |= {"strain_max": "to, %", "strain_rms": "mean, %", "warp": "warp shorter, %", "weft": "weft, %"}
     table = _texts(pattern.table, decimals, "length", "width")
@@ -77,19 +66,10 @@ def pattern_drawings(
         table = _texts(sewn, decimals, "length", "cut_length")
         sheets += table_sheets("Seams", table.rename(columns={"cut_length": "cut length"}), sheet, 2)
     add_frames(sheets, name, length, warning_mark(pattern.certificate))
-    points = pd.DataFrame(
-        [[str(s.number), *at, "strip"] for s, at in zip(pattern.strips, middles, strict=True)],
-        columns=["point", *"xyz", "on"],
-    )
-    about = pattern.surface, length, pattern.certificate, curves
+    rows = [[str(strip.number), *at, "strip"] for strip, at in _middles(pattern)]
+    points = pd.DataFrame(rows, columns=["point", *"xyz", "on"])
+    about = pattern.surface, length, pattern.certificate, _curves(pattern)
     return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets)
-
-
-def table_paths(path: Path) -> list[Path]:
-    """The files that one of a pattern is: those of a .csv are the tables of strips and of seams."""
-    return (
-        [path, path.with_name(f"{path.stem}-seams{path.suffix}")] if path.suffix.lower() == ".csv" else [path]
-    )
 
 
 def pattern_files(
@@ -100,16 +80,9 @@ def pattern_files(
     name: str = "",
 ) -> list[tuple[Path, Callable[[Path], Any]]]:
     """Each file of a cutting pattern with the function that writes it; FileError for an unknown suffix."""
-    given = list(map(Path, paths))
-    drawn = [path for path in given if suffix_of(path, SUFFIXES, "a cutting pattern") != ".csv"]
-    jobs: list[tuple[Path, Callable[[Path], Any]]] = []
-    if drawn:
-        jobs += pattern_drawings(pattern, units, sheet=sheet, name=name).files(*drawn)
-    for path in given:
-        if path not in drawn:
-            tables = zip(table_paths(path), (pattern.table, pattern.seam_table), strict=True)
-            jobs += [(file, partial(table.to_csv, index=False)) for file, table in tables]
-    return jobs
+    tables = dict(zip(TABLES, (pattern.table, pattern.seam_table), strict=True))
+    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name)
+    return document_files(paths, draw, tables, {}, "a cutting pattern")
 
 
 def _texts(table: pd.DataFrame, decimals: int, *lengths: str) -> pd.DataFrame:
@@ -122,9 +95,9 @@ def _curves(pattern: CuttingPattern) -> list[SheetLine]:
     return [SheetLine(seam.points, LAYER_OF[seam.kind], name=f"S{seam.number}") for seam in pattern.seams]
 
 
-def _middles(pattern: CuttingPattern) -> list[Floats]:
-    """(3,) the middle of each strip on the roof."""
-    return [strip.areas @ strip.roof[strip.faces].mean(axis=1) / strip.area for strip in pattern.strips]
+def _middles(pattern: CuttingPattern) -> list[tuple[Strip, Floats]]:
+    """Each strip and its middle (3,) on the roof."""
+    return [(s, s.areas @ s.roof[s.faces].mean(axis=1) / s.area) for s in pattern.strips]
 
 
 def seam_sheet(
@@ -133,8 +106,7 @@ def seam_sheet(
     """The seams from above, with the numbers of strips, and the places of corners along both axes."""
     axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
     lines = [curve._replace(points=curve.points @ axes.T) for curve in _curves(pattern)]
-    middles = zip(pattern.strips, _middles(pattern), strict=True)
-    texts = [(at @ axes.T, str(strip.number), nowhere) for strip, at in middles]
+    texts = [(at @ axes.T, str(strip.number), nowhere) for strip, at in _middles(pattern)]
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
@@ -144,11 +116,9 @@ def seam_sheet(
 def _strip_view(pattern: CuttingPattern, strip: Strip) -> DrawnView:
     """A strip as it is cut, with its net length and width."""
     lines, labels = strip_lines(pattern, strip)
-    texts = [(label.at, label.text, label.inward) for label in labels]
-    texts.append((_inside(strip), f"{strip.number}", np.zeros(2)))
-    title = f"strip {strip.number}, {strip.patch}"
+    labels.append((_inside(strip), f"{strip.number}", np.zeros(2)))
     stations = np.array([0.0, strip.length]), np.array([0.0, strip.width])
-    return DrawnView(title, lines, texts, stations=stations)
+    return DrawnView(f"strip {strip.number}, {strip.patch}", lines, labels, stations=stations)
 
 
 def _inside(strip: Strip) -> Floats:
@@ -157,16 +127,17 @@ def _inside(strip: Strip) -> Floats:
     return np.array(polygon.representative_point().coords[0])
 
 
-def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine], list[StripLabel]]:
+def strip_lines(
+    pattern: CuttingPattern, strip: Strip
+) -> tuple[list[SheetLine], list[tuple[Floats, str, Floats]]]:
     """What is drawn of a strip in its own coordinates, in the unit of the surface: the line to cut along, the
-    seam lines, notches and the arrow of the warp; and the labels of its sides: seam and neighbour."""
+    seam lines, notches and the arrow of the warp; and the labels of its sides, seam and neighbour, at points
+    (2,), with the unit vectors (2,) from there into the strip."""
     options, added = pattern.options, dict[tuple[int, int], float]()
-    net = [SheetLine(strip.cut[loop], "PCMC-SEAM", True) for loop in strip.outlines]
-    marks: list[SheetLine] = []
+    marks = [SheetLine(strip.cut[loop], "PCMC-SEAM", True) for loop in strip.outlines]
     labels = []
-    step = options.notches
-    if step is None:
-        step = float(np.mean([s.width for s in pattern.strips]))
+    mean = float(np.mean([s.width for s in pattern.strips]))
+    step = mean if options.notches is None else options.notches
     for seam in pattern.seams:
         beyond = options.rim_allowance if seam.kind == "rim" else options.allowance
         for side in seam.sides:
@@ -174,17 +145,24 @@ def strip_lines(pattern: CuttingPattern, strip: Strip) -> tuple[list[SheetLine],
                 continue
             edges = side.edges if side.forward else side.edges[:, ::-1]
             added |= dict.fromkeys(map(tuple, edges.tolist()), beyond)
-            places = _notches(seam, step) if seam.kind != "rim" and step > 0.0 else np.empty(0)
+            count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
             length = beyond or 0.02 * strip.width
-            for at, inward in (_along(seam, side, strip, place) for place in places):
+            for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
+                at, inward = _along(seam, side, strip, place)
                 marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
             at, inward = _along(seam, side, strip, 0.5 * seam.length)
             others = "+".join(str(s.strip) for s in seam.sides if s is not side)
-            labels.append(StripLabel(at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
+            labels.append((at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
     cloth = _with_allowances(strip, added)
     shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []
     cut = [SheetLine(np.array(ring.coords[:-1]), "PCMC-CUT", True) for ring in shapes]
-    return [*cut, *net, *marks, *_arrow(strip)], labels
+    # the arrow along the warp, a tenth of the width below the strip's number
+    middle, half = _inside(strip) - np.array([0.0, 0.1 * strip.width]), 0.5 * ARROW * strip.length
+    tail, tip = middle - np.array([half, 0.0]), middle + np.array([half, 0.0])
+    barb = 0.1 * min(half, strip.width)
+    head = np.array([tip - [barb, -0.5 * barb], tip, tip - [barb, 0.5 * barb]])
+    arrow = [SheetLine(np.array([tail, tip]), "PCMC-WARP"), SheetLine(head, "PCMC-WARP")]
+    return [*cut, *marks, *arrow], labels
 
 
 def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
@@ -194,8 +172,7 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
     parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
     for loop in strip.outlines:
         X, onward = strip.cut[loop], np.roll(strip.cut[loop], -1, axis=0)
-        along = onward - X
-        along /= np.linalg.norm(along, axis=1)[:, None]
+        along = unit_vectors(onward - X)
         out = np.stack([along[:, 1], -along[:, 0]], axis=1)
         wide = np.array([added[ends] for ends in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)])
         out *= wide[:, None]
@@ -211,12 +188,6 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
     return shapely.union_all(parts)
 
 
-def _notches(seam: Seam, step: float) -> Floats:
-    """Places along a seam, about ``step`` apart, the same for all of its sides."""
-    count = int(seam.length / step)
-    return seam.length * np.arange(1, count + 1) / (count + 1)
-
-
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:
     """The point (2,) of a strip at a length along a seam on the roof, and the unit vector into the strip."""
     total = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(seam.points, axis=0), axis=1)))
@@ -224,16 +195,6 @@ def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, 
     a, b = strip.cut[side.edges[k]]
     share, (x, y) = (place - total[k]) / (total[k + 1] - total[k]), (b - a) / np.linalg.norm(b - a)
     return a + share * (b - a), np.array([-y, x]) if side.forward else np.array([y, -x])
-
-
-def _arrow(strip: Strip) -> list[SheetLine]:
-    """The arrow along the warp, a tenth of the width below the strip's number."""
-    middle = _inside(strip) - np.array([0.0, 0.1 * strip.width])
-    half = 0.5 * ARROW * strip.length
-    tail, tip = middle - np.array([half, 0.0]), middle + np.array([half, 0.0])
-    barb = 0.1 * min(half, strip.width)
-    head = np.array([tip - [barb, -0.5 * barb], tip, tip - [barb, 0.5 * barb]])
-    return [SheetLine(np.array([tail, tip]), "PCMC-WARP"), SheetLine(head, "PCMC-WARP")]
 
 
 def _side_by_side(pattern: CuttingPattern, millimetres: float) -> Sheet:
@@ -248,11 +209,10 @@ def _side_by_side(pattern: CuttingPattern, millimetres: float) -> Sheet:
         sheet.lines += [line._replace(points=millimetres * line.points + shift) for line in lines]
         height = min(LETTERS, 0.1 * millimetres * strip.width)
         about: Any = {"layer": "PCMC-LABEL", "align": "C"}
-        for label in labels:
-            turn = float(np.degrees(np.arctan2(label.inward[1], label.inward[0]))) - 90.0
-            turn = (turn + 90.0) % 180.0 - 90.0
-            at = millimetres * label.at + height * label.inward + shift
-            sheet.texts.append(Text(at, label.text, height, turn=turn, **about))
+        for at, text, inward in labels:
+            turn = float(np.degrees(np.arctan2(inward[1], inward[0]))) % 180.0 - 90.0
+            place = millimetres * at + height * inward + shift
+            sheet.texts.append(Text(place, text, height, turn=turn, **about))
         title = f"{strip.number}  {strip.patch}"
         sheet.texts.append(Text(millimetres * _inside(strip) + shift, title, 1.5 * height, **about))
     return sheet

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from .panel_sheets import panel_sheets as panels_at_true_size
 from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, table_sheets
 from .sheet import write_pdf as write_pages
 
-SUFFIXES = (".dxf", ".pdf", ".svg")
+SUFFIXES, CSV = (".dxf", ".pdf", ".svg"), ".csv"
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
 Ends = tuple[tuple[float, float], tuple[float, float]]
@@ -77,6 +77,33 @@ class DrawingSet:
                 with writing(path):
                     write(temporary)
         return [path for path, _ in jobs]
+
+
+def table_paths(path: Path, tables: Iterable[str]) -> list[Path]:
+    """The files that one is: a .csv is NAME-TABLE.csv for each table, and NAME.csv for one without a name."""
+    names = tables if path.suffix.lower() == CSV else [""]
+    return [path.with_name(f"{path.stem}{'-' * bool(name)}{name}{path.suffix}") for name in names]
+
+
+def document_files(
+    paths: Iterable[str | os.PathLike[str]],
+    draw: Callable[[], DrawingSet],
+    tables: Mapping[str, pd.DataFrame],
+    others: Mapping[str, Callable[[Path], None]],
+    what: str,
+) -> list[tuple[Path, Callable[[Path], Any]]]:
+    """Each file of drawings and tables with the function that writes it, that of a suffix in ``others``, too;
+    FileError for an unknown suffix of ``what``."""
+    given = [(path, suffix_of(path, (*SUFFIXES, CSV, *others), what)) for path in map(Path, paths)]
+    drawn = [path for path, suffix in given if suffix in SUFFIXES]
+    jobs: list[tuple[Path, Callable[[Path], Any]]] = list(draw().files(*drawn)) if drawn else []
+    for path, suffix in given:
+        if suffix in others:
+            jobs.append((path, others[suffix]))
+        elif suffix == CSV:
+            files = zip(table_paths(path, tables), tables.values(), strict=True)
+            jobs += [(file, partial(table.to_csv, index=False)) for file, table in files]
+    return jobs
 
 
 def drawing_set(

@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.files import suffix_of
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate.certificate import warning_mark
 from ..panelling import PanelNet
-from .drawing_set import DECIMALS, DrawingSet
+from .drawing_set import CSV, DECIMALS, DrawingSet, document_files
 from .drawing_set import SUFFIXES as DRAWINGS
 from .panel_sheets import flat_panels, panel_sheets, polygons_at_true_size
 from .sheet import FORMATS, SheetLine, add_frames, table_sheets
 from .views import DrawnView, placed
 
-CSV, OBJ = ".csv", ".obj"
+OBJ = ".obj"
 SUFFIXES = (*DRAWINGS, CSV, OBJ)
-TABLES = ("", "nodes", "beams")
+TABLES = ("", "nodes", "beams")  # of panels, nodes and beams
 
 
 def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: str = "") -> DrawingSet:
@@ -69,12 +68,6 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
     return DrawingSet(*about, (), points, (), None, flat_panels(panels), sheets)
 
 
-def net_paths(path: Path) -> list[Path]:
-    """The files that one of a net is: those of a .csv are the tables of panels, nodes and beams."""
-    names = TABLES if path.suffix.lower() == CSV else TABLES[:1]
-    return [path.with_name(f"{path.stem}{'-' if one else ''}{one}{path.suffix}") for one in names]
-
-
 def net_files(
     net: PanelNet,
     paths: Iterable[str | os.PathLike[str]],
@@ -83,15 +76,6 @@ def net_files(
     name: str = "",
 ) -> list[tuple[Path, Callable[[Path], Any]]]:
     """Each file of a net with the function that writes it; FileError for an unknown suffix."""
-    given = [(path, suffix_of(path, SUFFIXES, "a net of panels")) for path in map(Path, paths)]
-    drawn = [path for path, suffix in given if suffix in DRAWINGS]
-    jobs: list[tuple[Path, Callable[[Path], Any]]] = []
-    if drawn:
-        jobs += net_drawings(net, units, sheet=sheet, name=name).files(*drawn)
-    for path, suffix in given:
-        if suffix == OBJ:
-            jobs.append((path, net.write_obj))
-        elif suffix == CSV:
-            tables = zip(net_paths(path), (net.panels, net.nodes, net.beams), strict=True)
-            jobs += [(file, partial(table.to_csv, index=False)) for file, table in tables]
-    return jobs
+    tables = dict(zip(TABLES, (net.panels, net.nodes, net.beams), strict=True))
+    draw = partial(net_drawings, net, units, sheet=sheet, name=name)
+    return document_files(paths, draw, tables, {OBJ: net.write_obj}, "a net of panels")

@@ -227,15 +227,17 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
 def equilibria_data(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
     """The branches and equilibria of a search, each point with the number of its surface, and in words."""
     numbers, branches = count(len(found)), []
-    (line,) = found.lines
-    for branch in found.branches[line.name]:
+    (along,) = found.lines
+    for branch in found.branches[along.name]:
         shown = branch.points.loc[sorted(branch.surfaces)]
         columns = {name: shown[name].tolist() for name in ("parameter", "height", "index")}
-        branches.append(columns | {"number": [next(numbers) for _ in range(len(shown))]})
+        lines = branch.pieces("parameter", "height")
+        pieces = [{"stable": stable, "points": points.tolist()} for stable, points in lines]
+        branches.append(columns | {"number": [next(numbers) for _ in range(len(shown))], "pieces": pieces})
     rows = found.table[["height", "index", "energy"]].to_dict(orient="records")
     return {
-        "parameter": line.name,
-        "value": line.value,
+        "parameter": along.name,
+        "value": along.value,
         "branches": branches,
         "equilibria": [row | {"number": k} for k, row in enumerate(rows)],
         "words": [*found.barrier_lines(units), *found.failed, INCOMPLETE],

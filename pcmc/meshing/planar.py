@@ -14,7 +14,7 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
 from ..surface.geometry import angles, cross_2d, segment_lengths
 from ..surface.topology import SIDES, components, edge_places
-from .angles import improve_angles
+from .quality import improve_angles
 
 CLEARANCE = 0.62  # of the edge length: distance of free points from the segments
 CROWDED = 0.6  # of the edge length: free points nearer to another point are removed

@@ -20,11 +20,9 @@ from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.topology import SIDES, edge_places
-from .angles import improve_angles
-from .curve_cutting import CurveMesh, cut_curves
-from .quality import edge_lengths
+from .curve_cutting import CurveMesh, check_sizes, cut_curves, limit_growth, sizes_at, triangles_for
+from .quality import edge_lengths, improve_angles
 from .refinement import Projection
-from .sizes import check_sizes, limit_growth, sizes_at, triangles_for
 
 CHORD = 0.1  # of the edge length
 SHORTEST = 0.3  # of the edge length: no edge of MMG gets shorter

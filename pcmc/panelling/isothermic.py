@@ -24,9 +24,8 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..surface.geometry import angles, face_areas
 from ..surface.topology import EdgeCurve, components, one_sided_copies
-from .directions import Directions, principal_directions
 from .net import nudged
-from .sheet import SheetMesh
+from .sheet import Directions, SheetMesh, principal_directions
 
 ALIGNED = np.radians(10.0)  # a curve is a line of curvature if half of it is within this of the directions
 ROUND = 0.05  # of the mean curvature: a sheet is part of a sphere if (κ₁ - κ₂)/2 is smaller on half of it
@@ -56,7 +55,7 @@ class _OpenSheet:
 
     def __init__(self, sheet: SheetMesh, directions: Directions) -> None:
         self.sheet, self.frame, m = sheet, directions.frame, len(sheet.F)
-        one, other = sheet.inner_sides
+        one, other = sheet.topology.neighbours.T
         self.f, self.g = f, g = one // 3, other // 3
         # corners at the ends of each inner edge, as f runs along it; g runs the other way
         self.fa, self.fb = (3 * f + (one + step) % 3 for step in (1, 2))
@@ -66,7 +65,11 @@ class _OpenSheet:
         root, along = np.sqrt(directions.w), sheet.X[self.b] - sheet.X[self.a]
         seen_f, seen_g = (root[face] * np.conj(_complex(self.frame[face], along)) for face in (f, g))
         same = (seen_g * np.conj(seen_f)).real > 0.0
-        self.index = self._index(np.angle((seen_g / seen_f) ** 2) / 2.0)
+        # at each inner vertex the index of the directions, a multiple of 1/2, from their turn at its edges
+        X, F, turn = sheet.X, sheet.F, np.angle((seen_g / seen_f) ** 2) / 2.0
+        total = 2.0 * np.pi - np.bincount(F.ravel(), np.radians(angles(X[F])).ravel(), len(X))
+        total += np.bincount(self.b, turn, len(X)) - np.bincount(self.a, turn, len(X))
+        self.index = np.where(sheet.topology.on_boundary, 0.0, np.rint(total / np.pi) / 2.0)
         cut = self._cuts()
         self.cut = np.flatnonzero(cut)
         label = one_sided_copies(f[~cut], g[~cut], ~same[~cut], m)
@@ -76,7 +79,7 @@ class _OpenSheet:
         ends = np.stack([np.append(self.fa, self.fb), np.append(self.ga, self.gb)], axis=1)
         self.place = components(ends[np.tile(~cut, 2)], 3 * m).astype(np.int64)  # of corners: open vertices
         self.count = int(self.place.max()) + 1
-        P = sheet.X[sheet.F]
+        P = X[F]
         self.area = face_areas(P)
         slopes = [0.5j * _complex(self.frame, P[:, k - 1] - P[:, k - 2]) / self.area for k in range(3)]
         slope = np.stack(slopes, axis=1)  # of the function that is 1 at a corner
@@ -88,14 +91,6 @@ class _OpenSheet:
         row = np.repeat(np.arange(len(places)), places.shape[1])
         entries = (np.broadcast_to(values, places.shape).ravel(), (row, places.ravel()))
         return csr_array(coo_array(entries, shape=(len(places), self.count)))
-
-    def _index(self, turn: Floats) -> Floats:
-        """(n,) the index of the directions at each inner vertex, a multiple of 1/2, from their ``turn``
-        against each inner edge, radians."""
-        X, F = self.sheet.X, self.sheet.F
-        total = 2.0 * np.pi - np.bincount(F.ravel(), np.radians(angles(X[F])).ravel(), len(X))
-        total += np.bincount(self.b, turn, len(X)) - np.bincount(self.a, turn, len(X))
-        return np.where(self.sheet.topology.on_boundary, 0.0, np.rint(total / np.pi) / 2.0)
 
     def _cuts(self) -> Bools:
         """Which of the inner edges are cut: paths from umbilics to the boundary, and between its loops."""

@@ -18,7 +18,7 @@ from ..base.compiled import compiled
 from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..surface import Surface
-from ..surface.geometry import cross_2d
+from ..surface.geometry import cross_2d, unit_vectors
 from ..surface.topology import components
 from .planar import before
 from .sheet import SheetMesh
@@ -143,7 +143,7 @@ def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool
     np.add.at(mean, corner[once], normal[kept[once]])
     return Net(
         points[np.unique(vertex, return_index=True)[1][used]],
-        mean / np.linalg.norm(mean, axis=1)[:, None],
+        unit_vectors(mean),
         kind[used],
         np.searchsorted(owner[kept], np.arange(len(start))),
         corner,

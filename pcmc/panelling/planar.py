@@ -9,7 +9,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, eye_array, kron
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
-from ..surface.geometry import cross_2d
+from ..surface.geometry import cross_2d, unit_vectors
 
 STEPS = 25  # of Gauss-Newton
 FLAT = 1e-7  # of the mean edge: the motion of a step at which it ends
@@ -84,11 +84,9 @@ def convex(P: Floats, start: Ints, corner: Ints) -> Bools:
     """
     out = np.ones(len(start) - 1, dtype=bool)
     for chosen, nodes in by_corners(start, corner):
-        side = np.roll(P[nodes], -1, axis=1) - P[nodes]
-        side /= np.linalg.norm(side, axis=2)[..., None]
+        side = unit_vectors(np.roll(P[nodes], -1, axis=1) - P[nodes])
         turn = np.cross(np.roll(side, 1, axis=1), side)
-        mean = turn.sum(axis=1)
-        mean /= np.linalg.norm(mean, axis=1)[:, None]
+        mean = unit_vectors(turn.sum(axis=1))
         out[chosen] = (np.einsum("pki,pi->pk", turn, mean) > -BENT).all(axis=1)
     return out
 
@@ -172,8 +170,7 @@ def torsion_free_axes(P: Floats, edges: Ints, normals: Floats) -> Floats:
     (a_j - a_i) × e over the edges, with e their unit vectors, near the unit ``normals`` (n,3).
     """
     n, count = len(P), len(edges)
-    e = P[edges[:, 1]] - P[edges[:, 0]]
-    e = e / np.linalg.norm(e, axis=1)[:, None]
+    e = unit_vectors(P[edges[:, 1]] - P[edges[:, 0]])
     ones, row = np.ones(count), np.arange(count)
     pair = (np.append(-ones, ones), (np.append(row, row), np.append(edges[:, 0], edges[:, 1])))
     difference = kron(csr_array(coo_array(pair, shape=(count, n))), eye_array(3))

@@ -174,7 +174,12 @@ def panels(
     lengths = np.linalg.norm(edge_vectors(corners), axis=2)
     parts = families(lengths, tolerance, mirror_images == "apart")
     table = _panel_table(surface, faces, lengths, parts.family, parts.order)
-    tables = _family_table(table), table, _edge_table(surface, faces)
+    groups = table.groupby("family")
+    least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()
+    counts = pd.DataFrame({"count": groups.size(), "mirrored": groups["mirrored"].sum()})
+    spread, area = (most - least).max(axis=1), groups["area"].sum()
+    shown = counts.join(0.5 * (least + most)).assign(spread=spread, area=area).reset_index()
+    tables = shown, table, _edge_table(surface, faces)
     return Panels(surface, tolerance, mirror_images, certificate, *tables, laid_flat(corners), parts.at_least)
 
 
@@ -200,14 +205,6 @@ def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, o
             "area": face_areas(surface.vertices[surface.faces[faces]]),
         }
     )
-
-
-def _family_table(table: pd.DataFrame) -> pd.DataFrame:
-    groups = table.groupby("family")
-    least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()
-    counts = pd.DataFrame({"count": groups.size(), "mirrored": groups["mirrored"].sum()})
-    spread, area = (most - least).max(axis=1), groups["area"].sum()
-    return counts.join(0.5 * (least + most)).assign(spread=spread, area=area).reset_index()
 
 
 def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:

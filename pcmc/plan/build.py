@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..forces.rooms import check_rooms
-from ..meshing.angles import improve_angles
 from ..meshing.planar import PlanarMesh, locate, signed_areas
+from ..meshing.quality import improve_angles
 from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
@@ -37,7 +37,7 @@ FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper a
 SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room
 REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
-FAR = 0.1  # of the size of the outline: of a divider that ends farther beyond it a warning tells
+FAR = 0.5  # of the size of the outline: of a divider that ends farther beyond it a warning tells
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 

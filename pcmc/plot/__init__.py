@@ -3,10 +3,9 @@
 With a path every function writes a picture; each returns it as an (h,w,3) array of bytes.
 """
 
-from .branches import equilibria
 from .curves import convergence, diagram, heatmap, histories, lines
 from .pictures import draw, families, panel, panel_planarity, reactions, vectors
-from .uses import member_forces, strains, under_load
+from .uses import equilibria, member_forces, strains, under_load
 
 __all__ = [
     "convergence",

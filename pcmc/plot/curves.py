@@ -262,8 +262,8 @@ def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
                 raise OptionError(message, what="branches", where=label, found=column)
         color = CURVES[k % len(CURVES)]
         named = label
-        for stable, (px, py) in _pieces(branch, x, y):
-            axes.plot(px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named)
+        for stable, piece in branch.pieces(x, y):
+            axes.plot(*piece.T, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named)
             named = ""
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
@@ -273,18 +273,6 @@ def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
             look = {"markersize": size, "zorder": layer, "markerfacecolor": "white", "markeredgewidth": 0.8}
             axes.plot(rows[x], rows[y], EVENT_MARKERS[str(kind)], color=color, label=text, **look)
     return len(marked)
-
-
-def _pieces(branch: Any, x: str, y: str) -> list[tuple[bool, tuple[Floats, Floats]]]:
-    """The branch cut where its stability changes; events are points of it too."""
-    columns = ["arclength", x, y]
-    events = branch.events[columns].assign(index=branch.events.index_after)
-    every = np.concatenate([branch.points[[*columns, "index"]].to_numpy(float), events.to_numpy(float)])
-    every = every[np.argsort(every[:, 0], kind="stable")]
-    stable = every[:, 3] == 0.0
-    cuts = np.flatnonzero(stable[1:] != stable[:-1]) + 1
-    ends = zip([0, *cuts], [*cuts, len(every)], strict=True)
-    return [(bool(stable[i]), (every[i : k + 1, 1], every[i : k + 1, 2])) for i, k in ends]
 
 
 def new_axes(width: int, height: int, title: str, x: str, y: str, *scales: str) -> tuple[Any, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Image, Rendering
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
 INK = "#202020"
+MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
+TALLEST = 1.1  # height of a picture at most, as a part of its width
 EFFORT = 6  # of compression; 9 takes six times as long for 2 % fewer bytes
 SUFFIXES = (".png", ".svg", ".pdf")
 # Okabe and Ito's scheme, in an order whose first few differ most.
@@ -75,6 +78,44 @@ def _as_written(figure: Any) -> None:
     for text in figure.findobj(Text):
         if "$" in text.get_text() and "mathdefault" not in text.get_text():
             text.set_parse_math(False)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A rectangle of pixels and the picture coordinates in it."""
+
+    size: tuple[int, int]  # width and height in pixels
+    low: Floats  # (2,) picture coordinates of the lower left corner
+    scale: float  # pixels per unit of length
+
+    def show(self, axes: Any, image: Image) -> None:
+        """Place a painted scene on the axes, pixel on pixel."""
+        right, top = self.low + np.array(self.size) / self.scale
+        figure, box = axes.figure.bbox, axes.get_window_extent()
+        left = round(box.x0) / figure.width
+        bottom = (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height
+        axes.set_position((left, bottom, self.size[0] / figure.width, self.size[1] / figure.height))
+        axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
+
+
+def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: bool = True) -> list[Frame]:
+    """Frames around the given points (k,2), row by row; those of a row are of one height."""
+    lows = np.array([p.min(axis=0) for p in points])
+    spans = np.array([np.ptp(p, axis=0) for p in points])
+    wide = width // columns
+    room = np.array([wide, TALLEST * wide]) - 2 * MARGIN
+    scales = (room / np.maximum(spans, 1e-9 * spans.max())).min(axis=1)
+    if one_scale:
+        scales[:] = scales.min()
+    frames = []
+    for start in range(0, len(points), columns):
+        row = range(start, min(start + columns, len(points)))
+        high = math.ceil(max(spans[k][1] * scales[k] for k in row) + 2 * MARGIN)
+        for k in row:
+            beside = (wide / scales[k] - spans[k][0]) / 2.0
+            low = lows[k] - np.array([beside, MARGIN / scales[k]])
+            frames.append(Frame((wide, high), low, float(scales[k])))
+    return frames
 
 
 def style(axes: Any) -> Any:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import html
-import math
 from base64 import b64encode
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +28,7 @@ from .figure import (
     color_scale,
     finish,
     fit_height,
+    frames_of,
     grid,
     new,
     png,
@@ -41,12 +40,10 @@ if TYPE_CHECKING:
 
 ViewName = str | tuple[float, float]
 
-MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
 EDGES_FROM = 9.0  # pixels: a mesh edge shorter than this is not drawn
 DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
 CELL_WIDTH = 700  # pixels of a picture in a notebook
 ABOVE = 7.0  # pixels above a title and below a picture
-TALLEST = 1.1  # height of a picture at most, as a part of its width
 FLAT_PERCENT = 1.0  # the least end of the scale of planarity: a glass pane bears a few tenths
 ARROW, AT_POINTS = "#B2182B", "#2166AC"
 
@@ -329,44 +326,6 @@ def _drawings(
                 validate.refuse(name, array.shape, f"shape {' or '.join(map(str, allowed))}")
         drawings.append(Rendering(surface, view_of(surface, view), title, values[0], values[1], names))
     return drawings
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A rectangle of pixels and the picture coordinates in it."""
-
-    size: tuple[int, int]  # width and height in pixels
-    low: Floats  # (2,) picture coordinates of the lower left corner
-    scale: float  # pixels per unit of length
-
-    def show(self, axes: Any, image: Image) -> None:
-        """Place a painted scene on the axes, pixel on pixel."""
-        right, top = self.low + np.array(self.size) / self.scale
-        figure, box = axes.figure.bbox, axes.get_window_extent()
-        left = round(box.x0) / figure.width
-        bottom = (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height
-        axes.set_position((left, bottom, self.size[0] / figure.width, self.size[1] / figure.height))
-        axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
-
-
-def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: bool = True) -> list[Frame]:
-    """Frames around the given points (k,2), row by row; those of a row are of one height."""
-    lows = np.array([p.min(axis=0) for p in points])
-    spans = np.array([np.ptp(p, axis=0) for p in points])
-    wide = width // columns
-    room = np.array([wide, TALLEST * wide]) - 2 * MARGIN
-    scales = (room / np.maximum(spans, 1e-9 * spans.max())).min(axis=1)
-    if one_scale:
-        scales[:] = scales.min()
-    frames = []
-    for start in range(0, len(points), columns):
-        row = range(start, min(start + columns, len(points)))
-        high = math.ceil(max(spans[k][1] * scales[k] for k in row) + 2 * MARGIN)
-        for k in row:
-            beside = (wide / scales[k] - spans[k][0]) / 2.0
-            low = lows[k] - np.array([beside, MARGIN / scales[k]])
-            frames.append(Frame((wide, high), low, float(scales[k])))
-    return frames
 
 
 def _print_numbers(axes: Any, surface: Surface, view: Camera, numbers: Floats, form: str) -> None:

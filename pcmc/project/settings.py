@@ -19,10 +19,11 @@ from ..base.files import PathLike, suffix_of
 from ..base.units import LENGTHS, Units, expect_length
 from ..cloth.settings import CuttingOptions
 from ..cloth.sheets import SUFFIXES as PATTERNS
-from ..cloth.sheets import table_paths
+from ..cloth.sheets import TABLES as PATTERN_TABLES
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
+from ..drawings.drawing_set import table_paths
 from ..drawings.net_drawings import SUFFIXES as NETS
-from ..drawings.net_drawings import net_paths
+from ..drawings.net_drawings import TABLES as NET_TABLES
 from ..drawings.sheet import FORMATS
 from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..panelling.panel_net import PATTERNS as NET_PATTERNS
@@ -246,8 +247,8 @@ class Output:
     def paths(self) -> list[Path]:
         """All files that are known before the roof is; sheets as .svg get numbers."""
         others = schedule_paths(Path(self.panels))[1:] if self.panels is not None else []
-        others += [path for file in self.pattern for path in table_paths(Path(file))[1:]]
-        others += [path for file in self.net for path in net_paths(Path(file))[1:]]
+        for files, tables in ((self.pattern, PATTERN_TABLES), (self.net, NET_TABLES)):
+            others += [path for file in files for path in table_paths(Path(file), tables)[1:]]
         return [Path(name) for name in self.names] + others
 
     def in_folder(self, folder: Path) -> Output:

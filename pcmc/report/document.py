@@ -22,10 +22,9 @@ from ..plot import draw, families, reactions
 from ..plot.figure import png
 from ..surface import Surface, expect_surface
 from . import tables
-from .cutting import cutting
+from .chapters import at_rest_chapter, cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .under_load import at_rest, chapter
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
 SUFFIXES = (".pdf",)
@@ -116,11 +115,11 @@ class RoofReport:
             yield Heading("Mesh check")
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
-            yield from chapter(self.analysis, units)
+            yield from under_load_chapter(self.analysis, units)
         elif self.model is not None:
-            yield from at_rest(self.model, units)
+            yield from at_rest_chapter(self.model, units)
         if self.pattern is not None:
-            yield from cutting(self.pattern, units)
+            yield from cutting_chapter(self.pattern, units)
         if self.schedule is not None:
             yield Heading("Panels", new_page=True)
             yield panel_text(self.schedule, units)

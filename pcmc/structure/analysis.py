@@ -326,10 +326,9 @@ def analyse_step(
 
     def law(pressure: float) -> tuple[Case, float | None]:
         acting = replace(step, pressures=step.pressures + (pressure - first) * signs)
-        case = _case_of(model, step.name, run_as_far(model, [*before, acting], timeout), len(before) + 1)
-        now = volume + gas.change(standing, np.nan_to_num(case.results.displacements))
-        case = replace(case, pressure=pressure, volume=now)
-        return case, (outside + first) * volume / now - outside if case.carried else None
+        found = run_as_far(model, [*before, acting], timeout)
+        case = _case_of(model, step.name, found, len(before) + 1, pressure)
+        return case, (outside + first) * volume / case.volume - outside if case.carried else None
 
     case, _, agreed = balanced_pressure(first, law, outside)
     if case.carried and not agreed:
@@ -349,16 +348,16 @@ def _permanent(model: StructuralModel) -> tuple[list[Step], list[Step]]:
     return alone, [step for step in others if all(step is not one for one in alone)]
 
 
-def _case_of(model: StructuralModel, name: str, found: Sequence[StepResults], wanted: int) -> Case:
-    """The case from the results of its steps: of the last one that was begun."""
-    share = found[-1].share if len(found) == wanted else 0.0
-    gas = model.gas
+def _case_of(
+    model: StructuralModel, name: str, found: Sequence[StepResults], wanted: int, p: float | None = None
+) -> Case:
+    """The case from the results of its steps: of the last one that was begun; ``p`` of a gas, by default the
+    form's."""
+    share, gas, form = found[-1].share if len(found) == wanted else 0.0, model.gas, model.standing
     if gas is None:
         return Case(name, found[-1], share)
-    change = gas.change(model.standing, np.nan_to_num(found[-1].displacements))
-    return Case(
-        name, found[-1], share, gas.pressure(model.standing), gas.first_volume(model.standing) + change
-    )
+    volume = gas.first_volume(form) + gas.change(form, np.nan_to_num(found[-1].displacements))
+    return Case(name, found[-1], share, gas.pressure(form) if p is None else p, volume)
 
 
 def _in_parallel(one: Callable[[Step], Case], steps: Sequence[Step], say: OnCase) -> Iterable[Case]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +16,12 @@ from ..base.arrays import Floats, Ints, format_rows
 from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
+from ..forces.motion_space import perpendicular
 from .frames import bar_axes
 from .loads import Step
 from .material import Material
 from .member_forces import forces_on_members, held_turns
 from .model import StructuralModel, expect_model
-from .pulls import axes_along
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
 POINTS, CABLE_POINTS = 2, 8  # integration points: one above the other; a truss is expanded to a brick
@@ -56,27 +57,20 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
     """The input file of a model under these steps, the form-finding load first; with ``every`` it prints the
     results of each increment, and writes none for viewers.
     """
-    return "".join(_sections(model, steps, every))
-
-
-def _sections(model: StructuralModel, steps: Sequence[Step], every: bool) -> Iterator[str]:
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
-    yield f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"
-    yield f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")
-    yield from (f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1))
+    text = [f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"]
+    text += [f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")]
+    text += [f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1)]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
-    yield from (f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports)
-    yield from (f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1))
-    yield "*NODE, NSET=NALL\n"
-    yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)
-    yield from _elements(model)
-    yield from _beams(model)
-    yield from _supports(model)
-    yield from _prestress(model)
+    text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]
+    text += [f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1)]
+    text += ["*NODE, NSET=NALL\n"]
+    text += [format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)]
+    for section in (_elements, _beams, _supports, _prestress):
+        text += section(model)
     if model.lines:  # members take over from what held the form, while its pressure stays
-        yield "*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n*AMPLITUDE, NAME=RELEASED\n0.,1.,1.,0.\n"
-    for k, step in enumerate(steps):
-        yield from _step(model, step, k == 0, every)
+        text += ["*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n*AMPLITUDE, NAME=RELEASED\n0.,1.,1.,0.\n"]
+    return "".join(chain(text, *(_step(model, step, k == 0, every) for k, step in enumerate(steps))))
 
 
 def _elements(model: StructuralModel) -> Iterator[str]:
@@ -146,7 +140,7 @@ def _beams(model: StructuralModel) -> Iterator[str]:
         if v in turns or stops not in ("", "123"):
             axes = model.axes[v]
             if v in turns:  # those that are held first
-                axes = axes_along(turns[v])[0] if len(turns[v]) == 1 else turns[v]
+                axes = turns[v] if len(turns[v]) > 1 else np.concatenate([turns[v], *perpendicular(turns[v])])
             yield f"*NSET, NSET=BEAM_{node}\n{node}\n*TRANSFORM, NSET=BEAM_{node}, TYPE=R\n"
             yield ",".join(FIELD % c for c in axes[:2].ravel()) + "\n"
         yield "".join(f"*BOUNDARY\n{node},{axis},{axis}\n" for axis in stops)

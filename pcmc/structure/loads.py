@@ -89,10 +89,7 @@ class Snow:
         if not carrying:
             hint = "all patches are walls; name those that carry snow"
             validate.refuse("Snow.patches", self.patches, "names of patches", hint=hint)
-        normal = np.array(surface.plane.normal)
-        plan = area_vectors(surface.vertices[surface.faces]) @ normal
-        side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
-        plan = np.maximum(plan * side[surface.patch_of_face], 0.0)
+        normal, plan = np.array(surface.plane.normal), np.maximum(plan_areas(surface), 0.0)
         plan[~(np.isin(surface.patch_of_face, carrying) & _in_zone(self, surface))] = 0.0
         if self.slides:
             whole, none = self.slides
@@ -274,15 +271,17 @@ def in_the_open(surface: Surface) -> Bools:
     return found
 
 
-def roof_slopes(surface: Surface) -> Floats:
-    """(m,) the angle between each face and Π, degrees: 90 if it is upright, above 90 if it overhangs.
-
-    The side of a patch that looks away from Π is the one of the larger part of its plan.
-    """
-    area = area_vectors(surface.vertices[surface.faces])
-    plan = area @ np.array(surface.plane.normal)
+def plan_areas(surface: Surface) -> Floats:
+    """(m,) the area of each face in the plan, below 0 if it overhangs, length². The side of a patch that
+    looks away from Π is the one of the larger part of its plan."""
+    plan = area_vectors(surface.vertices[surface.faces]) @ np.array(surface.plane.normal)
     side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
-    up = plan * side[surface.patch_of_face] / np.linalg.norm(area, axis=1)
+    return np.asarray(plan * side[surface.patch_of_face])
+
+
+def roof_slopes(surface: Surface) -> Floats:
+    """(m,) the angle between each face and Π, degrees: 90 if it is upright, above 90 if it overhangs."""
+    up = plan_areas(surface) / face_areas(surface.vertices[surface.faces])
     return np.asarray(np.degrees(np.arccos(np.clip(up, -1.0, 1.0))))
 
 

@@ -288,18 +288,18 @@ def cable_offers(model: StructuralModel) -> list[str]:
 def weak_members(
     model: StructuralModel, cases: Iterable[tuple[str, tuple[MemberForces, ...]]], units: Units
 ) -> list[str]:
-    """A line for each beam that buckles in a case if no sheets hold it; and each that moves by more than a
-    300th of its span, or would without the sheets, which carry a good part in its place; with the stiffness
-    that it would need to carry all alone."""
+    """A line for each beam that buckles in its worst case if no sheets hold it; and for each that moves by
+    more than a 300th of its span, or would without the sheets, which carry a good part in its place; with the
+    stiffness that it would need to carry all alone."""
     lines, listed = list[str](), list(cases)
-    for case, beam in ((case, beam) for case, beams in listed for beam in beams if beam.buckling < 1.0):
-        text = (
-            f"{case}: {beam.line.name} buckles at {100.0 * beam.buckling:.2g} % of its thrust, if no sheets"
-        )
-        text += f" hold it; {1.0 / beam.buckling:.2g} times its E I carries it alone, without any safety"
-        lines.append(text)
     for k, rest in enumerate(members_at_rest(model)):
-        case, worst = max(((name, beams[k]) for name, beams in listed), key=lambda one: one[1].deflection)
+        own = [(name, beams[k]) for name, beams in listed]
+        case, worst = min(own, key=lambda one: one[1].buckling)
+        if worst.buckling < 1.0:
+            text = f"{case}: {rest.line.name} buckles at {100.0 * worst.buckling:.2g} % of its thrust, if no"
+            text += f" sheets hold it; {1.0 / worst.buckling:.2g} times its E I carries it alone, without any"
+            lines.append(f"{text} safety")
+        case, worst = max(own, key=lambda one: one[1].deflection)
         share = max(0.0, 1.0 - listed[0][1][k].pulled / rest.pulled)
         if worst.enough > 1.0 or (rest.enough > 1.0 and share > HELPED):
             text = f"{rest.line.name} is too weak: under {case} it moves {worst.deflection:.3g}"

@@ -6,7 +6,6 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -63,7 +62,13 @@ class Member:
 
     def __post_init__(self) -> None:
         if not isinstance(self.on, str | Curve):
-            vars(self)["on"] = _two_points(self.on)
+            try:
+                points = tuple(tuple(validate.real(value) for value in point) for point in self.on)
+            except TypeError:
+                points = ()
+            if len(points) != 2 or not all(len(p) in (2, 3) and np.isfinite(p).all() for p in points):
+                validate.refuse("Member.on", self.on, "the name of a wall or a cable, a Curve, or two points")
+            vars(self)["on"] = points
         for name, kind in (("profile", Profile), ("material", Material)):
             if not isinstance(getattr(self, name), kind):
                 validate.refuse(f"Member.{name}", getattr(self, name), f"a {name.title()}")
@@ -87,18 +92,6 @@ class Member:
     def two_points(self) -> Sequence[Sequence[float]]:
         """Of a column or a stay, the point that it holds, and its foot or anchor; of others none."""
         return () if isinstance(self.on, str | Curve) else self.on
-
-
-def _two_points(given: Any) -> tuple[tuple[float, ...], ...]:
-    """Two points, of two or three coordinates."""
-    try:
-        points = tuple(tuple(validate.real(value) for value in point) for point in given)
-    except TypeError:
-        points = ()
-    if len(points) != 2 or not all(len(p) in (2, 3) and np.isfinite(p).all() for p in points):
-        expected = "the name of a wall or a cable, a Curve, or two points"
-        validate.refuse("Member.on", given, expected)
-    return points
 
 
 @dataclass(frozen=True, eq=False)

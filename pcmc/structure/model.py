@@ -15,6 +15,7 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate.certificate import certified
 from ..forces.cables import directions
+from ..forces.motion_space import perpendicular
 from ..forces.pinching import standing_part
 from ..forces.triangles import effective_tensions
 from ..surface import Surface, expect_surface
@@ -35,7 +36,7 @@ from .loads import (
 )
 from .material import Material
 from .members import Bar, Member, MemberLine, bars_on, lines_on
-from .pulls import at_vertices, axes_along, balancing_force, corner_forces, in_planes
+from .pulls import at_vertices, balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
@@ -327,8 +328,8 @@ class StructuralModel:
         along = self.allowed[guided]
         first = np.where((self.freedom[guided] == 2)[:, None, None], np.eye(3) - along, along)
         longest = np.linalg.norm(first, axis=1).argmax(axis=1)  # all columns are multiples of one direction
-        first = np.take_along_axis(first, longest[:, None, None], axis=2)[:, :, 0]
-        axes[guided] = axes_along(unit_vectors(first))
+        first = unit_vectors(np.take_along_axis(first, longest[:, None, None], axis=2)[:, :, 0])
+        axes[guided] = np.stack([first, *perpendicular(first)], axis=1)
         return axes
 
     @cached_property

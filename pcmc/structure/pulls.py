@@ -41,12 +41,6 @@ def corner_forces(P: Floats, tensors: Floats) -> Floats:
     return -0.5 * np.einsum("eij,ekj->eki", tensors, np.cross(normal[:, None], edge_vectors(P)))
 
 
-def axes_along(first: Floats) -> Floats:
-    """(k,3,3) right-handed axes, rows, the first along unit vectors (k,3)."""
-    second = unit_vectors(np.cross(np.eye(3)[np.abs(first).argmin(axis=1)], first))
-    return np.stack([first, second, np.cross(first, second)], axis=1)
-
-
 def at_vertices(forces: Floats, faces: Ints, n: int) -> Floats:
     """(n,3) the sums of forces (e,3,3) on the corners of faces (e,3)."""
     return np.stack([np.bincount(faces.ravel(), column, n) for column in forces.reshape(-1, 3).T], axis=1)

@@ -326,25 +326,20 @@ def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tup
         curves = [curve_of(curve, f"member {name!r}") for curve in section.along]
         members += [section.member(name, curve) for curve in curves]
         members += section.between(name, plan.points) if plan is not None else ()
-    for owner, name, on in () if plan is None else _sites(plan):
+    sites = list[tuple[str, str, str | Curve]]()  # dividers and holes, their members, and where these are
+    for number, divider in enumerate(() if plan is None else plan.dividers, 1):
+        if divider.member and divider.wall is None and divider.cable is None:
+            text = f"divider {number}: member = {divider.member!r} takes the place of a wall; give it one"
+            raise OptionError(text, what="member", where=divider.name)
+        sites.append((f"divider {number}", divider.member, divider.name))
+    for hole in () if plan is None else plan.holes:
+        if hole.member and hole.edge not in ("fixed", "sliding"):
+            text = f'{hole.name}: a member carries a held edge, but this is edge = "{hole.edge}"'
+            raise OptionError(f'{text}; make it edge = "fixed"', what="member", where=hole.name)
+        sites.append((hole.name, hole.member, hole.curve))
+    for owner, name, on in (site for site in sites if site[1]):
         if name not in known:
             text = f"{owner}: {unknown('member', name, list(known))}; add [structure.members.{name}]"
             raise OptionError(text, what="member", where=owner, found=name)
         members.append(known[name].member(name, on))
     return tuple(members)
-
-
-def _sites(plan: Plan) -> Iterator[tuple[str, str, str | Curve]]:
-    """The dividers and holes with a member: their names, that of the member, and where it is."""
-    for number, divider in enumerate(plan.dividers, 1):
-        if divider.member and divider.wall is None and divider.cable is None:
-            text = f"divider {number}: member = {divider.member!r} takes the place of a wall; give it one"
-            raise OptionError(text, what="member", where=divider.name)
-        if divider.member:
-            yield f"divider {number}", divider.member, divider.name
-    for hole in plan.holes:
-        if hole.member and hole.edge not in ("fixed", "sliding"):
-            text = f'{hole.name}: a member carries a held edge, but this is edge = "{hole.edge}"'
-            raise OptionError(f'{text}; make it edge = "fixed"', what="member", where=hole.name)
-        if hole.member:
-            yield hole.name, hole.member, hole.curve

@@ -23,7 +23,9 @@ def cap(alpha=0.75, edge_length=0.2):
     return solve(spherical_cap(edge_length, alpha=alpha)).surface
 
 
-@pytest.mark.parametrize(("what", "exact"), [("pressure", 1.5), ("tension", 1 / 1.5), ("cap", 1 / 1.5)])
+@pytest.mark.parametrize(
+    ("what", "exact"), [("pressure", 1.5), ("cap", 1 / 1.5), *at_night(("tension", 1 / 1.5))]
+)
 def test_a_cap_folds_as_a_hemisphere(what, exact):
     """At rest up to p R = 2 α."""
     found = margin(cap(), what)
@@ -61,9 +63,9 @@ def test_the_heaviest_rope():
     exact = 1.0 / (np.cosh(FOLD) / FOLD - 1.0)
     assert found.ends_by is MarginEnd.FOLD
     assert abs(found.factor - exact) <= found.bar <= 0.05 * exact
-    for what in ("cable_weight", "weight of cable rope"):
-        assert margin(rope, what, meshes=1).factor == pytest.approx(found.factor, rel=1e-6)
-    assert "times the weights of cables" in margin(rope, "cable_weight", meshes=1).text()
+    heavier = [margin(rope, what, meshes=1) for what in ("cable_weight", "weight of cable rope")]
+    assert [one.factor for one in heavier] == pytest.approx([found.factor] * 2, rel=1e-6)
+    assert "times the weights of cables" in heavier[0].text()
     light = solve(rope.retensioned(cable_weights={"rope": 0.0})).surface
     added = margin(light, "weight of cable rope", meshes=1)
     assert np.isnan(added.factor)

@@ -18,11 +18,11 @@ from pcmc.certificate.forces import reactions
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy, volume
 from pcmc.forces.second_variation import hessian
+from pcmc.meshing.curve_cutting import limit_growth
 from pcmc.meshing.held_curves import onto_held_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
-from pcmc.meshing.sizes import limit_growth
 from pcmc.plan import Divider, Plan
 from pcmc.surface.geometry import angles, face_areas
 from studies.orders import slope

@@ -378,6 +378,9 @@ def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
         page.idle()
         assert page.verdict == "saddle"
         assert changed(before, page.picture()) > 0.05
+        dashed = page.driver.find_elements("css selector", ".diagram polyline.saddle")
+        lines = page.driver.find_elements("css selector", ".diagram polyline")
+        assert 0 < len(dashed) < len(lines)
         points = page.driver.find_elements("css selector", ".diagram circle.way")
         pressures = {float(point.get_attribute("aria-label").split()[1].strip(",")) for point in points}
         assert min(pressures) < 0.6

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from nightly import at_night
 from shapes import placed, rotation
 from starts import four_fans, stationary, two_squares
 
@@ -241,7 +242,7 @@ def test_it_hangs_below_the_plane_alike():
 
 
 @pytest.mark.parametrize("suffix", ["pcmc", "fe", "obj", "vtu", "glb", "3dm"])
-@pytest.mark.parametrize(("n", "alpha_aux"), [(8, 3.0), (16, 2.0)])
+@pytest.mark.parametrize(("n", "alpha_aux"), [(8, 3.0), *at_night((16, 2.0))])
 def test_files_carry_it(n, alpha_aux, suffix, tmp_path):
     surface = stationary(partial(example, n, alpha_aux)).surface
     before = certify(surface)

@@ -9,10 +9,10 @@ import pcmc
 from generators import delaunay, spherical_cap, two_squares
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.panelling import panel_net
-from pcmc.panelling.directions import shape_operators
 from pcmc.panelling.net import CORNER, EDGE, Net
 from pcmc.panelling.net_tables import tidied
 from pcmc.panelling.planar import by_corners
+from pcmc.panelling.sheet import shape_operators
 from pcmc.plan import Plan
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nightly import at_night
 from small_project import SMALL
 
 import pcmc
@@ -89,13 +90,15 @@ def test_solving_a_project_fills_the_cache(folder):
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("edge_length = 1.0", "edge_length = 0.9"),
         ("[4, 3]", "[4, 3.001]"),
-        ("tension = 2.0", "tension = 2.1"),
         ('method = "newton"', "tolerance = 1e-11"),
         ("value = 0.6", "value = 0.61"),
-        ("[targets]", "[targets]\ntolerance = 1e-5"),
-        ("edge_length = 0.8", "edge_length = 0.7"),
+        *at_night(
+            ("edge_length = 1.0", "edge_length = 0.9"),
+            ("tension = 2.0", "tension = 2.1"),
+            ("[targets]", "[targets]\ntolerance = 1e-5"),
+            ("edge_length = 0.8", "edge_length = 0.7"),
+        ),
     ],
 )
 def test_another_content_is_another_roof(folder, old, new):
@@ -118,7 +121,7 @@ def test_comments_output_and_units_leave_the_roof_as_it_is(folder):
     assert roof.units.length == "m"
 
 
-@pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other", "surface"])
+@pytest.mark.parametrize("damage", ["cut", "surface", *at_night("flipped", "empty", "other")])
 def test_a_damaged_file_is_made_anew(folder, damage):
     first = designed("roof.toml").surface
     (path,) = cached_files()

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from nightly import at_night
 from starts import (
     bezier_hall,
     double_bubble,
@@ -71,7 +72,7 @@ def test_it_has_nothing_left_to_do(name):
     agrees(*CASES[name])
 
 
-@pytest.mark.parametrize("name", FINER)
+@pytest.mark.parametrize("name", [next(iter(FINER)), *at_night(*list(FINER)[1:])])
 def test_nor_on_finer_meshes(name):
     agrees(*FINER[name])
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from backends import every_backend
+from nightly import at_night
 from refusals import refused
 from shapes import pyramid
 from starts import four_fans, sphere, spherical_cap, two_squares
@@ -171,7 +172,7 @@ def test_tensions_that_cannot_balance_are_named(backend, target, right, wall):
 
 
 @TARGETS
-@pytest.mark.parametrize("right", [3.0, 3.02])
+@pytest.mark.parametrize("right", [3.0, *at_night(3.02)])
 def test_tensions_at_the_limit_of_balance_are_named(backend, target, right):
     """Where 4 = 3 + 1, the weaker patch and the wall would have to lie on each other."""
     surface = two_squares(4, alpha_aux=1.0).retensioned({"left": 4.0, "right": right})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from nightly import at_night
 from starts import double_bubble, joined_caps, sphere, spherical_cap
 
 from generators import double_bubble_exact, joined_caps_exact, sphere_exact, spherical_cap_exact
@@ -80,7 +81,7 @@ def test_below_the_fold_there_is_no_equilibrium(method):
     assert np.isfinite(np.array([v for v in found.numbers().values() if isinstance(v, float)])).all()
 
 
-@pytest.mark.parametrize("edge", [0.25, 0.0625])
+@pytest.mark.parametrize("edge", [0.25, *at_night(0.0625)])
 def test_below_the_fold_at_other_refinements(edge):
     result = solve(spherical_cap(edge, alpha=0.45))
     assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM

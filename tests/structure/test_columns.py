@@ -14,8 +14,8 @@ from pcmc import Material, StructuralModel
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, polyline
+from pcmc.report.chapters import at_rest_chapter, under_load_chapter
 from pcmc.report.tables import Table
-from pcmc.report.under_load import at_rest, chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.columns import column_answers, column_table, column_text, columns_at_rest
 from pcmc.structure.member_forces import members_at_rest
@@ -121,12 +121,12 @@ def test_a_stay_that_would_be_pressed_is_left_out_and_the_others_solved_again():
 
 def test_the_report_has_the_forces_of_columns_where_no_load_cases_were_run():
     model = sail_on(column([0, 0], [0, 0]), stay([0, 0], [-3, -1]), stay([0, 0], [-1, -3]))
-    blocks = list(at_rest(model, Units("m", "kN")))
+    blocks = list(at_rest_chapter(model, Units("m", "kN")))
     [table] = [block for block in blocks if isinstance(block, Table)]
     assert (table.title, len(table.rows)) == ("Forces of columns and stays", 3)
     assert table.rows[0][:3] == ["form pressure", "mast", "column"]
     assert any("no load cases were run" in block for block in blocks if isinstance(block, str))
-    assert list(at_rest(sail_on(), Units("m", "kN"))) == []
+    assert list(at_rest_chapter(sail_on(), Units("m", "kN"))) == []
 
 
 @pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
@@ -139,7 +139,7 @@ def test_each_case_and_the_report_have_the_forces_of_columns():
     assert (analysis.columns["N"][2:].abs().to_numpy() > 1.05 * form["N"].abs().to_numpy()).all()
     assert "columns" in analysis.tables
     assert "euler_over" in str(analysis)
-    tables = [block for block in chapter(analysis, Units("m", "kN")) if isinstance(block, Table)]
+    tables = [block for block in under_load_chapter(analysis, Units("m", "kN")) if isinstance(block, Table)]
     [table] = [block for block in tables if block.title == "Forces of columns and stays"]
     assert table.rows[0][:4] == ["form pressure", "mast", "column", "tube 0.1143 × 0.005"]
     assert table.rows[1][3] == "A = 0.0003"

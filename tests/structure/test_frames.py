@@ -95,6 +95,21 @@ def test_an_arch_buckles_in_its_plane_under_the_load_of_the_closed_form(half):
     assert exact == pytest.approx(following + 1.0, rel=0.03)  # as shallow arches have it
 
 
+def test_a_ring_buckles_out_of_its_plane_and_held_there_within_it():
+    """Under an even load q that keeps its direction: q R³/E I = 9/(4 + E I/G J), else 4, order 2."""
+    bars, off = [10, 20, 40], []
+    for n in bars:
+        at = 2.0 * np.pi * np.arange(n) / n
+        X, thrust = 5.0 * np.stack([np.cos(at), np.sin(at), 0.0 * at], axis=1), np.full(n, -100.0 / 5.0**2)
+        upright = [(point, 2) for point in range(n)]
+        rings = [frame_along(X, held, True, (1e6, 100.0, 100.0, 80.0)) for held in ((), upright)]
+        exact = 9.0 / (4.0 + 100.0 / 80.0), 4.0
+        off.append([ring.buckling(thrust) / value - 1.0 for ring, value in zip(rings, exact, strict=True)])
+    for column in np.transpose(off):
+        assert np.polyfit(np.log(bars), np.log(column), 1)[0] == pytest.approx(-2.0, abs=0.1)
+        assert column[-1] < 0.01
+
+
 def test_clamped_ends_take_a_twelfth():
     n = 32
     forces = np.zeros((n + 1, 3))

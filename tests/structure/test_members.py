@@ -18,8 +18,8 @@ from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
 from pcmc.plot import member_forces
+from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Picture, Table
-from pcmc.report.under_load import chapter
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import forces_on_members, member_tables, members_at_rest, weak_members
 from pcmc.structure.pulls import balancing_force, turns
@@ -211,7 +211,7 @@ def test_the_supports_have_the_ends_of_a_member_and_no_foot_of_its_wall():
 
 @needs_ccx
 def test_the_chapter_of_a_report_has_sections_and_forces_of_members():
-    blocks = list(chapter(hall_under_load(), Units("m", "kN")))
+    blocks = list(under_load_chapter(hall_under_load(), Units("m", "kN")))
     tables = {block.title: block for block in blocks if isinstance(block, Table)}
     [arch] = tables["Members"].rows
     assert arch == ["wall 1", "wall 1", "tube 0.1 × 0.005", "0.001492", "1.688e-06", "1.688e-06", "2.1e+08"]

@@ -9,8 +9,9 @@ import pytest
 
 
 def at_night(*cases: Any) -> list[Any]:
-    """These cases of a parameter, at night only."""
-    return [pytest.param(case, marks=pytest.mark.nightly) for case in cases]
+    """These cases of a parameter, or of several, which are tuples, at night only."""
+    together = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [pytest.param(*case, marks=pytest.mark.nightly) for case in together]
 
 
 def night_but(cases: Iterable[Any], *kept: Any) -> list[Any]:

@@ -22,22 +22,12 @@ function range(values) {
 
 const kind = (index) => (index === 0 ? "stable" : `saddle, index ${index}`);
 
-/** Runs of a branch of one kind, each joined to the next: [first, last, stable]. */
-function runs(index) {
-  const found = [];
-  for (let k = 1; k < index.length; k += 1) {
-    const stable = index[k - 1] === 0 && index[k] === 0;
-    const last = found.at(-1);
-    if (last?.[2] === stable) last[1] = k;
-    else found.push([k - 1, k, stable]);
-  }
-  return found;
-}
-
 /** Draw the diagram and list the equilibria; `visit(number)` shows one, or a point of a branch. */
 export function showDiagram(root, { parameter, value, branches, equilibria, words }, units, visit) {
-  const [x0, x1] = range([value, ...branches.flatMap((branch) => branch.parameter)]);
-  const [y0, y1] = range([...equilibria.map(({ height }) => height), ...branches.flatMap((branch) => branch.height)]);
+  const pieces = branches.flatMap((branch) => branch.pieces);
+  const along = pieces.flatMap(({ points }) => points);
+  const [x0, x1] = range([value, ...along.map(([p]) => p)]);
+  const [y0, y1] = range([...equilibria.map(({ height }) => height), ...along.map(([, h]) => h)]);
   const x = (p) => LEFT + ((p - x0) / (x1 - x0)) * (WIDTH - LEFT - PAD);
   const y = (h) => HEIGHT - BOTTOM - ((h - y0) / (y1 - y0)) * (HEIGHT - BOTTOM - PAD);
   const unit = units.given ? `, ${units.length}` : "";
@@ -71,11 +61,9 @@ export function showDiagram(root, { parameter, value, branches, equilibria, word
     circle.onkeydown = ({ key }) => { if (key === "Enter" || key === " ") shown(number); };
     svg.append(circle);
   };
-  for (const { parameter: at, height, index } of branches) {
-    for (const [first, last, stable] of runs(index)) {
-      const points = at.slice(first, last + 1).map((p, k) => `${x(p)},${y(height[first + k])}`).join(" ");
-      svg.append(drawn("polyline", { points, class: stable ? "" : "saddle" }));
-    }
+  for (const { stable, points } of pieces) {
+    const line = points.map(([p, h]) => `${x(p)},${y(h)}`).join(" ");
+    svg.append(drawn("polyline", { points: line, class: stable ? "" : "saddle" }));
   }
   for (const { parameter: at, height, index, number } of branches) at.forEach((p, k) => point(p, height[k], index[k], number[k], false));
   equilibria.forEach(({ height, index, number }) => point(value, height, index, number, true));

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from ...base import validate
+from ...base.arrays import Floats
 from ...base.errors import MissingExtra, OptionError
 from ...certificate.quantities import Parameter
 from ...surface import Surface, expect_surface
@@ -70,6 +72,20 @@ class Branch:
     def bifurcations(self) -> pd.DataFrame:
         """The events at which the index changes and λ does not turn; rows are numbered as in ``events``."""
         return self.events[(self.events.kind == "index") & (self.events.along_branch < ALONG)]
+
+    def pieces(self, x: str, y: str) -> list[tuple[bool, Floats]]:
+        """Lines (k,2) of column y against x, cut where the index passes 0: whether stable, and the points.
+
+        Events are points of them, too. A diagram draws them solid where stable, and dashed elsewhere.
+        """
+        columns = ["arclength", x, y]
+        events = self.events[columns].assign(index=self.events.index_after)
+        every = np.concatenate([self.points[[*columns, "index"]].to_numpy(float), events.to_numpy(float)])
+        every = every[np.argsort(every[:, 0], kind="stable")]
+        stable = every[:, 3] == 0.0
+        cuts = np.flatnonzero(stable[1:] != stable[:-1]) + 1
+        ends = zip([0, *cuts], [*cuts, len(every)], strict=True)
+        return [(bool(stable[i]), every[i : k + 1, 1:3]) for i, k in ends]
 
     def switch(
         self,

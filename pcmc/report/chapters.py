@@ -1,4 +1,4 @@
-"""The chapter of a report on a roof under load, and that on its members at rest."""
+"""The chapters of a report on a roof under load, on its members at rest, and on its cutting pattern."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..base.units import Units
-from ..plot import member_forces, under_load
+from ..base.units import Units, length_factor
+from ..plot import member_forces, strains, under_load
 from ..plot.figure import png
 from ..structure.columns import column_answers, columns_at_rest
 from ..structure.member_forces import member_tables, members_at_rest, sentences
-from .tables import Block, Columns, Heading, Picture, column, columns_in, text_table, vectors_of
+from .plan import FORMAT, on_paper
+from .tables import Block, Columns, Heading, Picture, column, columns_in, one, text_table, vectors_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..cloth import CuttingPattern
     from ..structure import Analysis
     from ..structure.model import StructuralModel
 
@@ -40,9 +42,15 @@ ABOUT_COLUMNS = (
     "pressed is left out, with N = 0. Euler's load is that of a column with hinged ends. Their own weight is "
     "left out."
 )
+ABOUT_CLOTH = (
+    "Each strip is laid flat with the least strain for which the sides of every seam are equally long. Strain"
+    " is that of the cloth on the roof beside the strain from its tension; its mean is the root mean square"
+    " over the area. Lengths and widths are those of the cut strip, shortened by the compensation, without"
+    " allowances."
+)
 
 
-def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
+def under_load_chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     """Cases, answers, pictures, and the tables of patches, supports and cables."""
     force = units.force or "force"
     yield Heading("Under load", new_page=True)
@@ -76,7 +84,7 @@ def chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield from _columns(analysis.model, analysis.columns, units)
 
 
-def at_rest(model: StructuralModel, units: Units) -> Iterator[Block]:
+def at_rest_chapter(model: StructuralModel, units: Units) -> Iterator[Block]:
     """The forces of members under the form-finding load, where no load cases were run."""
     rest = model.steps[0].name, members_at_rest(model)
     if model.beams or model.bars:
@@ -131,3 +139,23 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
     yield SIGNS
     yield from (Picture("", picture) for picture in pictures)
     yield from (f"{line}." for line in sentences(model, units))
+
+
+def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
+    """What is cut in sentences, the strips on the roof from above and coloured by strain, and their table."""
+    from ..cloth.sheets import seam_sheet
+
+    table, sewn = pattern.table, pattern.seam_table.query("kind != 'rim'")
+    sheet = seam_sheet(pattern, FORMAT, length_factor(units.length, "mm"))
+    yield Heading(f"Cutting pattern, scale {sheet.scale}, lengths in {units.length}", new_page=True)
+    yield on_paper(sheet.scale, *sheet.drawn())
+    area, long = one(float(table["cut_area"].sum())), one(float(sewn["length"].sum()))
+    yield f"{len(table)} strips of {area} {units.area} of cloth, {long} {units.length} of seams between them."
+    yield ABOUT_CLOTH
+    yield Picture("Strain of the cloth", png(strains(pattern, width=PIXELS)))
+    columns: Columns = columns_in(table, ["length", "width"], units.length)
+    columns |= columns_in(table, ["area", "cut_area"], units.area)
+    names = {"strain_min": "strain from", "strain_max": "to", "strain_rms": "mean"}
+    names |= {"warp": "warp shorter", "weft": "weft shorter"}
+    columns |= columns_in(table.rename(columns=names), names.values(), "%")
+    yield text_table("Strips", {"strip": table["strip"], "patch": table["patch"]}, columns)
