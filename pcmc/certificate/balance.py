@@ -170,10 +170,8 @@ def strained_junction(surface: Surface) -> UnbalancedJunction | None:
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     """Names a ``strained_junction``; or empty."""
-    strained, how = (
-        unbalanced(surface, pinchable, HARDLY),
-        "could balance only with its sheets nearly on each other",
-    )
+    strained = unbalanced(surface, pinchable, HARDLY)
+    how = "could balance only with its sheets nearly on each other"
     return "" if strained is None else strained.told(how, "against") + strained.hint
 
 

@@ -21,11 +21,7 @@ from .proof import WeakCable
 
 def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
     """The vertices (k,) of a cable, its two ends last, which share of the chord between these they are at,
-    and how far out from it (k,3).
-
-    Raises
-    ------
-    OptionError : for a cable that is closed, branched or in several parts.
+    and how far out from it (k,3). OptionError for a cable that is closed, branched or in several parts.
     """
     vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
     if (count > 2).any() or (count == 1).sum() != 2:

@@ -140,10 +140,8 @@ def judge(f: Findings) -> tuple[Verdict, str]:
     if not f.moving and f.quality > COLLAPSED and f.surface.tensions.any():
         told.append(only_coarse(f.surface, f.pinchable))
     if f.pulled:
-        text = (
-            f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than the"
-        )
-        told.append(f"{text} wall can hold: the wall will stand there once solved")
+        text = f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than"
+        told.append(f"{text} the wall can hold: the wall will stand there once solved")
     return verdict, "; ".join(str(part) for part in (*told, f.left_over) if part)
 
 

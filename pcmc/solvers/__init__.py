@@ -103,10 +103,8 @@ def solve(
 
     Raises
     ------
-    OptionError
-        For an unknown method or option, with the nearest known one, or a value out of range.
-    SurfaceError
-        If ``surface`` is no Surface, or all of its vertices are at one point.
+    OptionError : an unknown method or option, with the nearest known one, or a value out of range.
+    SurfaceError : ``surface`` is no Surface, or all of its vertices are at one point.
 
     See Also
     --------
