@@ -32,8 +32,7 @@ from .elements import Elements, add_values, energy_mesh
 from .flat_pieces import add_plane_volumes
 from .triangles import add_weights, areas_and_volumes, measure, moments
 
-LINE_FORCES = (cables.elements, cable_weights.elements)
-FORCES = (*LINE_FORCES, flat_pieces.elements)
+FORCES = (cables.elements, cable_weights.elements, flat_pieces.elements)
 Rates = Mapping[str, Floats]
 """Of change, by the kinds of ``pcmc.surface.values.KINDS``: one for each patch or cable."""
 
