@@ -30,8 +30,7 @@ from ..base.arrays import Floats
 from ..base.tolerances import AT_REST, PARALLEL
 from ..base.units import NO_UNITS, Units
 from ..forces.motion_space import MotionSpace
-from ..forces.pinching import StandingPart
-from ..forces.pull import pull_and_capacity
+from ..forces.pinching import StandingPart, pull_and_capacity
 from ..stability.backward_error import backward_error
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
