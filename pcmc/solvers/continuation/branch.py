@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,6 @@ import pandas as pd
 from ...base import validate
 from ...base.arrays import Floats
 from ...base.errors import MissingExtra, OptionError
-from ...certificate.quantities import Parameter
 from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
 from ..result import Callback
@@ -24,6 +23,9 @@ from .direction import Direction, ParameterLine
 from .options import Ending, FollowOptions
 from .state import QUANTITIES, BranchMesh
 from .tracing import Tracer
+
+if TYPE_CHECKING:
+    from ...certificate.quantities import Parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,12 +302,14 @@ def follow(
         raise MissingExtra("mmgpy", "remesh")
     goals = _goals(stop, until)
     direction: object = Direction({parameter: 1.0}) if isinstance(parameter, str) else parameter
-    if isinstance(parameter, Parameter):
-        by_kind: dict[str, Any] = {parameter.key: dict.fromkeys(parameter.names, 1.0)}
-        direction = Direction(**by_kind)
     if not isinstance(direction, Direction | BoundaryMotion):
-        expected = "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
-        validate.refuse("parameter", parameter, expected)
+        from ...certificate.quantities import Parameter  # slow to import
+
+        if not isinstance(direction, Parameter):
+            expected = "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
+            validate.refuse("parameter", parameter, expected)
+        by_kind: dict[str, Any] = {direction.key: dict.fromkeys(direction.names, 1.0)}
+        direction = Direction(**by_kind)
     if chosen.remesh is not None and isinstance(direction, BoundaryMotion):
         message = "remesh: a new mesh has other boundary vertices than BoundaryMotion moves; leave remesh out"
         raise OptionError(message, what="remesh", found=chosen.remesh)
