@@ -70,6 +70,12 @@ class BarFrame:
         """
         if not (N < 0.0).any():
             return np.inf
+        label = components(self.bars, len(self.points))
+        mine = np.isin(label, label[self.bars[N < 0.0]])
+        if not mine.all():  # other parts of the frame are not asked
+            bars, holds = mine[self.bars[:, 0]], self.holds[:, np.repeat(mine, 6)]
+            ends, held = (np.cumsum(mine) - 1)[self.bars[bars]], holds[holds.any(axis=1)]
+            return BarFrame(self.points[mine], ends, self.stiffness[bars], held, self.up).buckling(N[bars])
         (EA, EI, across, _), L, n = self.stiffness.T, self._axes[1], 6 * len(self.points)
         G = self._assembled(
             _blocks(L, 0.0 * N, N / (30 * L), N / (30 * L), N * (EI + across) / (EA * L), PULLED)

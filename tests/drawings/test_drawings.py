@@ -241,6 +241,29 @@ def test_setting_out_begins_with_the_ends_of_the_ridge(squares, drawings):
     assert [row[0] for row in first] == ["P1", "P2"]
 
 
+def test_sections_are_at_quarters_of_the_height_and_through_the_middle_or_along_a_line():
+    """Of a pyramid over 2 ≤ x ≤ 4, 5 ≤ y ≤ 7, with its tip at (3.5, 6, 3), 2 above its base."""
+    X = [[4, 7, 1], [2, 7, 1], [2, 5, 1], [4, 5, 1], [3.5, 6, 3]]
+    F = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    roof = pcmc.Surface(X, F, [0] * 4, [pcmc.Patch("roof", 1.0)], fixed=range(4))
+
+    def texts(found):
+        sheet = next(sheet for sheet in found.sheets if sheet.title == "Sections along lines")
+        return {text.text for text in sheet.drawn()[1]}
+
+    usual = drawing_set(roof, "m", sheet="A3", anyway=True)
+    *level, along_x, along_y = usual.sections
+    for line, z, side in zip(level, (1.5, 2.0, 2.5), (1.5, 1.0, 0.5), strict=True):
+        assert line.closed
+        np.testing.assert_allclose(line.points[:, 2], z)
+        np.testing.assert_allclose(np.ptp(line.points[:, :2], axis=0), side)
+    np.testing.assert_allclose(sorted(along_x.points.tolist()), [[2, 6, 1], [3.5, 6, 3], [4, 6, 1]])
+    np.testing.assert_allclose(sorted(along_y.points[[0, -1]].tolist()), [[3, 5, 1], [3, 7, 1]])
+    assert texts(usual) >= {"from (2, 6) towards (4, 6)", "from (3, 5) towards (3, 7)", "2.000", "+2.333"}
+    diagonal = drawing_set(roof, "m", sheet="A3", anyway=True, lines=[((2.9, 5.9), (3.1, 6.1))])
+    assert texts(diagonal) >= {"2.828", "+2.600"}
+
+
 def test_a_name_longer_than_dxf_allows_is_cut(tmp_path, squares):
     patches = [replace(patch, name=f"{patch.name} {'x' * 85}") for patch in squares.patches]
     given = (squares.vertices, squares.faces, squares.patch_of_face, patches, squares.fixed)
