@@ -234,12 +234,18 @@ def label(name: str) -> str:
 
 
 def split_entries(*arguments: Any) -> None:
-    """Put the meaning of ``name : meaning`` on a line of its own: to numpydoc it would be the type."""
+    """Put the meaning of ``name : meaning`` on a line of its own: to numpydoc it would be the type.
+
+    An example that follows a section gets its heading: to numpydoc it would be an entry of the section.
+    """
     lines = arguments[-1]
     section, out = "", []
     for line, following in zip(lines, [*lines[1:], ""], strict=False):
         if following and not following.strip("-"):
             section = line
+        if section in ENTRIES and line.startswith(">>>"):
+            section = "Examples"
+            out += [section, "-" * len(section), ""]
         name, colon, meaning = line.partition(" : ")
         if section in ENTRIES and colon and not line.startswith(" "):
             out += [name, f"    {meaning}"]

@@ -76,11 +76,8 @@ class Design:
 
     def __repr__(self) -> str:
         """How the search ended, what it reached and with what, above the surface."""
-        targets, parameters = (
-            f"targets: {values_text(self.targets)}",
-            f"parameters: {values_text(self.parameters)}",
-        )
-        return f"{self.message}\n  {targets}\n  {parameters}\n  {self.solves} solves\n{self.surface!r}"
+        values = f"  targets: {values_text(self.targets)}\n  parameters: {values_text(self.parameters)}"
+        return f"{self.message}\n{values}\n  {self.solves} solves\n{self.surface!r}"
 
     @property
     def met(self) -> bool:

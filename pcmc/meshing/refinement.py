@@ -65,7 +65,11 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     """
     expect_surface(surface)
     for _ in range(refinable("levels", levels, surface.m)):
-        surface = _refine_once(surface, project)
+        a, b, c = surface.faces.T
+        bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
+        F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
+        every = np.ones(len(surface.topology.edges), dtype=bool)
+        surface = with_vertices_on(surface, every, F, np.repeat(surface.patch_of_face, 4), project)
     return surface
 
 
@@ -173,14 +177,6 @@ def projected(project: Projection, points: Floats) -> Floats:
         message = f"project: expected a function that returns shape {expected}, it returned {found}"
         raise OptionError(message, what="project", found=found, expected=expected)
     return moved
-
-
-def _refine_once(surface: Surface, project: Projection | None) -> Surface:
-    a, b, c = surface.faces.T
-    bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
-    F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-    every = np.ones(len(surface.topology.edges), dtype=bool)
-    return with_vertices_on(surface, every, F, np.repeat(surface.patch_of_face, 4), project)
 
 
 def with_vertices_on(

@@ -17,10 +17,10 @@ from ..base.validate import checked_name
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
+from ..surface.parts import listed
 from ..surface.pieces import to_local, to_space
-from ..surface.summary import listed
 from . import parts
-from .parts import Divider, PatchSpec, check_keys
+from .parts import check_keys
 
 CURVES = {"kind": "a list of curves or tables"}  # of keys
 
@@ -161,9 +161,18 @@ class Plan:
     def __repr__(self) -> str:
         """Size, outline, patches, dividers and holes, a line each."""
         width, depth = np.ptp(self.outline.at(self.outline.dense), axis=0)[:2].tolist()
+        patches, dividers = list[str](), list[str]()
+        for p in self.patches:
+            load = f"pressure {p.pressure:g}" if p.volume is None else f"volume {p.volume:g}"
+            snow = f", snow {p.snow:g}" if p.snow else ""
+            patches.append(f"{p.name} (tension {p.tension:g}, {load}{snow})")
+        for d in self.dividers:
+            wall = f"wall {d.wall:g}" if isinstance(d.wall, int | float) else d.wall and f"wall {d.wall}"
+            cable = None if d.cable is None else f"cable {d.cable:g}"
+            dividers.append(f"{d.name} ({', '.join(filter(None, (wall, cable))) or 'no wall'})")
         texts = {
-            "patches": [_patch_text(patch) for patch in self.patches] or [f"all (tension {self.tension:g})"],
-            "dividers": [_divider_text(divider) for divider in self.dividers],
+            "patches": patches or [f"all (tension {self.tension:g})"],
+            "dividers": dividers,
             "holes": [f"{hole.name.removeprefix('hole ')} ({hole.edge})" for hole in self.holes],
             "cables": [f"{line.name or 'cable'} (tension {line.tension:g})" for line in self.cables],
             "rooms": [f"{name} (volume {room.volume:g})" for name, room in self.rooms.items()],
@@ -230,16 +239,3 @@ def plan_from(data: Mapping[str, Any]) -> Plan:
         check_keys(values["plane"], Plane, "plane")
         values["plane"] = Plane(**values["plane"])
     return Plan(**values)
-
-
-def _patch_text(patch: PatchSpec) -> str:
-    load = f"pressure {patch.pressure:g}" if patch.volume is None else f"volume {patch.volume:g}"
-    snow = f", snow {patch.snow:g}" if patch.snow else ""
-    return f"{patch.name} (tension {patch.tension:g}, {load}{snow})"
-
-
-def _divider_text(divider: Divider) -> str:
-    wall = f"{divider.wall:g}" if isinstance(divider.wall, int | float) else divider.wall
-    loads = {"wall": wall, "cable": None if divider.cable is None else f"{divider.cable:g}"}
-    texts = [f"{name} {value}" for name, value in loads.items() if value is not None]
-    return f"{divider.name} ({', '.join(texts) or 'no wall'})"

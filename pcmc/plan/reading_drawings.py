@@ -66,8 +66,19 @@ def dxf_entities(path: str) -> dict[str, Any]:
     for layer, entity in _with_blocks(document.modelspace(), None, 0):
         if layer.lower() in unseen or entity.dxf.get("invisible", 0):
             contents.hide(layer)
+            continue
+        kind, handle = entity.dxftype(), str(entity.dxf.get("handle") or "in a block")
+        if kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline):
+            kind = "polyface"
+        if kind == "POINT":
+            contents.add(layer, kind, handle, point=tuple(entity.dxf.location))
+        elif kind in ("TEXT", "MTEXT"):
+            place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
+            contents.add(layer, kind, handle, point=tuple(place), text=entity.plain_text())
+        elif (pieces := _dxf_pieces(kind, entity)) is not None:
+            contents.add(layer, kind, handle, pieces=pieces)
         else:
-            _add_dxf(contents, layer, entity)
+            contents.leave_out(layer, "3-D faces" if kind in SOLID else kind)
     return contents.values
 
 
@@ -84,21 +95,6 @@ def _with_blocks(entities: Any, layer: str | None, depth: int) -> Iterator[tuple
                 yield from _with_blocks(copy.virtual_entities(), own, depth + 1)
         else:
             yield own, entity
-
-
-def _add_dxf(contents: Contents, layer: str, entity: Any) -> None:
-    kind, handle = entity.dxftype(), str(entity.dxf.get("handle") or "in a block")
-    if kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline):
-        kind = "polyface"
-    if kind == "POINT":
-        contents.add(layer, kind, handle, point=tuple(entity.dxf.location))
-    elif kind in ("TEXT", "MTEXT"):
-        place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
-        contents.add(layer, kind, handle, point=tuple(place), text=entity.plain_text())
-    elif (pieces := _dxf_pieces(kind, entity)) is not None:
-        contents.add(layer, kind, handle, pieces=pieces)
-    else:
-        contents.leave_out(layer, "3-D faces" if kind in SOLID else kind)
 
 
 def _dxf_pieces(kind: str, entity: Any) -> list[tuple[Any, ...]] | None:

@@ -29,6 +29,7 @@ from ..surface.geometry import unit_vectors
 from ..surface.topology import components
 
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
+EXACT = 1e-10  # of the factor at which bars buckle
 LOOSE = 1e-9  # a rigid motion that supports hold less than so moves freely
 BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
 PULLED = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]], dtype=float)
@@ -70,6 +71,12 @@ class BarFrame:
         """
         if not (N < 0.0).any():
             return np.inf
+        label = components(self.bars, len(self.points))
+        mine = np.isin(label, label[self.bars[N < 0.0]])
+        if not mine.all():  # other parts of the frame are not asked
+            bars, holds = mine[self.bars[:, 0]], self.holds[:, np.repeat(mine, 6)]
+            ends, held = (np.cumsum(mine) - 1)[self.bars[bars]], holds[holds.any(axis=1)]
+            return BarFrame(self.points[mine], ends, self.stiffness[bars], held, self.up).buckling(N[bars])
         (EA, EI, across, _), L, n = self.stiffness.T, self._axes[1], 6 * len(self.points)
         G = self._assembled(
             _blocks(L, 0.0 * N, N / (30 * L), N / (30 * L), N * (EI + across) / (EA * L), PULLED)
@@ -80,7 +87,7 @@ class BarFrame:
             return np.asarray(factor.solve(np.pad(-(G @ u.ravel()), (0, factor.shape[0] - n)))[:n])
 
         start = np.random.default_rng(0).standard_normal(n)  # no mode is square to it, as to an even vector
-        most = float(eigs(LinearOperator((n, n), bent), 1, which="LR", v0=start)[0][0].real)
+        most = float(eigs(LinearOperator((n, n), bent), 1, which="LR", v0=start, tol=EXACT)[0][0].real)
         return 1.0 / most if most > 0.0 else np.inf
 
     @cached_property

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats, Ints, cached_array
+from ..base.arrays import Floats, Ints, cached_array, kept_with_owner
 from ..base.units import Units
 from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
@@ -103,6 +103,7 @@ class MemberForces:
         return self.deflection / (self.span / LIMIT)
 
 
+@kept_with_owner
 def members_at_rest(model: StructuralModel) -> tuple[MemberForces, ...]:
     """The beams of a model under the pull of the sheets at rest, with the displacements of beams alone."""
     return _along_lines(model, model.steps[0])

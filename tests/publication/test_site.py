@@ -1,4 +1,4 @@
-"""The built site, in a browser: no page and no code is wider than a laptop's or a telephone's screen."""
+"""The built site: no page is wider than a laptop's or a telephone's screen, and examples are examples."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from browsing import browser, needs_browser
 
 HOME = Path(__file__).resolve().parents[2]
 
-# What is cut or has to be scrolled sideways: [what, its width, the width there is]. Tables may scroll by
-# themselves on a telephone.
+# What is cut or has to be scrolled sideways: [what, its width, the width there is]. Tables, and those that a
+# command prints, may scroll by themselves on a telephone.
 TOO_WIDE = """
 const narrow = window.innerWidth < 700, found = [];
 const page = document.documentElement;
 if (page.scrollWidth > page.clientWidth) found.push(["page", page.scrollWidth, page.clientWidth]);
 for (const one of document.querySelectorAll("pre, .pst-scrollable-table-container, .output")) {
-  if (narrow && one.tagName !== "PRE") continue;
+  if (narrow && (one.tagName !== "PRE" || one.closest(".highlight-text, .output"))) continue;
   if (one.scrollWidth > one.clientWidth + 1) {
     found.push([one.textContent.trim().slice(0, 60), one.scrollWidth, one.clientWidth]);
   }
@@ -71,3 +71,10 @@ def test_notes_to_developers_are_not_on_the_pages(site):
     text = (site / "comparison.html").read_text(encoding="utf-8")
     assert "do not edit" in text
     assert "do not edit" not in re.sub(r"<!--.*?-->", "", text, flags=re.S)
+
+
+@pytest.mark.nightly
+def test_examples_of_docstrings_are_no_entries_of_their_parameters(site):
+    pages = sorted((site / "reference").rglob("*.html"))
+    assert pages
+    assert not [page for page in pages if "<dt><strong>&gt;&gt;&gt;" in page.read_text(encoding="utf-8")]

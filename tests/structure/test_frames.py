@@ -62,6 +62,16 @@ def test_a_column_buckles_under_eulers_load_to_the_fourth_order():
     clamped = frame_along(straight(16), [(end, k) for end in (0, -1) for k in range(6)])
     assert clamped.buckling(np.full(16, -2.0)) == pytest.approx(4.0 * euler / 2.0, rel=1e-4)
     assert clamped.buckling(np.ones(16)) == np.inf
+    both = BarFrame(
+        np.concatenate([straight(8), straight(8) + 5.0 * UP]),
+        np.concatenate([frame_along(straight(8)).bars + first for first in (0, 9)]),
+        np.tile((1e6, 2000.0, 500.0, 300.0), (16, 1)),
+        np.kron(np.eye(2), frame_along(straight(8), hinged(3)).holds),
+        UP,
+    )
+    alone = frame_along(straight(8), hinged(3)).buckling(-np.ones(8))
+    assert both.buckling(-np.repeat([0.0, 1.0], 8)) == pytest.approx(alone)
+    assert both.buckling(-np.repeat([3.0, 1.0], 8)) == pytest.approx(alone / 3.0)
 
 
 def buckling_of_an_arc(half):
