@@ -1,16 +1,17 @@
 """Frames of straight bars with bending: displacements, forces within the bars, and loads that buckle them.
 
-All N, V and M of members are from here: CalculiX, which has their displacements, expands a beam to a brick
-and prints no forces of sections. Each bar from a to b has twelve coordinates: the displacements and turns of
-both ends. In its axes (x along it, z upright, y across) its stiffness K is that of Euler and Bernoulli: E A/L
-along it, G J/L in torsion, and in each of the planes of bending, with the displacements w and the slopes φ,
+N, V and M of members all come from here. At rest there is no CalculiX; in its cases it has the displacements,
+but expands a beam to a brick, and has forces of sections in its files for viewers alone. Each bar from a to b
+has twelve coordinates: the displacements and turns of both ends. In its axes (x along it, z upright, y
+across) its stiffness K is that of Euler and Bernoulli: E A/L along it, G J/L in torsion, and in each of the
+planes of bending, with the displacements w and the slopes φ,
 
     E I/L³ [[12, 6 L, -12, 6 L], [6 L, 4 L², -6 L, 2 L²], [-12, -6 L, 12, -6 L], [6 L, 2 L², -6 L, 4 L²]].
 
 With loads at the ends of bars alone its forces at the ends are exact. A force N along it adds, with the same
-cubics between the ends, the stiffness G(N), N (I + I')/(A L) in torsion and in each of these planes
+cubics between the ends, the stiffness G(N) (Przemieniecki 1968): N (I + I')/(A L) in torsion, and in bending
 
-    N/30 L [[36, 3 L, -36, 3 L], [3 L, 4 L², -3 L, -L²], [-36, -3 L, 36, -3 L], [3 L, -L², -3 L, 4 L²]].
+    N/(30 L) [[36, 3 L, -36, 3 L], [3 L, 4 L², -3 L, -L²], [-36, -3 L, 36, -3 L], [3 L, -L², -3 L, 4 L²]].
 """
 
 from __future__ import annotations
