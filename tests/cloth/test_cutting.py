@@ -220,6 +220,18 @@ def test_a_line_that_ends_inside_a_sheet_is_a_dart():
     assert pattern.largest_difference < 1e-6
 
 
+def test_sheets_close_over_each_other_are_cut_apart_and_a_square_one_along_x():
+    X = np.array([[x, y, z] for z in (0.0, 0.01) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)])
+    F = np.concatenate([grid(2, 2)[:, ::-1], grid(2, 2)[:, ::-1] + 9])
+    patches = [Patch("lower", 1.0, 0.0), Patch("upper", 1.0, 0.0)]
+    two = Surface(X, F, np.repeat([0, 1], 8), patches, fixed=range(18))
+    pattern = cutting_pattern(two, strips=2, anyway=True)
+    assert pattern.table["patch"].tolist() == ["lower", "lower", "upper", "upper"]
+    assert pattern.table["cut_area"].to_numpy() == pytest.approx(2.0)
+    for strip in pattern.strips:
+        assert np.ptp(strip.roof, axis=0) == pytest.approx([2.0, 1.0, 0.0])
+
+
 def test_cables_and_holes_are_cut_around():
     lines = {"holes": [{"curve": [[3.0, 1.5], [5.0, 1.5], [5.0, 2.5], [3.0, 2.5]]}]}
     hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], edge_length=0.5, tension=8.0, **lines).surface()
