@@ -128,6 +128,18 @@ def test_a_small_panel_with_an_acute_corner_is_no_sliver():
     assert left.start.tolist() == [0, 3, 7]
 
 
+@pytest.mark.parametrize(("depth", "start"), [(0.03, [0, 4, 7]), (0.06, [0, 3, 7, 10])])
+def test_a_panel_on_the_rim_below_a_hundredth_of_the_square_of_the_size_is_left_out(depth, start):
+    """A triangle of that depth on a side of 0.4, beside a quad and another triangle; the size is 2."""
+    xy = [[0, 0], [0.2, -depth], [0.4, 0], [0.4, 0.5], [0, 0.5], [0, -0.5], [0.4, -0.5]]
+    points, kind = 2.0 * np.pad(np.array(xy), ((0, 0), (0, 1))), np.full(7, CORNER)
+    corners, every = np.array([0, 1, 2, 0, 2, 3, 4, 1, 5, 6]), np.array([0, 3, 7, 10])
+    rest = np.zeros(3, dtype=int), np.ones(3, dtype=bool), np.zeros(3)
+    left = tidied(Net(points, np.tile([0.0, 0, 1], (7, 1)), kind, every, corners, *rest), 2.0)
+    assert np.array_equal(left.points, points)
+    assert left.start.tolist() == start
+
+
 def test_the_share_of_the_roof_that_panels_cover_grows_as_they_get_smaller(walled):
     left = [1.0 - panel_net(walled, size, "quads").covered for size in (1.6, 0.8)]
     assert 0.0 < 2.0 * left[1] < left[0] < 0.01
