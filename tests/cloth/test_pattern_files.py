@@ -1,5 +1,7 @@
 """Cutting patterns in files: sheets, tables, the section of a project, the command."""
 
+from itertools import combinations
+
 import ezdxf
 import numpy as np
 import pandas as pd
@@ -115,6 +117,15 @@ def test_sheets_and_model_have_every_strip(pattern, tmp_path):
     titles = [sheet.title for sheet in drawings.sheets]
     assert titles[0] == "Seams on the roof"
     assert titles[-2:] == ["Strips", "Seams"]
+
+
+def test_strips_lie_apart_at_true_size_each_with_its_number_inside(pattern):
+    flat = pattern_drawings(pattern, "m", sheet="A3").flat
+    cut = [Polygon(line.points) for line in flat.lines if line.layer == "PCMC-CUT"]
+    assert all(one.distance(other) > 1.0 for one, other in combinations(cut, 2))  # mm
+    for strip, outline in zip(pattern.strips, cut, strict=True):
+        (at,) = (text.at for text in flat.texts if text.text == f"{strip.number}  {strip.patch}")
+        assert outline.contains(Point(at))
 
 
 def test_the_picture_shows_the_strain(pattern, tmp_path):
