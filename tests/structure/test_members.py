@@ -372,6 +372,17 @@ def test_a_sentence_has_the_force_that_is_largest_in_size_and_what_it_leaves():
     assert f"would leave {100.0 * share:.0f} % of the sheets' pull" in sentences(arch, Units())[0]
 
 
+@pytest.mark.parametrize(("ends", "shown"), [((-3.0, 1.0), "-3"), ((-1.0, 3.0), "3")])
+def test_a_sentence_shows_a_thrust_that_is_larger_than_the_pull(monkeypatch, ends, shown):
+    [beam] = members_at_rest(hall_with())
+    within = beam.within.copy()
+    within[:, 0] = np.linspace(*ends, len(within))
+    turned = [replace(beam, within=within)]
+    monkeypatch.setattr("pcmc.structure.member_forces.members_at_rest", lambda model: turned)
+    [text] = sentences(hall_with(), Units("m", "kN"))
+    assert text.startswith(f"wall 1: at rest N = {shown} kN, ")
+
+
 def test_the_lines_that_the_command_offers_give_a_shape_that_does_not_bend(tmp_path, capsys):
     """What N leaves of the sheets' pull falls below a twentieth: by the project, its lines, and again."""
 
