@@ -107,7 +107,7 @@ def _needs(module: str, name: str) -> tuple[tuple[str, str], ...]:
     tree, named = _tree(_path(module)), _named(_path(module))
     if name not in named:
         return tuple(_imports(tree, module))
-    nodes = [node for node in (named[name], *filter(_runs, tree.body)) if not isinstance(node, IMPORT)]
+    nodes = [node for node in (named[name], *_loose(_path(module))) if not isinstance(node, IMPORT)]
     used = {part.id for node in nodes for part in ast.walk(node) if isinstance(part, ast.Name)} | {name}
     imports = [_with_names(node, used) for node in tree.body if isinstance(node, IMPORT)]
     own = {other for other in used & named.keys() if not isinstance(named[other], IMPORT)}
@@ -147,6 +147,12 @@ def _reached(tree: ast.Module, starts: frozenset[str]) -> ast.Module:
     return ast.Module(body, [])
 
 
+@cache
+def _loose(path: Path) -> list[ast.stmt]:
+    """The statements on top of a module that run whenever it is imported."""
+    return [node for node in _tree(path).body if _runs(node)]
+
+
 def _runs(node: ast.stmt) -> bool:
     """Whether a statement on top of a module does more than give names to something."""
     if isinstance(node, ast.Assign):
@@ -177,7 +183,8 @@ def _imports(tree: ast.Module, module: str) -> Iterator[tuple[str, str]]:
     """The names of other modules of this checkout that a module's code imports: (module, name or ALL)."""
     package = module if _path(module).name == "__init__.py" else module.rpartition(".")[0]
     modules = {}  # by the name that stands for one here
-    for node in _run(tree):
+    nodes = list(_run(tree))
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 if alias.name.split(".")[0] in PACKAGES:
@@ -192,11 +199,11 @@ def _imports(tree: ast.Module, module: str) -> Iterator[tuple[str, str]]:
         elif isinstance(node, ast.Call) and _is_import_module(node):
             yield from ((found, ALL) for found in _imported_by_call(node, package))
     parts = set()
-    for node in _run(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules:
             parts.add(node.value)
             yield from _home(modules[node.value.id], node.attr)
-    for node in _run(tree):  # a module handed on as it is
+    for node in nodes:  # a module handed on as it is
         if isinstance(node, ast.Name) and node.id in modules and node not in parts:
             yield modules[node.id], ALL
 
@@ -269,11 +276,13 @@ def _imported_by_call(node: ast.Call, package: str) -> Iterator[str]:
             yield f"{package}.{path.parent.name}"
 
 
+@cache
 def _path(module: str) -> Path:
     folder = HOME.joinpath(*module.split("."))
     return folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
 
 
+@cache
 def _exists(module: str) -> bool:
     return _path(module).is_file()
 

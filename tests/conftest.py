@@ -1,4 +1,7 @@
-"""What several test files start from."""
+"""What several test files start from.
+
+The process that hands out the tests reads this file, too: fixtures import what takes long.
+"""
 
 import os
 import shutil
@@ -7,13 +10,7 @@ import sys
 
 import pytest
 from browsing import SOFTWARE_GL, Explored, browser
-from explore_cases import designed_hall
 from small_project import SMALL
-
-from generators import bezier_hall, spherical_cap
-from pcmc import explore, solve
-from pcmc.explore.session import Session, solved_start
-from pcmc.plot import scene as raster
 
 
 def pytest_addoption(parser):
@@ -34,6 +31,8 @@ def pytest_sessionstart():
     Some tests raise SIGINT, and a process that they start inherits whether it is ignored.
     """
     if os.environ.get("CI") and "PYTEST_XDIST_WORKER" not in os.environ:
+        from pcmc.plot import scene as raster
+
         missing = [name for name in ("evolver", "ccx", "chromium", "pdftotext") if shutil.which(name) is None]
         missing += [] if raster.opengl() else ["OpenGL"]
         if missing:
@@ -46,6 +45,9 @@ def pytest_sessionstart():
 @pytest.fixture(scope="session")
 def small_cap():
     """A stable cap of few triangles, at rest under tension 0.6."""
+    from generators import spherical_cap
+    from pcmc import solve
+
     return solve(spherical_cap(0.25)).surface
 
 
@@ -68,6 +70,9 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def explorer():
     """The page of a hall, served."""
+    from generators import bezier_hall
+    from pcmc import explore
+
     running = explore.start(bezier_hall(edge_length=10.0), title="the hall")
     yield running
     running.close()
@@ -97,9 +102,13 @@ def hall_folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def hall_roof(hall_folder):
     """The hall of ``explore_cases`` at its targets, as the page opens it."""
+    from explore_cases import designed_hall
+
     return designed_hall(hall_folder)
 
 
 @pytest.fixture
 def hall_session(hall_roof):
+    from pcmc.explore.session import Session, solved_start
+
     return Session(solved_start(hall_roof.surface))

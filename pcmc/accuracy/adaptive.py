@@ -257,11 +257,6 @@ class _Round:
     excess: float  # the largest error bar over its accuracy
 
     @property
-    def settled(self) -> bool:
-        """Whether finer meshes have this surface, and all of its quantities a limit."""
-        return self.check.persists and math.isfinite(self.excess)
-
-    @property
     def record(self) -> dict[str, Any]:
         """The numbers for the history."""
         return {"triangles": self.result.surface.m, "verdict": self.check.verdict.name.lower()}
@@ -338,7 +333,8 @@ class _Search:
                     f"the first mesh has only points of them, and the {row_name(*goal)} may be {doubt:.2g}"
                     " off for that; draw them in a plan, start from more points, or give boundary= a function"
                 )
-        if len(self.rounds) >= PATIENCE and not any(r.settled for r in self.rounds[-PATIENCE:]):
+        limits = [r.check.persists and math.isfinite(r.excess) for r in self.rounds[-PATIENCE:]]
+        if len(limits) == PATIENCE and not any(limits):
             rows = here.values[~np.isfinite(here.values["error"])]
             names = ", ".join(map(row_name, rows["quantity"], rows["of"]))
             why = "; ".join(filter(None, (here.check.detail, here.check.advice)))

@@ -19,7 +19,7 @@ from ..base.errors import OptionError
 from ..base.tolerances import AT_REST
 from ..certificate import certify
 from ..certificate.measures import Measurement
-from ..forces.parameters import gradient_by
+from ..forces.functional import gradient_by
 from ..surface import Surface
 from .margins import Margin, MarginEnd, margin
 from .varied import Varied

@@ -196,10 +196,8 @@ class Margin:
         number = {f"{of}_value": self.value} if math.isnan(self.factor) else {of: self.factor}
         return {**number, f"{of}_error": self.bar, f"{of}_ends_by": self.ends_by.name.lower()}
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
-
-    __repr__ = __str__
 
     def text(self, units: Units = NO_UNITS) -> str:
         """The margin in a sentence."""

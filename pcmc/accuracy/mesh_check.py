@@ -102,10 +102,8 @@ class MeshCheck:
     def _head(self) -> str:
         return "\n".join(filter(None, (self.verdict.value, self.detail, self.advice)))
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
-
-    __repr__ = __str__  # what a prompt shows: the table, not arrays
 
 
 def check_mesh(

@@ -171,13 +171,8 @@ def strained_junction(surface: Surface) -> UnbalancedJunction | None:
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     """Names a ``strained_junction``; or empty."""
     strained = unbalanced(surface, pinchable, HARDLY)
-    if strained is None:
-        return ""
-    others = " + ".join(f"{tension:g}" for tension in strained.others)
-    return (
-        f"the tensions at the junction {' | '.join(strained.junction)} could balance only with its sheets"
-        f" nearly on each other: {strained.strongest:g} against {others}{strained.hint}"
-    )
+    how = "could balance only with its sheets nearly on each other"
+    return "" if strained is None else strained.told(how, "against") + strained.hint
 
 
 def _remedy(surface: Surface, sheets: Sequence[int]) -> tuple[str, float, bool] | None:
@@ -207,8 +202,8 @@ def unheld(surface: Surface) -> Unheld | None:
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
     ...                [Patch("tent", 1.0)], on_plane=range(4))
-    >>> unheld(tent), unheld(tent.retensioned(None, {"tent": 0.0})), growing_part(tent)
-    (None, Unheld(vertex=0, falls=False), 0)
+    >>> unheld(tent), unheld(tent.retensioned(None, {"tent": 0.0})), growing_part(tent)[:42]
+    (None, Unheld(vertex=0, falls=False), 'nothing fixes the part of the surface arou')
     """
     parts, patch = surface.topology.components, surface.patch_of_face
     resting = surface.held.copy()
@@ -224,19 +219,16 @@ def unheld(surface: Surface) -> Unheld | None:
     return None
 
 
-def growing_part(surface: Surface) -> int | None:
-    """A vertex of a part under pressure that nothing fixes: none of its equilibria is stable; or None.
+def growing_part(surface: Surface) -> str:
+    """Names a part under pressure that nothing fixes, so that none of its equilibria is stable; or empty.
 
     Its homotheties about Π's point are free: E(s) = s² T - s³ P, or with cables s C + s² T - s³ P, where
     T = Σ α A and P = Σ p V. At rest C + 2 T = 3 P, and there E'' = 2 T - 6 P = -2 (T + C) < 0.
     """
-    parts = surface.topology.components
-    growing = (int(np.flatnonzero(parts == part)[0]) for part, pressed in _scaled(surface) if pressed)
-    return next(growing, None)
-
-
-def describe_growing(vertex: int) -> str:
-    """Why none of the equilibria of ``growing_part`` is stable, and what to do."""
+    growing = next((part for part, pressed in _scaled(surface) if pressed), None)
+    if growing is None:
+        return ""
+    vertex = np.flatnonzero(surface.topology.components == growing)[0]
     return (
         f"nothing fixes the part of the surface around vertex {vertex}: from every equilibrium it grows or"
         " shrinks to nothing, so that none is stable; hold it, or prescribe its volume (rooms=)"

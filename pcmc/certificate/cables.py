@@ -21,11 +21,7 @@ from .proof import WeakCable
 
 def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
     """The vertices (k,) of a cable, its two ends last, which share of the chord between these they are at,
-    and how far out from it (k,3).
-
-    Raises
-    ------
-    OptionError : for a cable that is closed, branched or in several parts.
+    and how far out from it (k,3). OptionError for a cable that is closed, branched or in several parts.
     """
     vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
     if (count > 2).any() or (count == 1).sum() != 2:
@@ -103,7 +99,10 @@ def weak_cable(surface: Surface) -> WeakCable | None:
         chords = np.roll(corners, -1, axis=0) - corners
         lengths = np.linalg.norm(chords, axis=1)
         arcs = np.nan_to_num(alpha * lengths / pulls)
-        angles = _angles(chords) if disc and not np.isnan(pulls).any() else np.full(len(arcs), math.inf)
+        before, angles = np.roll(chords, 1, axis=0), np.full(len(arcs), math.inf)
+        turns = np.arctan2(cross_2d(before, chords), np.einsum("ij,ij->i", before, chords))
+        if disc and not np.isnan(pulls).any() and abs(abs(turns.sum()) - 2.0 * math.pi) < ON:
+            angles = math.pi - np.sign(turns.sum()) * turns  # β, where the polygon turns once
         for k, beta in enumerate(angles):
             beside, side = sorted((k - 1, k), key=lambda i: arcs[i])
             factor = _least_factor(arcs[beside], arcs[side], beta)
@@ -146,14 +145,6 @@ def _sides(surface: Surface, loop: Ints) -> tuple[list[str], Floats]:
         tension = surface.cables[ropes[0]].tension if known else math.nan
         pulls.append(math.inf if last == first + 1 else tension)
     return names, np.array(pulls)
-
-
-def _angles(chords: Floats) -> Floats:
-    """(k,) the angle β at the start of each side (k,2) of a polygon; infinite where it does not turn once."""
-    before = np.roll(chords, 1, axis=0)
-    turns = np.arctan2(cross_2d(before, chords), np.einsum("ij,ij->i", before, chords))
-    once = abs(abs(turns.sum()) - 2.0 * math.pi) < ON
-    return np.asarray(math.pi - np.sign(turns.sum()) * turns if once else np.full(len(turns), math.inf))
 
 
 def _least_factor(small: float, large: float, angle: float) -> float:

@@ -206,10 +206,8 @@ class Certificate:
             "load_ratio": self.load_ratio,
         }
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
-
-    __repr__ = __str__  # what a prompt shows: the findings, not arrays
 
     def text(self, units: Units = NO_UNITS) -> str:
         """The findings as a table, with the units of its numbers if they are given."""

@@ -21,8 +21,7 @@ from ..base.arrays import Bools, Floats, Ints, read_only
 from ..base.tolerances import EXCESS
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
-from ..forces.elements import add_values
-from ..forces.mesh import Points, energy_mesh
+from ..forces.elements import Points, add_values, energy_mesh
 from ..forces.pinching import standing_part
 from ..forces.triangles import add_weights, measure
 from ..surface import Surface
@@ -68,11 +67,12 @@ def along_normal(surface: Surface, forces: Floats) -> float:
     return float((forces @ np.array(surface.plane.normal)).sum())
 
 
-def by_cause(surface: Surface) -> dict[str, Floats]:
-    """(n,3) the forces on the vertices: of tension, cables, weight, and of pressure less snow.
+def reactions(surface: Surface) -> Floats:
+    """(n,3) forces of the supports: the whole force where fixed, its part normal to the plane where sliding.
 
-    Of tension -Σ α ∂A, of pressure Σ p ∫ N_i ν dA: of a flat triangle a third. At a boundary these are not
-    -∇E: there the volume is that of a cone to the point of Π, whose side is under no pressure.
+    In a mirror plane this part is the pull of the image. The force of tension is -Σ α ∂A, that of pressure
+    Σ p ∫ N_i ν dA, of a flat triangle a third. At a boundary these are not -∇E: there the volume is that of a
+    cone to the point of Π, whose side is under no pressure.
     """
     X, mesh = surface.vertices, energy_mesh(surface)
     tension = measure(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
@@ -82,15 +82,7 @@ def by_cause(surface: Surface) -> dict[str, Floats]:
     add_weights(surface, X, weight)
     pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
     np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))
-    return {"tension": -tension, "cable": -cable, "weight": -weight, "pressure": pressure}
-
-
-def reactions(surface: Surface) -> Floats:
-    """(n,3) forces of the supports: the whole force where fixed, its part normal to the plane where sliding.
-
-    In a mirror plane this part is the pull of the image.
-    """
-    total = sum(by_cause(surface).values(), np.zeros_like(surface.vertices))
+    total = -tension - cable - weight + pressure
     return apply_supports(surface, total.copy()) - total
 
 

@@ -15,8 +15,7 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..forces.functional import weighted
-from ..forces.parameters import gradient_by
+from ..forces.functional import gradient_by, weighted
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, segment_lengths

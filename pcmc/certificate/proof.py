@@ -53,9 +53,12 @@ class UnbalancedJunction:
     @property
     def imbalance(self) -> str:
         """The sentence without the remedy."""
-        others = " + ".join(f"{tension:g}" for tension in self.others)
-        names = " | ".join(self.junction)
-        return f"the tensions at the junction {names} cannot balance: {self.strongest:g} > {others}"
+        return self.told("cannot balance", ">")
+
+    def told(self, how: str, beside: str) -> str:
+        """How the tensions are, and what they are."""
+        names, others = " | ".join(self.junction), " + ".join(f"{tension:g}" for tension in self.others)
+        return f"the tensions at the junction {names} {how}: {self.strongest:g} {beside} {others}"
 
     @property
     def hint(self) -> str:

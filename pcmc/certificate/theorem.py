@@ -30,8 +30,7 @@ from ..base.arrays import Floats
 from ..base.tolerances import AT_REST, PARALLEL
 from ..base.units import NO_UNITS, Units
 from ..forces.motion_space import MotionSpace
-from ..forces.pinching import StandingPart
-from ..forces.pull import pull_and_capacity
+from ..forces.pinching import StandingPart, pull_and_capacity
 from ..stability.backward_error import backward_error
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
@@ -80,10 +79,8 @@ class Theorem:
     spare: float | None = None
     rigid: int = 0
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
-
-    __repr__ = __str__  # what a prompt and a notebook's cell show
 
     def brief(self, units: Units = NO_UNITS) -> str:
         """The theorem in a line: "proved: index 0, within 1.3e-09 m"."""

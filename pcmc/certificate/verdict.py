@@ -15,7 +15,7 @@ from ..forces.cables import compressed_cables
 from ..forces.triangles import compressed, effective_tensions
 from ..stability.modes import Spectrum
 from ..surface import Surface
-from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
+from .balance import coarseness, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
 from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
@@ -140,10 +140,8 @@ def judge(f: Findings) -> tuple[Verdict, str]:
     if not f.moving and f.quality > COLLAPSED and f.surface.tensions.any():
         told.append(only_coarse(f.surface, f.pinchable))
     if f.pulled:
-        text = (
-            f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than the"
-        )
-        told.append(f"{text} wall can hold: the wall will stand there once solved")
+        text = f"at {len(f.pulled)} pinched vertices, the first {f.pulled[0]}, the sheets pull harder than"
+        told.append(f"{text} the wall can hold: the wall will stand there once solved")
     return verdict, "; ".join(str(part) for part in (*told, f.left_over) if part)
 
 
@@ -152,8 +150,7 @@ def _disproved(f: Findings) -> list[object]:
 
 
 def _none_found(f: Findings) -> list[object]:
-    vertex = growing_part(f.surface)
-    return ["" if vertex is None else describe_growing(vertex), *f.tried, f.neck, _compressed(f)]
+    return [growing_part(f.surface), *f.tried, f.neck, _compressed(f)]
 
 
 def _ran_away(f: Findings) -> str:

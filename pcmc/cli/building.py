@@ -20,14 +20,7 @@ from ..io import FORMATS, write
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
 from ..project.settings import Output, Structure, cost_paths, schedule_paths
-from ..project.writing import (
-    analysis_jobs,
-    check_outputs,
-    cost_jobs,
-    model_job,
-    schedule_jobs,
-    write_all,
-)
+from ..project.writing import analysis_jobs, check_outputs, cost_jobs, model_job, schedule_jobs, write_all
 from ..structure import analyse
 from ..structure.calculix import expect_program
 from ..structure.columns import column_text, columns_at_rest

@@ -54,9 +54,14 @@ def pattern_drawings(
     size = sheet, millimetres, None, decimals
     sheets = [seam_sheet(pattern, *size)]
     for first in range(0, len(pattern.strips), PER_SHEET):
-        group = pattern.strips[first : first + PER_SHEET]
+        group, views = pattern.strips[first : first + PER_SHEET], list[DrawnView]()
+        for strip in group:  # as it is cut, with its net length and width
+            lines, labels = strip_lines(pattern, strip)
+            labels.append((_inside(strip), f"{strip.number}", np.zeros(2)))
+            ends = np.array([0.0, strip.length]), np.array([0.0, strip.width])
+            views.append(DrawnView(f"strip {strip.number}, {strip.patch}", lines, labels, stations=ends))
         title = f"Strips {group[0].number} to {group[-1].number}, outside up"
-        sheets.append(placed([_strip_view(pattern, strip) for strip in group], title, *size))
+        sheets.append(placed(views, title, *size))
     head = {"area": f"area, {length}²", "cut_area": f"cut area, {length}²", "strain_min": "strain from, %"}
     head |= {"strain_max": "to, %", "strain_rms": "mean, %", "warp": "warp shorter, %", "weft": "weft, %"}
     table = _texts(pattern.table, decimals, "length", "width")
@@ -111,14 +116,6 @@ def seam_sheet(
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
     return placed([view], "Seams on the roof", sheet, millimetres, scale, decimals)
-
-
-def _strip_view(pattern: CuttingPattern, strip: Strip) -> DrawnView:
-    """A strip as it is cut, with its net length and width."""
-    lines, labels = strip_lines(pattern, strip)
-    labels.append((_inside(strip), f"{strip.number}", np.zeros(2)))
-    stations = np.array([0.0, strip.length]), np.array([0.0, strip.width])
-    return DrawnView(f"strip {strip.number}, {strip.patch}", lines, labels, stations=stations)
 
 
 def _inside(strip: Strip) -> Floats:

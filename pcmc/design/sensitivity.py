@@ -22,7 +22,7 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..base.tolerances import AT_REST
 from ..certificate.measures import Measurement
-from ..forces.parameters import gradient_by
+from ..forces.functional import gradient_by
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix

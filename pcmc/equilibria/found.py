@@ -195,7 +195,5 @@ class Equilibria:
             lines.append(f"barrier from {b.start} over saddle {b.saddle} {end}: {energy}")
         return lines
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
-
-    __repr__ = __str__

@@ -111,9 +111,7 @@ def squared_cable_forces(surface: Surface, X: Floats) -> Floats:
 def laws_on(topo: Topology, surface: Surface) -> Floats:
     """(e,2) the line tension, force, and weight, force/length, on each edge of a topology.
 
-    Raises
-    ------
-    SurfaceError : a cable runs along an edge that is not there, so that nothing else acts on it.
+    SurfaceError if a cable runs along an edge that is not there, so that nothing else acts on it.
     """
     ends, tension, weight = surface.cable_edges
     place = topo.edge_numbers(ends)

@@ -21,23 +21,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
-from ..surface.geometry import (
-    Vector,
-    accumulate,
-    add,
-    cross,
-    cross_sum,
-    dot,
-    norm,
-    point,
-    scaled,
-    sub,
-    vector,
-)
+from ..surface.geometry import accumulate, add, cross, cross_sum, dot, norm, point, scaled, sub, vector
 from ..surface.lagrange import Shapes
-from .mesh import Mesh
+from .elements import Mesh
 
 
 @inlined

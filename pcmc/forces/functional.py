@@ -1,4 +1,4 @@
-"""The energy of a Surface, and its gradient with the supports applied.
+"""The energy of a Surface, its gradient with the supports applied, and their derivatives by its parameters.
 
     E = Σ α_i A_i - Σ p_i V_i + Σ τ L + Σ g ∫ z ds + Σ w ∫ z dA   (11), (20); the paper's p are 1 and 0
     A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
@@ -20,7 +20,7 @@ Units: E force·length, ∇E force, with tension in force/length and pressure in
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -28,13 +28,13 @@ from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
 from . import cable_weights, cables, flat_pieces
-from .elements import Elements, add_values
+from .elements import Elements, add_values, energy_mesh
 from .flat_pieces import add_plane_volumes
-from .mesh import energy_mesh
-from .triangles import add_weights, areas_and_volumes, measure
+from .triangles import add_weights, areas_and_volumes, measure, moments
 
-LINE_FORCES = (cables.elements, cable_weights.elements)
-FORCES = (*LINE_FORCES, flat_pieces.elements)
+FORCES = (cables.elements, cable_weights.elements, flat_pieces.elements)
+Rates = Mapping[str, Floats]
+"""Of change, by the kinds of ``pcmc.surface.values.KINDS``: one for each patch or cable."""
 
 
 def energy(surface: Surface) -> float:
@@ -144,3 +144,43 @@ def patch_volumes(surface: Surface, X: Floats | None = None) -> Floats:
 def volume(surface: Surface) -> float:
     """Σ V_i of the energy over the patches that are no walls, length³; under a roof see ``volume_below``."""
     return float(patch_volumes(surface)[~surface.auxiliary].sum())
+
+
+def energy_by(surface: Surface, rates: Rates, X: Floats) -> float:
+    """∂E/∂λ at X (n,3) by the numbers that E is linear in, whatever their values are:
+
+        ∂E/∂λ = Σ α̇ A - Σ (ṗ - ṡ) V + Σ ẇ ∫ z dA + Σ τ̇ L + Σ ġ ∫ z ds
+
+    A prescribed volume is a condition beside E, and no part of it.
+    """
+    none = np.zeros(len(surface.patches))
+    areas, volumes, _ = weighted(surface, X=X)
+    change = float(rates.get("tensions", none) @ areas)
+    change -= float((rates.get("pressures", none) - rates.get("snows", none)) @ volumes)
+    if "weights" in rates:
+        change += float(rates["weights"] @ moments(surface, X, none))
+    return change + _cables_by(surface, rates, X)
+
+
+def gradient_by(surface: Surface, rates: Rates, X: Floats | None = None) -> Floats:
+    """∂∇E/∂λ (n,3) at X or where the surface is, supports not applied."""
+    X, none = surface.vertices if X is None else X, np.zeros(len(surface.patches))
+    out = np.zeros_like(X)
+    if not rates.keys().isdisjoint(("tensions", "pressures", "snows")):
+        net = rates.get("pressures", none) - rates.get("snows", none)
+        out = weighted(surface, rates.get("tensions", none), net, X)[2]
+    if "weights" in rates:
+        moments(surface, X, rates["weights"], out)
+    _cables_by(surface, rates, X, out)
+    return out
+
+
+def _cables_by(surface: Surface, rates: Rates, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ τ̇ L + Σ ġ ∫ z ds at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
+    none, elements = np.zeros(len(surface.cables)), list[Elements]()
+    pulls, weights = rates.get("cables", none), rates.get("cable_weights", none)
+    for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):
+        each = np.ones(len(cable.edges))
+        elements += [cables.lengths(X, cable.edges).times(pull * each)] if pull else []
+        elements += [cable_weights.moments(surface, X, cable.edges, weight * each)] if weight else []
+    return add_values(elements, gradient)

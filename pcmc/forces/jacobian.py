@@ -21,17 +21,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import (
-    accumulate,
-    cross_sum,
-    divided,
-    dot,
-    norm,
-    point,
-    scaled,
-    sub,
-    vector,
-)
+from ..surface.geometry import accumulate, cross_sum, divided, dot, norm, point, scaled, sub, vector
 from ..surface.topology import SHEET
 from .motion_space import MotionSpace, VertexClasses, curve_chords, normal_vectors
 from .second_variation import add_products, circle_curvatures

@@ -51,7 +51,7 @@ from ..surface.topology import (
     vertex_kind,
 )
 from .cables import laws_on, squared_cable_forces
-from .mesh import Mesh, energy_mesh
+from .elements import Mesh, energy_mesh
 from .triangles import effective_tensions
 
 
@@ -137,10 +137,8 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
         topo = topology(faces, alike, surface.n)
     if (topo.one_way_edge & ~topo.seam_edge).any():
         # faces to turn over so that each sheet has one side; none of a sheet that has only one
-        flat, m = topo.edge_of_face.ravel(), len(faces)
-        smooth = (topo.valence == 2) & ~topo.seam_edge
-        hit = np.flatnonzero(smooth[flat])
-        one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
+        m, smooth = len(faces), (topo.valence == 2) & ~topo.seam_edge
+        one, other = (topo.neighbours[smooth[topo.valence == 2]] // 3).T
         label = one_sided_copies(one, other, topo.one_way_edge[smooth], m)
         turned = (label[:m] > label[m:]) & ((surface.net_pressures == 0.0) & ~in_room)[patch]
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
@@ -197,13 +195,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
 
 @compiled
 def _fill(
-    kind: Ints,
-    normal: Floats,
-    chord: Floats,
-    freedom: Ints,
-    axis: Floats,
-    basis: Floats,
-    dimension: Ints,
+    kind: Ints, normal: Floats, chord: Floats, freedom: Ints, axis: Floats, basis: Floats, dimension: Ints
 ) -> None:
     """The basis at each vertex, from the shape's normal or chord and what the supports admit."""
     none = (0.0, 0.0, 0.0)

@@ -71,12 +71,6 @@ def volume_gradients_at(surface: Surface, X: Floats) -> Floats:
     return np.array(gradients).reshape(len(surface.rooms), *X.shape)
 
 
-def volume_defects(surface: Surface) -> Floats:
-    """(r,) (V - V̄) / |V̄|: what each room has too much of its prescribed volume, relative."""
-    wanted = prescribed_volumes(surface)
-    return (room_volumes(surface) - wanted) / np.abs(wanted)
-
-
 def prescribed_volumes(surface: Surface) -> Floats:
     """(r,) V̄ of each room, length³."""
     return np.array([room.volume for room in surface.rooms])

@@ -22,9 +22,8 @@ from ..base.compiled import compiled, inlined
 from ..surface import Surface, expect_surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scaled, vector
 from .curved import add_element_products, fill_block
-from .elements import Elements, add_hessian_products
+from .elements import Elements, Mesh, add_hessian_products, energy_mesh
 from .functional import elements, energy_and_gradient
-from .mesh import Mesh, energy_mesh
 from .motion_space import MotionSpace, VertexClasses
 from .pattern import Pattern, hessian_pattern, pair_place, row_place
 from .triangles import Block, Tilt, triangle, triangle_block, triangle_skew, triangle_tilt

@@ -31,7 +31,7 @@ from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
 from ..surface import Surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
 from .curved import measure_elements
-from .mesh import Mesh, energy_mesh
+from .elements import Mesh, energy_mesh
 
 NO_GRADIENT = np.empty((0, 3))
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface
-from .mesh import Points, energy_mesh
+from .elements import Points, energy_mesh
 
 
 def volumes_below(surface: Surface) -> Floats:

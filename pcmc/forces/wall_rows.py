@@ -1,4 +1,4 @@
-"""Rows of a wall: where its vertices lie below its top edge; and which walls with held bottoms can pinch."""
+"""Walls that can pinch: which they are, and their rows, where their vertices lie below the top edges."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.checks import lying
+from ..surface.geometry import area_vectors, vertex_sums
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
@@ -206,3 +207,91 @@ def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
     foot = np.full(n, -1, dtype=np.int64)
     foot[tops[above]] = bottoms[below]
     return foot
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """The walls that can pinch: the lower edge slides on Π or is held there, the top edge is a junction."""
+
+    rows: WallRows  # where their other vertices lie below the top edges
+    top_edges: Ints  # (k,2)
+    wall_below: Ints  # (k,) the patch of the wall below each of them
+    top_free: Bools  # (n,) free vertices of top edges: these can come to rest on Π
+    corner: Bools  # (n,) fixed vertices of top edges on Π, where a wall ends
+    side: Floats  # (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to
+    pinchable: Bools  # (patches,) the patches that are such walls
+    foot: Ints  # (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere
+
+    @property
+    def held(self) -> Bools:
+        """(n,) the junction vertices that come to rest on a held bottom."""
+        return self.top_free & (self.foot >= 0)
+
+    @property
+    def sliding(self) -> Bools:
+        """(patches,) the walls whose bottom slides on Π."""
+        held = np.zeros_like(self.pinchable)
+        held[self.wall_below[(self.foot[self.top_edges] >= 0).all(axis=1)]] = True
+        return self.pinchable & ~held
+
+    def across_bottom(self, vectors: Floats, X: Floats) -> Floats:
+        """The part (n,3) of vectors across the held bottom below each top vertex; X, vectors are (n,3)."""
+        chord, first = np.zeros_like(X), np.zeros_like(X)
+        edges = self.top_edges[(self.foot[self.top_edges] >= 0).all(axis=1)]
+        start, end = X[self.foot[edges.T]]
+        side = end - start
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        # the two edges at a vertex may run either way, so sum their directions with the sign of the first
+        first[edges[:, 1]], first[edges[:, 0]] = side, side
+        for v in edges.T:
+            sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
+            np.add.at(chord, v, sign[:, None] * side)
+        length = np.linalg.norm(chord, axis=1)[:, None]
+        tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
+        return np.asarray(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
+
+
+def find_walls(surface: Surface, held: bool = False) -> Walls:
+    """The walls of a surface that can pinch, and their rows.
+
+    With ``held``, or where a junction already rests on one, walls with held bottoms are among them.
+    """
+    n, topo, X = surface.n, surface.topology, surface.vertices
+    roof = ~surface.auxiliary[surface.patch_of_face]
+    roof_edge, roof_vertex = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
+    roof_edge[topo.edge_of_face[roof]] = True
+    roof_vertex[surface.faces[roof]] = True
+    height = surface.plane.height(X)
+    low, foot = lying(height, X), np.full(n, -1, dtype=np.int64)
+    every = list[tuple[int, Ints, Ints, Ints | None]]()
+    for index in np.flatnonzero(surface.auxiliary).tolist():
+        of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
+        edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
+        if surface.on_ground[edges].any() and len(top):
+            every.append((index, edges, top, None))
+    none = np.empty((0, 2), dtype=np.int64)
+    sliding = np.concatenate([none, *(top for _, _, top, _ in every)])
+    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
+        if not np.isin(top, sliding).any():
+            foot = np.where(feet >= 0, feet, foot)
+            every.append((index, edges, top, feet))
+    rows = join_rows([wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every])
+    top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
+    below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])
+    on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
+    on_top[top_edges], pinchable[below] = True, True
+    # on Π the side is that of the push of the sheets' pressure along its normal
+    near = low[surface.faces].any(axis=1)
+    F, patch = surface.faces[near], surface.patch_of_face[near]
+    force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
+    push = vertex_sums((force * (area_vectors(X[F]) @ np.array(surface.plane.normal)))[:, None], F, n)[:, 0]
+    return Walls(
+        rows=rows,
+        top_edges=top_edges,
+        wall_below=below,
+        top_free=on_top & ~surface.pinned & ~surface.on_ground,
+        corner=on_top & surface.pinned & low,
+        side=np.where(np.where(low, push, height) < 0.0, -1.0, 1.0),
+        pinchable=pinchable,
+        foot=foot,
+    )

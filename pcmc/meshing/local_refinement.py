@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Ints
 from ..base.errors import OptionError
-from ..forces.pinching import Walls, lift, standing_part
+from ..forces.pinching import lift, standing_part
+from ..forces.wall_rows import Walls
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.lagrange import expect_flat

@@ -144,11 +144,21 @@ def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats
 
 
 def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k: int) -> PlanarMesh:
-    """The triangulation inside the outline and outside the holes; points used elsewhere only go.
+    """The Delaunay triangulation with every segment an edge, inside the outline and outside the holes; points
+    used elsewhere only go.
 
     Segments separate the parts of it; a part with a side that no other triangle has is outside.
     """
-    T = _constrained(points, segments)
+    try:
+        T: Ints = Delaunay(points).simplices.astype(np.int64)
+    except QhullError:
+        raise SurfaceError("the points lie on one line and enclose no area", what="points") from None
+    area = signed_areas(points, T)
+    T[area < 0] = T[area < 0][:, ::-1]
+    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0]:
+        T = _with_segment(points, T, int(a), int(b))
+    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
+        raise _crossing(points, a, b)
     sides = T[:, SIDES].reshape(-1, 2)
     free = edge_places(sides, segments) < 0
     pairs = twins(sides.min(axis=1) * len(points) + sides.max(axis=1))
@@ -174,21 +184,6 @@ def twins(key: Ints) -> Ints:
     order = np.argsort(key, kind="stable")
     _, first, count = np.unique(key[order], return_index=True, return_counts=True)
     return order[np.stack([first[count == 2], first[count == 2] + 1], axis=1)]
-
-
-def _constrained(points: Floats, segments: Ints) -> Ints:
-    """(t,3) Delaunay triangles, counter-clockwise, with every segment an edge."""
-    try:
-        T: Ints = Delaunay(points).simplices.astype(np.int64)
-    except QhullError:
-        raise SurfaceError("the points lie on one line and enclose no area", what="points") from None
-    area = signed_areas(points, T)
-    T[area < 0] = T[area < 0][:, ::-1]
-    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0]:
-        T = _with_segment(points, T, int(a), int(b))
-    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
-        raise _crossing(points, a, b)
-    return T
 
 
 def _crossing(X: Floats, a: int, b: int) -> SurfaceError:

@@ -8,18 +8,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..surface import Surface
-from ..surface.geometry import (
-    Vector,
-    add,
-    area_vectors,
-    cross,
-    dot,
-    norm,
-    point,
-    scaled,
-    sub,
-    vertex_sums,
-)
+from ..surface.geometry import Vector, add, area_vectors, cross, dot, norm, point, scaled, sub, vertex_sums
 
 
 def distances(points: Floats, X: Floats, F: Ints) -> Floats:

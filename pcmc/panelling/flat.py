@@ -105,19 +105,14 @@ def _beside(row: list[Floats], panel: Floats) -> Floats:
     placements = []
     for turned in (panel, -panel):
         at = turned - np.array([turned[:, 0].min(), turned[:, 1].max()])
-        shift = max((_gap(other, at) + SPACE for other in row[-3:]), default=0.0)
-        placements.append(at + np.array([max(shift, 0.0), 0.0]))
+        shift = 0.0
+        for other in row[-3:]:  # until it only touches: both are convex, so a corner of one of the two does
+            low, high = max(other[:, 1].min(), at[:, 1].min()), min(other[:, 1].max(), at[:, 1].max())
+            levels = np.clip(np.append(other[:, 1], at[:, 1]), low, high)
+            gap = float((_reach(other, levels).max(axis=0) - _reach(at, levels).min(axis=0)).max())
+            shift = max(shift, gap + SPACE)
+        placements.append(at + np.array([shift, 0.0]))
     return min(placements, key=lambda placed: float(placed[:, 0].max()))
-
-
-def _gap(left: Floats, right: Floats) -> float:
-    """How far the right triangle must move along x until it only touches the left one.
-
-    Both sides are convex, so a corner of one of the two touches.
-    """
-    low, high = max(left[:, 1].min(), right[:, 1].min()), min(left[:, 1].max(), right[:, 1].max())
-    levels = np.clip(np.append(left[:, 1], right[:, 1]), low, high)
-    return float((_reach(left, levels).max(axis=0) - _reach(right, levels).min(axis=0)).max())
 
 
 def _reach(triangle: Floats, levels: Floats) -> Floats:

@@ -68,13 +68,6 @@ class Net(NamedTuple):
         """(k,2) the nodes of each side of each panel, ascending."""
         return np.sort(np.stack([self.corner, self.corner[before(self.start)]], axis=1), axis=1)
 
-    def of_panels(self, kept: Bools) -> Net:
-        """The net of the panels in a mask (p,)."""
-        count = np.diff(self.start)
-        corner, start = self.corner[np.repeat(kept, count)], np.append(0, np.cumsum(count[kept]))
-        rest = {name: getattr(self, name)[kept] for name in ("sheet", "cut", "turned")}
-        return self._replace(start=start, corner=corner, **rest)
-
 
 def counted(count: Ints) -> tuple[Ints, Ints]:
     """Each number k as often as ``count[k]`` says, and which time it is, from 0.

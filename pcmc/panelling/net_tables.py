@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import components
@@ -25,7 +25,14 @@ SLIVER = 0.02  # of the size squared: twice the area of a panel between a rim an
 def tidied(net: Net, size: float) -> Net:
     """A net without short edges and slivers."""
     P, kind, start, corner = net.points, net.kind, net.start, net.corner
-    number = _merged(P, kind, np.stack([corner, corner[before(start)]], axis=1), size)
+    # the ends of short edges become one node: a corner, else one of a ridge or rim; two corners both stay
+    pairs = np.stack([corner, corner[before(start)]], axis=1)
+    short = size * np.where((kind[pairs] == CORNER).any(axis=1), BESIDE, SHORT)
+    label = components(pairs[segment_lengths(P, pairs) < short], len(P))
+    first = np.lexsort((-kind, label))
+    stays = first[np.unique(label[first], return_index=True)[1]]
+    crowded = np.bincount(label[kind == CORNER], minlength=len(stays)) > 1
+    number = np.where(crowded[label], np.arange(len(P)), stays[label])
     owner = np.repeat(np.arange(len(start) - 1), np.diff(start))
     used = number[corner]
     shown = used != used[before(start)]
@@ -47,19 +54,6 @@ def tidied(net: Net, size: float) -> Net:
     return net._replace(points=P[nodes], normals=net.normals[nodes], kind=kind[nodes], **panels)
 
 
-def _merged(P: Floats, kind: Ints, pairs: Ints, size: float) -> Ints:
-    """(n,) for each node the one that it is merged with: at the ends of short edges.
-
-    A corner stays, else a node of a ridge or rim; two corners are not merged.
-    """
-    short = size * np.where((kind[pairs] == CORNER).any(axis=1), BESIDE, SHORT)
-    label = components(pairs[segment_lengths(P, pairs) < short], len(P))
-    first = np.lexsort((-kind, label))
-    stays = first[np.unique(label[first], return_index=True)[1]]
-    crowded = np.bincount(label[kind == CORNER], minlength=len(stays)) > 1
-    return np.where(crowded[label], np.arange(len(P)), stays[label])
-
-
 def without_flat(net: Net, size: float) -> Net:
     """Without triangles that planarity has laid flat on a straight rim; their nodes come to lie on it.
 
@@ -79,7 +73,9 @@ def without_flat(net: Net, size: float) -> Net:
     share = np.einsum("ti,ti->t", P[tip] - P[first], along) / np.einsum("ti,ti->t", along, along)
     P, kind = P.copy(), net.kind.copy()
     P[tip], kind[tip] = P[first] + share[:, None] * along, EDGE
-    return net._replace(points=P, kind=kind).of_panels(~flat)
+    corner, start = corner[np.repeat(~flat, count)], np.append(0, np.cumsum(count[~flat]))
+    rest = {name: getattr(net, name)[~flat] for name in ("sheet", "cut", "turned")}
+    return net._replace(points=P, kind=kind, start=start, corner=corner, **rest)
 
 
 def net_tables(

@@ -17,8 +17,8 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.units import conversion_note, unlikely_size
 from ..surface.curves import Curve, polyline
+from ..surface.parts import listed
 from ..surface.pieces import Piece, point_text, two_digits
-from ..surface.summary import listed
 from .lines import EXACT, Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines

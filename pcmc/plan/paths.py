@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..surface.curves import Curve, arc
+from ..surface.parts import listed
 from ..surface.pieces import Piece
-from ..surface.summary import listed
 from ..surface.topology import components
 from .lines import EXACT, Kind, LineTree, PlanLine
 from .strokes import Stroke

@@ -17,8 +17,8 @@ from ..base.validate import checked_name
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
+from ..surface.parts import listed
 from ..surface.pieces import to_local, to_space
-from ..surface.summary import listed
 from . import parts
 from .parts import check_keys
 

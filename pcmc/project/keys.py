@@ -300,13 +300,8 @@ def reference() -> str:
     lines = []
     for section in sections():
         condition = f" with `{section.condition}`" if section.condition else ""
-        title = (
-            f"`{section.name}`"
-            if section is CURVE
-            else f"`[{section.name}]`"
-            if section.name
-            else "First lines"
-        )
+        title = f"`[{section.name}]`" if section.name else "First lines"
+        title = f"`{section.name}`" if section is CURVE else title
         lines += [f"## {title}{condition}", "", section.help, ""]
         lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
         for key in section.keys:

@@ -38,8 +38,16 @@ BOUNDARY, GROUND = "boundary", "ground"
 WHEN = ("before", "after")
 COLOURS = ("patches", "curvature", "error", "reactions")
 CSV, INP = ".csv", ".inp"
-SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
 SAME_WARP = 1.0  # degree: directions of [pattern] and [structure] that differ by less are one
+DOCUMENTS = {  # keys of files for those who build, with their suffixes and what they are
+    "drawings": (DRAWINGS, "a drawing"),
+    "net": (NETS, "a net of panels"),
+    "panels": ((CSV,), "a schedule of panels"),
+    "structure": ((INP,), "a structural model"),
+    "pattern": (PATTERNS, "a cutting pattern"),
+    "report": (REPORTS, "a report"),
+}
+SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
 LISTS = ("files", "drawings", "net", "pattern")  # keys of several files
 SECTION = TypeVar("SECTION")
 
@@ -196,27 +204,16 @@ class Output:
         validate.choice("sheet", self.sheet, tuple(FORMATS))
         if self.tolerance is not None:
             validate.positive("tolerance", self.tolerance)
-        for drawing in self.drawings:
-            suffix_of(drawing, DRAWINGS, "a drawing")
-        for file in self.net:
-            suffix_of(file, NETS, "a net of panels")
+        for key, (suffixes, what) in DOCUMENTS.items():
+            for file in self.files_of(key):
+                suffix_of(file, suffixes, what)
         validate.choice("net_pattern", self.net_pattern, NET_PATTERNS)
         validate.number("net_direction", self.net_direction)
         if self.net_size is not None:
             validate.positive("net_size", self.net_size)
         if bool(self.net) != (self.net_size is not None):
-            text = (
-                "net: files of a net need net_size = LENGTH, the edge of its panels, and net_size needs net"
-            )
-            raise OptionError(text, what="net_size" if self.net else "net")
-        if self.panels is not None:
-            suffix_of(self.panels, (CSV,), "a schedule of panels")
-        if self.structure is not None:
-            suffix_of(self.structure, (INP,), "a structural model")
-        for file in self.pattern:
-            suffix_of(file, PATTERNS, "a cutting pattern")
-        if self.report is not None:
-            suffix_of(self.report, REPORTS, "a report")
+            text = "files of a net need net_size = LENGTH, the edge of its panels, and net_size needs net"
+            raise OptionError(f"net: {text}", what="net_size" if self.net else "net")
         for name in ("panels", "panel_sheets"):
             if getattr(self, name) and self.tolerance is None:
                 text = f"{name}: needs the largest difference of edges in a family; add tolerance = LENGTH"
@@ -230,18 +227,17 @@ class Output:
     @property
     def documents(self) -> bool:
         """Whether there are any besides files and a picture."""
-        return bool(self.drawings or self.pattern or self.net) or {
-            self.panels,
-            self.structure,
-            self.report,
-        } != {None}
+        return any(map(self.files_of, DOCUMENTS))
+
+    def files_of(self, key: str) -> list[PathLike]:
+        """The files of a key, as they are given."""
+        given = getattr(self, key)
+        return [*given] if key in LISTS else [] if given is None else [given]
 
     @property
     def names(self) -> list[str]:
         """The names of the files, as they are given."""
-        single = [getattr(self, name) for name in SINGLE]
-        several = [file for name in LISTS for file in getattr(self, name)]
-        return [str(name) for name in (*several, *single) if name is not None]
+        return [str(name) for key in (*LISTS, *SINGLE) for name in self.files_of(key)]
 
     @property
     def paths(self) -> list[Path]:
@@ -259,17 +255,12 @@ class Output:
 
     def check(self, units: Units, structure: Structure | None, pattern: CuttingOptions | None) -> None:
         """Refuse documents that need a unit of length or a section which the project does not have."""
-        if self.drawings:
-            expect_length(units.length, "a drawing")
-        if any(Path(file).suffix.lower() != CSV for file in self.pattern):
-            expect_length(units.length, "a cutting pattern")
-        if any(Path(file).suffix.lower() in DRAWINGS for file in self.net):
-            expect_length(units.length, "a net of panels")
+        for key in ("drawings", "pattern", "net", "report"):
+            if any(Path(file).suffix.lower() in (*DRAWINGS, *REPORTS) for file in self.files_of(key)):
+                expect_length(units.length, DOCUMENTS[key][1])
         if self.pattern and pattern is None:
             text = "a cutting pattern needs the width of the cloth; add [pattern] with width, strips or seams"
             raise OptionError(text, what="pattern", expected="a table")
-        if self.report is not None:
-            expect_length(units.length, "a report")
         if self.structure is not None and structure is None:
             text = "a structural model needs material and thickness; add [structure] with young and thickness"
             raise OptionError(text, what="structure", expected="a table")

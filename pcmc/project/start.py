@@ -95,15 +95,13 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
 
 def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
     """(n,) the vertices that the supports of a project fix."""
-    X, edges = surface.vertices, surface.topology.edges
-    boundary = np.zeros(surface.n, dtype=bool)
-    boundary[edges[surface.topology.boundary_edge]] = True
+    X, boundary = surface.vertices, surface.topology.on_boundary
     if supports == BOUNDARY:
         return boundary
     height = surface.plane.height(X)
     if supports == GROUND:
         return np.asarray(boundary & (height <= height[boundary].min() + NEAR * surface.size))
-    reach = 0.5 * float(segment_lengths(X, edges).mean())
+    reach = 0.5 * float(segment_lengths(X, surface.topology.edges).mean())
     fixed = np.zeros(surface.n, dtype=bool)
     for number, one in enumerate(supports, start=1):
         try:

@@ -13,6 +13,7 @@ from ..structure.columns import column_answers, columns_at_rest
 from ..structure.member_forces import member_tables, members_at_rest, sentences
 from .plan import FORMAT, on_paper
 from .tables import Block, Columns, Heading, Picture, column, columns_in, one, text_table, vectors_of
+from .words import sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +64,7 @@ def under_load_chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     if "pressure" in table:
         columns |= columns_in(table, ["pressure"], units.pressure)
     yield text_table("Cases and combinations", {"case": table["case"]}, columns)
-    yield from (f"{line[:1].upper()}{line[1:]}." for line in analysis.answers(units))
+    yield from map(sentence, analysis.answers(units))
     for what in ("deflection", "least force"):
         yield Picture("", png(under_load(analysis, what=what, units=units, width=PIXELS)))
     table = analysis.patches
@@ -110,8 +111,7 @@ def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Itera
         columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
     yield text_table("Forces of columns and stays", words, columns)
     yield ABOUT_COLUMNS
-    lines = column_answers(model, table, units)
-    yield from (f"{line[:1].upper()}{line[1:]}." for line in lines)
+    yield from map(sentence, column_answers(model, table, units))
 
 
 def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *pictures: bytes) -> Iterator[Block]:

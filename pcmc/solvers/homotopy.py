@@ -16,8 +16,8 @@ from ..certificate.diagnosis import held_groups
 from ..certificate.proof import Attempt
 from ..forces.functional import gradient
 from ..surface import Surface
+from . import solve_once
 from .continuation import BoundaryMotion, Branch, Direction, Ending, follow
-from .methods import solve_once
 from .result import Callback, Progress, Result, Status
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed

@@ -20,8 +20,8 @@ from ..base.errors import CurvedContactError, SurfaceError
 from ..base.tolerances import POOR
 from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..forces.functional import energy
-from ..forces.pinching import find_walls
 from ..forces.rooms import check_rooms, room_pressures
+from ..forces.wall_rows import find_walls
 from ..meshing.elevation import elevate
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix

@@ -9,14 +9,7 @@ from typing import Any
 from ..base.arrays import Bools
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
-from ..certificate.balance import (
-    describe_growing,
-    growing_part,
-    hardly_balanced,
-    load_name,
-    load_ratio,
-    overload,
-)
+from ..certificate.balance import growing_part, hardly_balanced, load_name, load_ratio, overload
 from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..certificate.verdict import theorems
@@ -66,13 +59,13 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result:
     pinchable = standing_part(start).walls.pinchable
     load = overload(start) if first.status in (Status.DIVERGED, Status.DEGENERATE) else None
     proofs = theorems(start, pinchable)
-    growing = growing_part(start) if minimum and not proofs else None
+    growing = growing_part(start) if minimum and not proofs else ""
     tried, given = [Attempt("given start", _name(first))], _name(first).replace("_", " ")
-    ways = _further_ways(start, pinchable) if growing is None and not proofs else ()
-    if growing is not None:
+    ways = _further_ways(start, pinchable) if not (growing or proofs) else ()
+    if growing:
         result = solves.solve(start, target="stationary")
         if result.converged:
-            return replace(result, status=Status.SADDLE, note=describe_growing(growing))
+            return replace(result, status=Status.SADDLE, note=growing)
         tried.append(Attempt("stationary point", _name(result)))
     for way in ways:
         outcome = attempt(way, solves) if isinstance(way, Homotopy) else way
@@ -125,8 +118,7 @@ def _failed(first: Result, proofs: tuple[Proof, ...], tried: list[Attempt]) -> R
         status = Status.NO_EQUILIBRIUM
     elif folds or neck is not None or status in (Status.DIVERGED, Status.VANISHED):
         status = Status.NONE_FOUND
-    growing = growing_part(first.surface) if status is Status.NONE_FOUND else None
+    growing = growing_part(first.surface) if status is Status.NONE_FOUND else ""
     reasons = (*proofs, *(folds if proofs else tried), first.note, neck or "")
-    notes = ["" if growing is None else describe_growing(growing), *map(str, reasons)]
-    note = "; ".join(filter(None, notes))
+    note = "; ".join(filter(None, [growing, *map(str, reasons)]))
     return replace(first, status=status, note=note, proofs=proofs, tried=tuple(tried))

@@ -9,7 +9,8 @@ from scipy.sparse.linalg import splu
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import FAILED, ON, PARALLEL
 from ..certificate.forces import load
-from ..forces.pinching import find_walls, place_wall_rows
+from ..forces.pinching import place_wall_rows
+from ..forces.wall_rows import find_walls
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import cross_2d

@@ -12,15 +12,14 @@ from ..forces.functional import energy_at
 from ..forces.loose_parts import rounding_left
 from ..forces.pinching import (
     StandingPart,
-    Walls,
-    find_walls,
     lift,
+    pull_directions,
     resting_vertices,
     standing_part,
     top_spacing,
 )
-from ..forces.pull import pull_directions
 from ..forces.rooms import closing_volumes, volume_gradients_at, volumes_at, with_room_pressures
+from ..forces.wall_rows import Walls, find_walls
 from ..meshing.elevation import blended, flat_places
 from ..meshing.quality import compare, edge_lengths, redistribute, worst_quality
 from ..stability.equilibrium import Equilibrium

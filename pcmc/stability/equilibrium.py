@@ -19,8 +19,7 @@ from ..forces.jacobian import Linearisation, linearise
 from ..forces.loose_parts import relative_forces
 from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..forces.pattern import Pattern, hessian_pattern
-from ..forces.pinching import StandingPart, standing_part
-from ..forces.pull import excess_pull
+from ..forces.pinching import StandingPart, excess_pull, standing_part
 from ..forces.rigid_motions import net_forces, rigid_field, rigid_modes, rigid_motions
 from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
 from ..forces.second_variation import assemble

@@ -95,7 +95,15 @@ def column_answers(model: StructuralModel, table: pd.DataFrame, units: Units) ->
         case, N, names = own["case"].iloc[far], own["N"].iloc[far], list(dict.fromkeys(own["member"]))
         if sizes[far] > LEAST * (np.abs(own["N"]).max() + sizes[far]):
             text = f"{case}: across {' and '.join(names)} {sizes[far]:.3g}{force} are left,"
-            lines.append(f"{text} {_vector(left[far])}; {_hint(model, names, N, left[far])}")
+            text += f" {_vector(left[far])};"
+            bar = next(bar for bar in model.bars if bar.name == names[0])
+            all_of_it, normal = N * bar.direction + left[far], np.array(model.surface.plane.normal)
+            drop, rate = normal @ (bar.points[1] - bar.points[0]), normal @ all_of_it
+            if len(names) > 1 or drop * rate == 0.0 or N >= 0.0:
+                lines.append(f"{text} add a stay, or clamp the column's foot")
+            else:  # where a column alone would have to stand
+                foot = _vector(bar.points[0] + drop / rate * all_of_it)
+                lines.append(f"{text} with its foot at {foot} it would carry all; or add stays")
     return lines
 
 
@@ -105,16 +113,6 @@ def column_text(model: StructuralModel, table: pd.DataFrame, units: Units) -> st
     shown = shown.dropna(axis=1, how="all")
     text = shown.to_string(index=False, float_format="{:.4g}".format, na_rep="-")
     return "\n".join([text, *column_answers(model, table, units)])
-
-
-def _hint(model: StructuralModel, names: list[str], N: float, left: Floats) -> str:
-    """Where a column alone would have to stand, or that a stay is missing."""
-    bar = next(bar for bar in model.bars if bar.name == names[0])
-    force, normal = N * bar.direction + left, np.array(model.surface.plane.normal)
-    drop, rate = normal @ (bar.points[1] - bar.points[0]), normal @ force
-    if len(names) > 1 or drop * rate == 0.0 or N >= 0.0:
-        return "add a stay, or clamp the column's foot"
-    return f"with its foot at {_vector(bar.points[0] + drop / rate * force)} it would carry all; or add stays"
 
 
 def _vector(value: Floats) -> str:

@@ -1,16 +1,17 @@
 """Frames of straight bars with bending: displacements, forces within the bars, and loads that buckle them.
 
-All N, V and M of members are from here: CalculiX, which has their displacements, expands a beam to a brick
-and prints no forces of sections. Each bar from a to b has twelve coordinates: the displacements and turns of
-both ends. In its axes (x along it, z upright, y across) its stiffness K is that of Euler and Bernoulli: E A/L
-along it, G J/L in torsion, and in each of the planes of bending, with the displacements w and the slopes φ,
+N, V and M of members all come from here. At rest there is no CalculiX; in its cases it has the displacements,
+but expands a beam to a brick, and has forces of sections in its files for viewers alone. Each bar from a to b
+has twelve coordinates: the displacements and turns of both ends. In its axes (x along it, z upright, y
+across) its stiffness K is that of Euler and Bernoulli: E A/L along it, G J/L in torsion, and in each of the
+planes of bending, with the displacements w and the slopes φ,
 
     E I/L³ [[12, 6 L, -12, 6 L], [6 L, 4 L², -6 L, 2 L²], [-12, -6 L, 12, -6 L], [6 L, 2 L², -6 L, 4 L²]].
 
 With loads at the ends of bars alone its forces at the ends are exact. A force N along it adds, with the same
-cubics between the ends, the stiffness G(N), N (I + I')/(A L) in torsion and in each of these planes
+cubics between the ends, the stiffness G(N) (Przemieniecki 1968): N (I + I')/(A L) in torsion, and in bending
 
-    N/30 L [[36, 3 L, -36, 3 L], [3 L, 4 L², -3 L, -L²], [-36, -3 L, 36, -3 L], [3 L, -L², -3 L, 4 L²]].
+    N/(30 L) [[36, 3 L, -36, 3 L], [3 L, 4 L², -3 L, -L²], [-36, -3 L, 36, -3 L], [3 L, -L², -3 L, 4 L²]].
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from ..surface.geometry import unit_vectors
 from ..surface.topology import components
 
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
+EXACT = 1e-10  # of the factor at which bars buckle
 LOOSE = 1e-9  # a rigid motion that supports hold less than so moves freely
 BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
 PULLED = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]], dtype=float)
@@ -86,7 +88,7 @@ class BarFrame:
             return np.asarray(factor.solve(np.pad(-(G @ u.ravel()), (0, factor.shape[0] - n)))[:n])
 
         start = np.random.default_rng(0).standard_normal(n)  # no mode is square to it, as to an even vector
-        most = float(eigs(LinearOperator((n, n), bent), 1, which="LR", v0=start)[0][0].real)
+        most = float(eigs(LinearOperator((n, n), bent), 1, which="LR", v0=start, tol=EXACT)[0][0].real)
         return 1.0 / most if most > 0.0 else np.inf
 
     @cached_property

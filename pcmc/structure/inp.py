@@ -66,8 +66,13 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
     text += [f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1)]
     text += ["*NODE, NSET=NALL\n"]
     text += [format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)]
-    for section in (_elements, _beams, _supports, _prestress):
+    for section in (_elements, _beams, _supports):
         text += section(model)
+    # σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge
+    text += ["*INITIAL CONDITIONS, TYPE=STRESS\n", _stresses(model.faces + 1, model.stresses, POINTS)]
+    for cable, area, _, numbers, along in model.cable_edges():
+        pull = pull_along(surface, cable, cable.edges)[:, None, None]
+        text += [_stresses(numbers, pull / area * along[:, :, None] * along[:, None, :], CABLE_POINTS)]
     if model.lines:  # members take over from what held the form, while its pressure stays
         text += ["*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n*AMPLITUDE, NAME=RELEASED\n0.,1.,1.,0.\n"]
     return "".join(chain(text, *(_step(model, step, k == 0, every) for k, step in enumerate(steps))))
@@ -178,15 +183,6 @@ def _supports(model: StructuralModel) -> Iterator[str]:
         yield f"*TRANSFORM, NSET=GUIDE_{k}, TYPE=R\n"
         yield ",".join(FIELD % c for c in model.axes[leader, :2].ravel()) + "\n"
         yield f"*BOUNDARY\nGUIDE_{k},{'1,1' if model.freedom[leader] == 2 else '2,3'}\n"
-
-
-def _prestress(model: StructuralModel) -> Iterator[str]:
-    """σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge."""
-    yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, model.stresses, POINTS)
-    for cable, area, _, numbers, along in model.cable_edges():
-        pull = pull_along(model.standing, cable, cable.edges)[:, None, None]
-        stress = pull / area * along[:, :, None] * along[:, None, :]
-        yield _stresses(numbers, stress, CABLE_POINTS)
 
 
 def _stresses(elements: Ints, stress: Floats, points: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -148,7 +148,7 @@ class MemberLine:
 
 def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, ...]:
     """The lines of members on a surface, but for those of its own cables; OptionError for a member that is on
-    no edge, on a wall that rests on Π, or where another one is.
+    no edge, on a wall that rests on Π, or where another one is, and a wall that ends at one with a member.
 
     >>> from pcmc.plan import Plan
     >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
@@ -172,7 +172,19 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
                 raise OptionError(text, what="members", where=line.name)
             taken[edges] = True
             lines.append(line)
-    _refuse_half_walls(surface, {line.wall for line in lines})
+    # a wall that ends at one with a member: nothing would hold its edge there
+    replaced = {line.wall for line in lines}
+    gone = np.array([patch.name in replaced for patch in surface.patches])
+    of_edge, patch = surface.topology.edge_of_face, surface.patch_of_face
+    beside = np.zeros((2, len(taken)), dtype=bool)
+    beside[0, of_edge[gone[patch]]] = True
+    beside[1, of_edge[(surface.walls & ~gone)[patch]]] = True
+    shared = beside[0] & beside[1]
+    if shared.any():
+        names = [surface.patches[k].name for k in np.unique(patch[shared[of_edge].any(axis=1)])]
+        one, other = ([name for name in names if (name in replaced) == side] for side in (True, False))
+        text = f"wall {other[0]!r} ends at {one[0]!r}, which has a member; give both one, or none"
+        raise OptionError(text, what="members", where=one[0])
     return tuple(lines)
 
 
@@ -242,21 +254,6 @@ def _refuse_mechanisms(bars: Sequence[Bar]) -> None:
             raise OptionError(
                 f"{text} of two, not in one line; leave one out", what="members", where=own[0].name
             )
-
-
-def _refuse_half_walls(surface: Surface, replaced: Set[str]) -> None:
-    """Refuse a wall that ends at one with a member: nothing would hold its edge there."""
-    gone = np.array([patch.name in replaced for patch in surface.patches])
-    of_edge, patch = surface.topology.edge_of_face, surface.patch_of_face
-    beside = np.zeros((2, len(surface.topology.edges)), dtype=bool)
-    beside[0, of_edge[gone[patch]]] = True
-    beside[1, of_edge[(surface.walls & ~gone)[patch]]] = True
-    shared = beside[0] & beside[1]
-    if shared.any():
-        names = [surface.patches[k].name for k in np.unique(patch[shared[of_edge].any(axis=1)])]
-        one, other = ([name for name in names if (name in replaced) == side] for side in (True, False))
-        text = f"wall {other[0]!r} ends at {one[0]!r}, which has a member; give both one, or none"
-        raise OptionError(text, what="members", where=one[0])
 
 
 def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:

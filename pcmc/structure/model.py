@@ -239,26 +239,19 @@ class StructuralModel:
     def standing(self) -> Surface:
         """The surface without pinched walls: its vertices, and the faces that are elements. Members that are
         cables are cables of it."""
-        s = standing_part(self.surface).surface
-        more = [
-            Cable(line.name, self._tension_of(s, line), np.sort(line.pairs, axis=1))
-            for line in self.lines
-            if line.member.kind == "cable"
-        ]
+        s, more = standing_part(self.surface).surface, list[Cable]()
+        for line in (line for line in self.lines if line.member.kind == "cable"):
+            wall = s.patch_index(line.wall)  # in whose place it has the tension that balances the sheets best
+            faces = s.faces[s.patch_of_face == wall]
+            P = s.vertices[faces]
+            load = s.net_pressures[wall] / 3.0 * area_vectors(P)[:, None]
+            of_wall = at_vertices(corner_forces(P, s.tensions[wall] * in_planes(P)) + load, faces, s.n)
+            N, _ = balancing_force(s.vertices[line.vertices], -of_wall[line.vertices], line.closed)
+            if N <= 0.0:
+                text = f'member {line.name!r}: the sheets press along it; no cable can; kind = "beam" does'
+                raise OptionError(text, what="Member.kind", where=line.name, found="cable")
+            more.append(Cable(line.name, N, np.sort(line.pairs, axis=1)))
         return s.rebuilt(cables=(*s.cables, *more)) if more else s
-
-    def _tension_of(self, s: Surface, line: MemberLine) -> float:
-        """Of a cable in the place of a wall: it balances the sheets best."""
-        wall = s.patch_index(line.wall)
-        faces = s.faces[s.patch_of_face == wall]
-        P = s.vertices[faces]
-        load = s.net_pressures[wall] / 3.0 * area_vectors(P)[:, None]
-        of_wall = at_vertices(corner_forces(P, s.tensions[wall] * in_planes(P)) + load, faces, s.n)
-        N, _ = balancing_force(s.vertices[line.vertices], -of_wall[line.vertices], line.closed)
-        if N <= 0.0:
-            text = f'member {line.name!r}: the sheets press along it; no cable can; kind = "beam" does'
-            raise OptionError(text, what="Member.kind", where=line.name, found="cable")
-        return N
 
     @cached_array
     def active(self) -> Ints:

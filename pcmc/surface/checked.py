@@ -21,12 +21,7 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a Surface by name, of the parameters given for it, and its topology.
 
     Arrays come back read-only; ``fixed`` also counts the vertices that cannot move because of several planes,
-    and those on lines.
-
-    Raises
-    ------
-    SurfaceError
-        Naming the first offending index.
+    and those on lines. SurfaceError names the first offending index.
     """
     plane = given["plane"]
     if not isinstance(plane, Plane):

@@ -125,10 +125,7 @@ class EdgesOnCurves:
 def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: float) -> tuple[HeldCurve, ...]:
     """Curves with fixed vertices (n,3) on them and edges of the mesh between these, no edge on two of them.
 
-    Raises
-    ------
-    SurfaceError
-        With the number of the first curve that is wrong.
+    SurfaceError has the number of the first curve that is wrong.
     """
     parts = tuple(given) if isinstance(given, Iterable) else (None,)
     if not all(isinstance(part, HeldCurve) for part in parts):
@@ -174,12 +171,8 @@ def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCur
     """The curves where their vertices are now, X (n,3), for an affine motion of these.
 
     All kinds of curves are mapped by an affine map x → M x + b exactly. It is found from the vertices of the
-    curve alone or, where these do not determine it, of all curves together; so rings may move apart.
-
-    Warns
-    -----
-    CurveWarning
-        Where the motion is no such map: then the curve is left out.
+    curve alone or, where these do not determine it, of all curves together; so rings may move apart. A
+    CurveWarning tells where the motion is no such map: then the curve is left out.
     """
     kept, every = list[HeldCurve](), np.concatenate([np.empty(0, int), *(one.vertices for one in held)])
     before = np.concatenate([np.empty((0, 3)), *(one.points for one in held)])

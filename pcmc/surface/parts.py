@@ -20,6 +20,7 @@ from .lagrange import sides_along
 from .topology import Topology, edge_places
 
 Part = TypeVar("Part")
+NAMED = 6  # patches, cables or rooms that a summary names
 
 
 @dataclass(frozen=True)
@@ -272,3 +273,39 @@ def checked_rooms(given: Any, patches: Sequence[str]) -> tuple[Room, ...]:
             message = f"room {name!r}: its volume is prescribed already, by that of the rooms before it"
             raise SurfaceError(f"{message}; remove it", what="rooms", where=name)
     return parts
+
+
+def summary(surface: Any) -> str:
+    """Of a Surface: size, patches, walls, cables, rooms, supports and heights, a line each."""
+    patches = [
+        f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g}{f', snow {p.snow:g}' * bool(p.snow)})"
+        for p in surface.patches
+    ]
+    parts = {
+        "patches": [patches[k] for k in np.flatnonzero(~surface.walls)],
+        "walls": [patches[k] for k in np.flatnonzero(surface.walls)],
+        "cables": [
+            f"{cable.name} (tension {cable.tension:g}{f', weight {cable.weight:g}' * bool(cable.weight)})"
+            for cable in surface.cables
+        ],
+        "rooms": [f"{room.name} (volume {room.volume:g})" for room in surface.rooms],
+        "planes": [str(plane) for plane, _ in surface.on_planes],
+    }
+    height, fixed = surface.plane.height(surface.vertices), surface.pinned.sum()
+    lines = [
+        f"Surface of {surface.m} triangles and {surface.n} vertices, {surface.size:.4g} across",
+        *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts),
+        f"  supports: {fixed} vertices fixed, {surface.held.sum() - fixed} sliding",
+        f"  heights over the plane: {height.min():.4g} to {height.max():.4g}",
+    ]
+    return "\n".join(lines)
+
+
+def listed(texts: Sequence[str]) -> str:
+    """The first few, and how many more there are.
+
+    >>> listed("abcdefgh")
+    'a, b, c, d, e, f, and 2 more'
+    """
+    more = f", and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
+    return ", ".join(texts[:NAMED]) + more

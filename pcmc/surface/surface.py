@@ -21,8 +21,7 @@ from .geometry import bounding_size
 from .guides import Guide, Plane
 from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .lagrange import element_nodes
-from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs
-from .summary import summary
+from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs, summary
 from .topology import Topology, topology
 from .values import part_index, wall_patches, with_values
 

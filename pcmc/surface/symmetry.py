@@ -37,8 +37,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
 
     Raises
     ------
-    SurfaceError
-        If a triangle crosses the plane or lies in it, or nothing lies on one side of it.
+    SurfaceError : a triangle crosses the plane or lies in it, or nothing lies on one side of it.
 
     >>> from pcmc import Patch
     >>> square = Surface([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]], [0, 0],
@@ -157,8 +156,7 @@ def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> S
 
     Raises
     ------
-    SurfaceError
-        Without mirror planes, if the images never end, as between parallel planes, or if they overlap.
+    SurfaceError : no mirror planes; images that never end, as between parallel planes, or overlap.
 
     >>> from pcmc import Patch
     >>> wall = Plane(normal=(1, 0, 0), mirror=True)
@@ -271,9 +269,8 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
                 images.append(new)
         if len(images) > MOST_IMAGES:
             text = "the images in the mirror planes never end: some planes are parallel, or no whole number"
-            text += (
-                " of images fits around their line; name those to unfold at: mirrored(surface, planes=[…])"
-            )
+            hint = "name those to unfold at: mirrored(surface, planes=[…])"
+            text += f" of images fits around their line; {hint}"
             raise SurfaceError(text, what="planes", found=len(images))
     for image in images:
         for plane in planes:

@@ -5,9 +5,11 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from pcmc import MeshVerdict, check_mesh, solve, solve_to_accuracy
+from generators import spherical_cap
+from pcmc import MeshVerdict, Patch, Surface, certify, check_mesh, solve, solve_to_accuracy
 from pcmc.accuracy.adaptive import AccuracyStatus
 from pcmc.accuracy.extrapolation import extrapolate
+from pcmc.accuracy.quantities import readings
 from studies.coverage import forms as coverage_forms
 from studies.coverage import weights as coverage_weights
 from studies.coverage.bars import STUDY
@@ -93,6 +95,26 @@ def test_the_limit_and_its_bar_are_those_of_the_table(values, limit, bar):
     assert found.limit[0] == pytest.approx(limit, rel=1e-12)
     assert found.limit_error[0] == pytest.approx(bar, rel=1e-12)
     assert found.error[0] == pytest.approx(abs(limit - values[0]) + bar, rel=1e-12)
+
+
+def test_of_a_surface_that_settles_slowly_a_fast_quantity_is_not_believed_more():
+    """Of order 1, where the quantity shows 2: |d_1| / (S (S - 1)) less what is left by order 2, 3/16."""
+    found = extrapolate(np.array([[4.0], [6.25], [6.8125]]), np.array([1e-15]), shape_order=1.0)
+    assert found.limit[0] == pytest.approx(7.0, rel=1e-12)
+    assert found.limit_error[0] == pytest.approx(2.25 / 2.0 - 3.0 / 16.0, rel=1e-12)
+
+
+def test_the_rounding_of_each_quantity_has_its_unit():
+    """A hundred times as large under forces 10⁴ times as large, it grows as the quantity itself."""
+    cap = solve(spherical_cap(0.4, alpha=0.75)).surface
+    (patch,) = cap.patches
+    large = Surface(100.0 * cap.vertices, cap.faces, cap.patch_of_face,
+                    [Patch(patch.name, 100.0 * patch.tension, patch.pressure)], fixed=cap.fixed)  # fmt: skip
+    small, grown = (readings(s, certify(s), s.n) for s in (cap, large))
+    assert {"height", "area", "volume", "energy", "reaction"} <= {key[0] for key in small}
+    for (name, one), other in zip(small.items(), grown.values(), strict=True):
+        if abs(one.value) > 1e-6:
+            assert other.rounding / one.rounding == pytest.approx(other.value / one.value, rel=0.5), name
 
 
 def test_two_meshes_of_one_value_leave_rounding():

@@ -17,8 +17,7 @@ from pcmc.certificate.lipschitz import lipschitz
 from pcmc.certificate.system import system
 from pcmc.forces.motion_space import motion_space
 from pcmc.forces.pattern import hessian_pattern
-from pcmc.forces.pinching import standing_part
-from pcmc.forces.pull import pull_and_capacity
+from pcmc.forces.pinching import pull_and_capacity, standing_part
 from pcmc.forces.second_variation import assemble
 from pcmc.stability.equilibrium import Equilibrium
 from studies.forces.cases import hanging_barrel

@@ -201,6 +201,16 @@ def test_a_slit_that_reaches_no_rim_does_not_open():
         cutting_pattern(cap(), seams=[[[-0.5, -0.1], [0.5, -0.1]]])
 
 
+@pytest.mark.parametrize("turn", [1, -1], ids=["from the seam", "to the seam"])
+def test_a_line_may_begin_or_end_at_another(turn):
+    """Strips of 4 × 2, 2 × 1 and 2 × 1, whichever way the second line runs."""
+    flat = Plan([[0, 0], [6, 0], [6, 2], [0, 2]], edge_length=1.0, tension=2.0, pressure=0.0).surface()
+    for sign in (1, -1):
+        second = [[3 + sign, 1], [3 + 3 * sign, 1]]
+        pattern = cutting_pattern(flat, seams=[[[3 + sign, 0], [3 + sign, 2]], second[::turn]], anyway=True)
+        assert sorted(pattern.table["cut_area"]) == pytest.approx([2.0, 2.0, 8.0])
+
+
 def test_a_line_that_ends_inside_a_sheet_is_a_dart():
     pattern = cutting_pattern(cap(), seams=[[[0.0, -1.0], [0.0, 0.0]]])
     (strip,) = pattern.strips
@@ -208,6 +218,18 @@ def test_a_line_that_ends_inside_a_sheet_is_a_dart():
     assert [side.strip for side in dart.sides] == [1, 1]
     assert len(strip.outlines) == 1
     assert pattern.largest_difference < 1e-6
+
+
+def test_sheets_close_over_each_other_are_cut_apart_and_a_square_one_along_x():
+    X = np.array([[x, y, z] for z in (0.0, 0.01) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)])
+    F = np.concatenate([grid(2, 2)[:, ::-1], grid(2, 2)[:, ::-1] + 9])
+    patches = [Patch("lower", 1.0, 0.0), Patch("upper", 1.0, 0.0)]
+    two = Surface(X, F, np.repeat([0, 1], 8), patches, fixed=range(18))
+    pattern = cutting_pattern(two, strips=2, anyway=True)
+    assert pattern.table["patch"].tolist() == ["lower", "lower", "upper", "upper"]
+    assert pattern.table["cut_area"].to_numpy() == pytest.approx(2.0)
+    for strip in pattern.strips:
+        assert np.ptp(strip.roof, axis=0) == pytest.approx([2.0, 1.0, 0.0])
 
 
 def test_cables_and_holes_are_cut_around():
@@ -286,7 +308,7 @@ def test_uncertified_and_closed_surfaces_are_refused():
     raised = cap().moved(np.where(cap().fixed[:, None], cap().vertices, cap().vertices * [1.0, 1.0, 1.3]))
     with pytest.raises(SurfaceError, match="not certified"):
         cutting_pattern(raised, width=1.0)
-    assert "not certified" in str(cutting_pattern(raised, width=1.0, anyway=True))
+    assert str(cutting_pattern(raised, width=1.0, anyway=True)).startswith("not certified  ")
     corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
     faces = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
     closed = Surface(corners, faces, [0] * 4, [Patch("bubble", 1.0)], fixed=range(4))
@@ -307,3 +329,8 @@ def test_the_stretch_is_what_a_tension_undoes():
     warp, weft = CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson=0.25).stretch(4.0)
     assert warp * (1.0 + 4.0 * 0.75 / 200.0) == pytest.approx(1.0)
     assert weft * (1.0 + 4.0 / 100.0 - 0.25 * 4.0 / 200.0) == pytest.approx(1.0)
+    usual = CuttingOptions(strips=1, stiffness=(200.0, 100.0)).stretch(4.0)[1]
+    assert usual == CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson=0.3).stretch(4.0)[1]
+    assert CuttingOptions(strips=1, compensation=(20.0, 0.0)).stretch(4.0) == (0.8, 1.0)
+    with pytest.raises(OptionError, match="compensation"):
+        CuttingOptions(strips=1, compensation=(20.1, 0.0))

@@ -1,5 +1,7 @@
 """Cutting patterns in files: sheets, tables, the section of a project, the command."""
 
+from itertools import combinations
+
 import ezdxf
 import numpy as np
 import pandas as pd
@@ -117,6 +119,15 @@ def test_sheets_and_model_have_every_strip(pattern, tmp_path):
     assert titles[-2:] == ["Strips", "Seams"]
 
 
+def test_strips_lie_apart_at_true_size_each_with_its_number_inside(pattern):
+    flat = pattern_drawings(pattern, "m", sheet="A3").flat
+    cut = [Polygon(line.points) for line in flat.lines if line.layer == "PCMC-CUT"]
+    assert all(one.distance(other) > 1.0 for one, other in combinations(cut, 2))  # mm
+    for strip, outline in zip(pattern.strips, cut, strict=True):
+        (at,) = (text.at for text in flat.texts if text.text == f"{strip.number}  {strip.patch}")
+        assert outline.contains(Point(at))
+
+
 def test_the_picture_shows_the_strain(pattern, tmp_path):
     image = strains(pattern, tmp_path / "strain.png", view="plan", width=300)
     assert image.shape[1] == 300
@@ -124,6 +135,22 @@ def test_the_picture_shows_the_strain(pattern, tmp_path):
     of_face = pattern.strain_of_face
     assert (np.isfinite(of_face) == pattern.surface.roof[pattern.surface.patch_of_face]).all()
     assert np.nanmax(np.abs(of_face)) <= 100.0 * max(np.abs(strip.strain).max() for strip in pattern.strips)
+
+
+def test_numbers_of_strips_and_faces_are_those_of_the_cloth(pattern):
+    """Cut shorter by what was asked for; the strain of faces, in percent, is a mean of the strips'."""
+    assert pattern.table["warp"].to_numpy() == pytest.approx(0.5)
+    assert pattern.table["weft"].to_numpy() == pytest.approx(1.0)
+    assert "cut shorter  by 0.5 to 0.5 % along the warp, 1 to 1 % along the weft\n" in pattern.text()
+    low, high = np.full((2, pattern.surface.m), [[np.inf], [-np.inf]])
+    for strip in pattern.strips:
+        least, most = 100.0 * strip.strain.T
+        larger = np.where(np.abs(least) > np.abs(most), least, most)
+        np.minimum.at(low, strip.source, larger)
+        np.maximum.at(high, strip.source, larger)
+    shown, cut = pattern.strain_of_face, np.isfinite(low)
+    assert (shown[cut] >= low[cut] - 1e-12).all()
+    assert (shown[cut] <= high[cut] + 1e-12).all()
 
 
 def test_a_project_writes_its_pattern(tmp_path):

@@ -11,14 +11,14 @@ from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pinching import (
     StandingPart,
     beside_resting,
-    find_walls,
     lift,
     place_wall_rows,
+    pull_and_capacity,
     resting_links,
     resting_vertices,
     top_spacing,
 )
-from pcmc.forces.pull import pull_and_capacity
+from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.state import SolverState
 

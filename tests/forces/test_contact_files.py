@@ -14,7 +14,8 @@ from starts import stationary, two_squares
 import pcmc
 from pcmc import certify
 from pcmc.base.errors import FileError, FileWarning, SurfaceError
-from pcmc.forces.pinching import find_walls, resting_vertices
+from pcmc.forces.pinching import resting_vertices
+from pcmc.forces.wall_rows import find_walls
 from pcmc.io import load
 from pcmc.io.metadata import WALLS as KEY
 

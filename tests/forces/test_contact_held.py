@@ -11,13 +11,8 @@ from starts import four_fans, stationary, two_squares
 import pcmc
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.forces.functional import energy_and_gradient
-from pcmc.forces.pinching import (
-    StandingPart,
-    find_walls,
-    lift,
-    resting_vertices,
-)
-from pcmc.forces.pull import pull_and_capacity, pull_directions
+from pcmc.forces.pinching import StandingPart, lift, pull_and_capacity, pull_directions, resting_vertices
+from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.newton import newton

@@ -10,13 +10,8 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.forces.pinching import (
-    StandingPart,
-    find_walls,
-    place_wall_rows,
-    resting_vertices,
-    standing_part,
-)
+from pcmc.forces.pinching import StandingPart, place_wall_rows, resting_vertices, standing_part
+from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import SolverState

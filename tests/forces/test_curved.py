@@ -24,8 +24,8 @@ from generators import (
 from pcmc import Patch, Surface, energy, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.diagnostics import check_gradient, check_hessian, taylor
+from pcmc.forces.elements import energy_mesh
 from pcmc.forces.functional import energy_and_gradient, patch_areas, patch_volumes
-from pcmc.forces.mesh import energy_mesh
 from pcmc.forces.rooms import room_volumes
 from pcmc.forces.second_variation import add_products, hessian
 from pcmc.forces.volume_below import volume_below, volume_below_gradient

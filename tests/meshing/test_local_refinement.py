@@ -8,7 +8,8 @@ import pcmc
 from generators import four_fans, spherical_cap, three_patches, two_caps, two_squares
 from pcmc.base.errors import OptionError
 from pcmc.forces.functional import patch_areas, patch_volumes
-from pcmc.forces.pinching import find_walls, standing_part
+from pcmc.forces.pinching import standing_part
+from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.local_refinement import refine_faces, refine_near
 from pcmc.meshing.quality import edge_lengths
 from pcmc.meshing.refinement import refine

@@ -128,6 +128,18 @@ def test_a_small_panel_with_an_acute_corner_is_no_sliver():
     assert left.start.tolist() == [0, 3, 7]
 
 
+@pytest.mark.parametrize(("depth", "start"), [(0.03, [0, 4, 7]), (0.06, [0, 3, 7, 10])])
+def test_a_panel_on_the_rim_below_a_hundredth_of_the_square_of_the_size_is_left_out(depth, start):
+    """A triangle of that depth on a side of 0.4, beside a quad and another triangle; the size is 2."""
+    xy = [[0, 0], [0.2, -depth], [0.4, 0], [0.4, 0.5], [0, 0.5], [0, -0.5], [0.4, -0.5]]
+    points, kind = 2.0 * np.pad(np.array(xy), ((0, 0), (0, 1))), np.full(7, CORNER)
+    corners, every = np.array([0, 1, 2, 0, 2, 3, 4, 1, 5, 6]), np.array([0, 3, 7, 10])
+    rest = np.zeros(3, dtype=int), np.ones(3, dtype=bool), np.zeros(3)
+    left = tidied(Net(points, np.tile([0.0, 0, 1], (7, 1)), kind, every, corners, *rest), 2.0)
+    assert np.array_equal(left.points, points)
+    assert left.start.tolist() == start
+
+
 def test_the_share_of_the_roof_that_panels_cover_grows_as_they_get_smaller(walled):
     left = [1.0 - panel_net(walled, size, "quads").covered for size in (1.6, 0.8)]
     assert 0.0 < 2.0 * left[1] < left[0] < 0.01
@@ -144,6 +156,21 @@ def test_panels_without_area_are_told_of(rectangle):
     thin = net.panels.assign(area=net.panels["area"].where(net.panels["panel"] != 7, 1e-4))
     assert "slivers  1 panels have next to no area, as panel 7" in str(replace(net, panels=thin))
     assert "slivers" not in str(net)
+
+
+def test_tables_of_a_net_number_its_nodes_beams_and_panels_from_1(rectangle):
+    """A beam is as long as its nodes are apart, and every panel has as many beams as corners."""
+    net = panel_net(rectangle, 1.0)
+    for table, name in ((net.nodes, "node"), (net.beams, "beam"), (net.panels, "panel")):
+        assert table[name].tolist() == list(range(1, len(table) + 1))
+    P = net.nodes.set_index("node")[[*"xyz"]]
+    apart = P.loc[net.beams["node"]].to_numpy() - P.loc[net.beams["other"]].to_numpy()
+    assert net.beams["length"].to_numpy() == pytest.approx(np.linalg.norm(apart, axis=1))
+    beside = net.beams[["panel", "neighbour"]].to_numpy()
+    assert (beside[:, 0] != beside[:, 1]).all()
+    assert np.bincount(beside.ravel())[1:].tolist() == net.panels["corners"].tolist()
+    rim = net.beams[net.beams["neighbour"] == 0][["node", "other"]].to_numpy().ravel()
+    assert set(net.nodes["kind"][rim - 1]) == {"edge", "corner"}
 
 
 def test_quads_of_a_grid_stay_on_the_surface_and_are_worse_planar(rectangle):

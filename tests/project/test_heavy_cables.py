@@ -10,7 +10,7 @@ from pcmc import cli
 from pcmc.base.errors import OptionError
 from pcmc.explore.page_data import state_data
 from pcmc.explore.session import Session, solved_start
-from pcmc.forces.parameters import energy_by, gradient_by
+from pcmc.forces.functional import energy_by, gradient_by
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import CableLine, Divider, Hole, Plan
 from pcmc.project import designed, load, surface_of, varied

@@ -349,7 +349,7 @@ def test_sweeps_search_only_if_asked():
 
 def test_from_equal_tensions_to_those_asked_for():
     """The pressure cannot be raised from low ones: there the stronger patch pulls the wall away."""
-    weak = two_caps(1.2, alpha_large=1.0, alpha_small=1.5, alpha_aux=6.0)
+    weak = two_caps(2.4, alpha_large=1.0, alpha_small=1.5, alpha_aux=6.0)
     result = solve(weak, target="stationary")
     assert result.status is Status.NONE_FOUND  # the wall slides: its foot may be as long as it likes
     assert result.proofs == ()

@@ -21,7 +21,13 @@ from pcmc.plot import member_forces
 from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Picture, Table
 from pcmc.structure import Member, Profile, analyse, calculix
-from pcmc.structure.member_forces import forces_on_members, member_tables, members_at_rest, weak_members
+from pcmc.structure.member_forces import (
+    forces_on_members,
+    member_tables,
+    members_at_rest,
+    sentences,
+    weak_members,
+)
 from pcmc.structure.pulls import balancing_force, turns
 from pcmc.structure.section import members_of
 
@@ -346,6 +352,35 @@ def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
     assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
     stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
     assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
+
+
+def test_a_sentence_has_the_force_that_is_largest_in_size_and_what_it_leaves():
+    """In tension below 1 along an arch, with its share of bending; in compression along a rim."""
+    arch = hall_with(of=hall(scale=0.05))
+    rim = model_of(
+        spherical_cap(0.4, alpha=0.6, exact=True),
+        members=[Member(circle([0, 0], 1.0), TUBE, STEEL, propped=True)],
+        anyway=True,
+    )
+    for model, sign in ((arch, 1.0), (rim, -1.0)):
+        [text], [beam] = sentences(model, Units("m", "kN")), members_at_rest(model)
+        N = max(beam.within[:, 0], key=abs)
+        assert N * sign > 0.0
+        assert f": at rest N = {N:.3g} kN, M up to {beam.largest['M']:.3g} kN·m" in text
+        assert "thrust" not in text
+    share = members_at_rest(arch)[0].balance[1]
+    assert f"would leave {100.0 * share:.0f} % of the sheets' pull" in sentences(arch, Units())[0]
+
+
+@pytest.mark.parametrize(("ends", "shown"), [((-3.0, 1.0), "-3"), ((-1.0, 3.0), "3")])
+def test_a_sentence_shows_a_thrust_that_is_larger_than_the_pull(monkeypatch, ends, shown):
+    [beam] = members_at_rest(hall_with())
+    within = beam.within.copy()
+    within[:, 0] = np.linspace(*ends, len(within))
+    turned = [replace(beam, within=within)]
+    monkeypatch.setattr("pcmc.structure.member_forces.members_at_rest", lambda model: turned)
+    [text] = sentences(hall_with(), Units("m", "kN"))
+    assert text.startswith(f"wall 1: at rest N = {shown} kN, ")
 
 
 def test_the_lines_that_the_command_offers_give_a_shape_that_does_not_bend(tmp_path, capsys):

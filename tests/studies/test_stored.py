@@ -28,7 +28,7 @@ def age(study, results):
 
 def forget():
     """What is read once is kept."""
-    for cached in (code._tree, code._hash, code._needs, code._named, code._handed_on):
+    for cached in (value for value in vars(code).values() if hasattr(value, "cache_clear")):
         cached.cache_clear()
 
 

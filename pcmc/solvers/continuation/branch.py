@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -19,10 +19,13 @@ from ...surface.lagrange import expect_flat
 from ..result import Callback
 from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
-from .direction import Direction, Named, ParameterLine
+from .direction import Direction, ParameterLine
 from .options import Ending, FollowOptions
 from .state import QUANTITIES, BranchMesh
 from .tracing import Tracer
+
+if TYPE_CHECKING:
+    from ...certificate.quantities import Parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +232,7 @@ def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
 
 def follow(
     surface: Surface,
-    parameter: str | Named | Direction | BoundaryMotion,
+    parameter: str | Parameter | Direction | BoundaryMotion,
     stop: float | None = None,
     *,
     until: Mapping[str, float] | None = None,
@@ -299,12 +302,14 @@ def follow(
         raise MissingExtra("mmgpy", "remesh")
     goals = _goals(stop, until)
     direction: object = Direction({parameter: 1.0}) if isinstance(parameter, str) else parameter
-    if isinstance(parameter, Named):
-        by_kind: dict[str, Any] = {parameter.key: dict.fromkeys(parameter.names, 1.0)}
-        direction = Direction(**by_kind)
     if not isinstance(direction, Direction | BoundaryMotion):
-        expected = "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
-        validate.refuse("parameter", parameter, expected)
+        from ...certificate.quantities import Parameter  # slow to import
+
+        if not isinstance(direction, Parameter):
+            expected = "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
+            validate.refuse("parameter", parameter, expected)
+        by_kind: dict[str, Any] = {direction.key: dict.fromkeys(direction.names, 1.0)}
+        direction = Direction(**by_kind)
     if chosen.remesh is not None and isinstance(direction, BoundaryMotion):
         message = "remesh: a new mesh has other boundary vertices than BoundaryMotion moves; leave remesh out"
         raise OptionError(message, what="remesh", found=chosen.remesh)

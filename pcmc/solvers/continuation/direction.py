@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,24 +17,13 @@ from ...base import validate
 from ...base.arrays import Floats
 from ...base.errors import OptionError
 from ...base.tolerances import ON_BRANCH
-from ...forces.parameters import Rates, energy_by, gradient_by
+from ...forces.functional import Rates, energy_by, gradient_by
 from ...forces.rooms import refuse_varied_pressure
 from ...surface import Surface
 from ...surface.supports import apply_supports
 from ...surface.values import KINDS, part_index, part_values, rates_of
 
 VARIED = ("tensions", "pressures", "volumes", "weights", "snows", "cables", "cable_weights")
-
-
-@runtime_checkable
-class Named(Protocol):
-    """What names the parts whose value varies, and one of ``VARIED``, such as ``pcmc.Parameter``."""
-
-    @property
-    def key(self) -> str: ...
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -109,7 +97,12 @@ class Direction:
                 start[kind][[part_index(surface, kind, name) for name in self.named[kind]]] = 0.0
         line = ParameterLine(value, start, rates)
         refuse_varied_pressure(surface, np.flatnonzero(rates.get("pressures", ())))
-        _refuse_slack(surface, rates)
+        why = {"tensions": "{!r} is 0, where its triangles stop pulling", "cables": "the cable {!r} is 0"}
+        for kind in [kind for kind in why if kind in rates]:  # from 0 on they would slide for nothing
+            for part in np.flatnonzero((rates[kind] != 0.0) & (part_values(surface, kind) <= 0.0)):
+                name = getattr(surface, KINDS[kind][0])[part].name
+                message = f"the tension of {why[kind].format(name)}; start from one > 0"
+                raise OptionError(message, what="parameter", where=name, found=0.0)
         surface.retensioned(snows=line.named(surface, value + 1.0).get("snows"))  # refuses it at free edges
         return line
 
@@ -129,16 +122,6 @@ class Direction:
                 text += " weights in proportion to the surface's own values, or relative=True"
                 raise OptionError(text, what="parameter", where=name, found=other, expected=value)
         return float(value)
-
-
-def _refuse_slack(surface: Surface, rates: Rates) -> None:
-    """Refuse a tension of 0: from there on triangles, or a curve, would slide for nothing."""
-    why = {"tensions": "{!r} is 0, where its triangles stop pulling", "cables": "the cable {!r} is 0"}
-    for kind in [kind for kind in why if kind in rates]:
-        for part in np.flatnonzero((rates[kind] != 0.0) & (part_values(surface, kind) <= 0.0)):
-            name = getattr(surface, KINDS[kind][0])[part].name
-            message = f"the tension of {why[kind].format(name)}; start from one > 0"
-            raise OptionError(message, what="parameter", where=name, found=0.0)
 
 
 @dataclass(frozen=True, eq=False)

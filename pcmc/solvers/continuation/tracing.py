@@ -18,7 +18,7 @@ from ...forces.rooms import room_pressures
 from ...meshing.quality import redistribute, turns_over
 from ...meshing.remeshing import remesh
 from ...surface import Surface
-from ..methods import solve_once
+from .. import solve_once
 from ..result import Callback, Progress, Status
 from .branch_point import BranchPoint, Tangent, along_branch, branch_point
 from .correction import (

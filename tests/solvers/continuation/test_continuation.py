@@ -174,14 +174,12 @@ def test_ratio_keeps_the_lower_tension_and_names_what_varies():
 
 
 def test_diagram_cuts_the_branch_where_stability_changes(small_cap, tmp_path):
-    from pcmc.plot.curves import _pieces
-
     branch = follow(small_cap, "cap", until={"height": 1.2}, step=-0.05)
-    stable, unstable = _pieces(branch, "parameter", "height")
+    stable, unstable = branch.pieces("parameter", "height")
     assert (stable[0], unstable[0]) == (True, False)
     change = branch.events.set_index("kind").loc["index"]
     for piece, end in ((stable, -1), (unstable, 0)):
-        assert (piece[1][0][end], piece[1][1][end]) == (change.parameter, change.height)
+        assert piece[1][end].tolist() == [change.parameter, change.height]
     assert diagram({"cap": branch}, tmp_path / "cap.png").shape[2] == 3
     assert (tmp_path / "cap.png").stat().st_size > 1000
     with pytest.raises(OptionError, match=r"'cap'.*'heigt'; did you mean 'height'"):

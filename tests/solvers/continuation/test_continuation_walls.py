@@ -7,8 +7,7 @@ from nightly import at_night
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
-from pcmc.forces.pinching import standing_part
-from pcmc.forces.pull import pull_and_capacity
+from pcmc.forces.pinching import pull_and_capacity, standing_part
 from pcmc.plan import Divider, Plan
 from pcmc.solvers.continuation import Ending
 
