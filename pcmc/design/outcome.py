@@ -76,14 +76,8 @@ class Design:
 
     def __repr__(self) -> str:
         """How the search ended, what it reached and with what, above the surface."""
-<<<<<<< HEAD
-        targets, parameters = values_text(self.targets), values_text(self.parameters)
-        text = f"{self.message}\n  targets: {targets}\n  parameters: {parameters}\n  {self.solves} solves"
-        return f"{text}\n{self.surface!r}"
-=======
         values = f"  targets: {values_text(self.targets)}\n  parameters: {values_text(self.parameters)}"
         return f"{self.message}\n{values}\n  {self.solves} solves\n{self.surface!r}"
->>>>>>> main
 
     @property
     def met(self) -> bool:
