@@ -53,7 +53,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
     if outcome.under_load is not None:
-        print(outcome.under_load)
+        said = f"{units.sentence}\n" if verdict else ""
+        print(str(outcome.under_load).removeprefix(said))
     if outcome.advice:
         print("\n  ".join(outcome.advice))
     ended(outcome.good, outcome.files)
