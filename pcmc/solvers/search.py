@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 from ..base.arrays import Bools
-from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
 from ..certificate.balance import growing_part, hardly_balanced, load_name, load_ratio, overload
 from ..certificate.diagnosis import pinched_neck
@@ -48,8 +47,7 @@ def search(surface: Surface, first: Result, callback: Callback | None, options: 
         return _search(start, first, solves)
     except LimitReached as reached:
         return reached.result
-    except (StopIteration, KeyboardInterrupt) as error:
-        stop_requested(error)
+    except (StopIteration, KeyboardInterrupt):  # a mistake in a callback has become a RuntimeError below
         return replace(first, status=Status.STOPPED, evaluations=solves.evaluations)
 
 

@@ -1,12 +1,14 @@
 """Error bars where they once failed: minimal surfaces, guessed curves, orders that are coincidences."""
 
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from generators import spherical_cap
-from pcmc import MeshVerdict, Patch, Surface, certify, check_mesh, solve, solve_to_accuracy
+from pcmc import MeshVerdict, Patch, Plane, Room, Surface, certify, check_mesh, solve, solve_to_accuracy
 from pcmc.accuracy.adaptive import AccuracyStatus
 from pcmc.accuracy.extrapolation import extrapolate
 from pcmc.accuracy.quantities import readings
@@ -104,12 +106,14 @@ def test_of_a_surface_that_settles_slowly_a_fast_quantity_is_not_believed_more()
     assert found.limit_error[0] == pytest.approx(2.25 / 2.0 - 3.0 / 16.0, rel=1e-12)
 
 
-def test_the_rounding_of_each_quantity_has_its_unit():
+@pytest.mark.parametrize("rooms", [(), [Room("inside", {"cap": 1}, 1.0)]])
+def test_the_rounding_of_each_quantity_has_its_unit(rooms):
     """A hundred times as large under forces 10⁴ times as large, it grows as the quantity itself."""
-    cap = solve(spherical_cap(0.4, alpha=0.75)).surface
+    cap = solve(spherical_cap(0.4, alpha=0.75)).surface.rebuilt(rooms=rooms)
     (patch,) = cap.patches
     large = Surface(100.0 * cap.vertices, cap.faces, cap.patch_of_face,
-                    [Patch(patch.name, 100.0 * patch.tension, patch.pressure)], fixed=cap.fixed)  # fmt: skip
+                    [Patch(patch.name, 100.0 * patch.tension, patch.pressure)], fixed=cap.fixed,
+                    rooms=[replace(room, volume=1e6) for room in rooms])  # fmt: skip
     small, grown = (readings(s, certify(s), s.n) for s in (cap, large))
     assert {"height", "area", "volume", "energy", "reaction"} <= {key[0] for key in small}
     for (name, one), other in zip(small.items(), grown.values(), strict=True):
@@ -121,6 +125,19 @@ def test_two_meshes_of_one_value_leave_rounding():
     found = extrapolate(np.array([[2.0], [2.0 + 1e-13]]), np.array([1e-12]))
     assert (found.limit[0], found.limit_error[0]) == (2.0 + 1e-13, 1e-12)
     assert np.isnan(found.order[0])
+
+
+def test_the_top_of_a_paraboloid_in_a_mirror_plane_is_found_between_its_vertices():
+    """Half of it, z = 1 - x² - (y - 0.03)²/4 over a grid: the images of vertices lie on it, too."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0.0, 1.0, 6), np.linspace(-1.0, 1.0, 11)))
+    X = np.stack([x, y, 1.0 - x**2 - 0.25 * (y - 0.03) ** 2], axis=1)
+    mirror = Plane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), mirror=True)
+    rim = (x == 1.0) | (np.abs(y) == 1.0)
+    half = Surface(X, Delaunay(X[:, :2]).simplices, [0] * 100, [Patch("roof", 1.0)], fixed=rim,
+                   on_planes={mirror: ~rim & (x == 0.0)})  # fmt: skip
+    height = readings(half, certify(half), half.n)["height", "roof", (), b""]
+    assert height.value < 0.9998
+    assert height.estimate == pytest.approx(1.0, abs=1e-12)
 
 
 def test_heights_in_mirror_planes_are_read_with_the_images():

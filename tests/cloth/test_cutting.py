@@ -122,6 +122,12 @@ def test_strips_fit_the_cloth_and_cover_the_roof(width):
         assert len(strip.outlines) == 1
 
 
+def test_the_table_of_seams_has_both_ends_of_each():
+    pattern = cutting_pattern(cap(), strips=4)
+    ends = pattern.seam_table[["x0", "y0", "z0", "x1", "y1", "z1"]].to_numpy()
+    assert ends == pytest.approx(np.array([seam.points[[0, -1]].ravel() for seam in pattern.seams]))
+
+
 def test_the_strain_of_strips_is_of_order_two_in_their_width():
     strains = [cutting_pattern(cap(), strips=count).table["strain_rms"].max() for count in (4, 8)]
     assert orders(strains) == pytest.approx(2.0, abs=0.3)

@@ -74,6 +74,15 @@ def test_corners_of_allowances_are_where_the_lines_outside_meet():
     assert Polygon(cut).area == pytest.approx(2.1 * 2.4)
 
 
+def test_a_hole_in_a_strip_is_cut_out_smaller_by_its_hem():
+    square = [[2, 0.5], [4, 0.5], [4, 1.5], [2, 1.5]]
+    plan = Plan([[0, 0], [6, 0], [6, 2], [0, 2]], holes=[square], edge_length=0.5, tension=2.0, pressure=0.0)
+    pattern = cutting_pattern(plan.surface(), strips=1, hem=0.2, anyway=True)
+    lines, _ = strip_lines(pattern, pattern.strips[0])
+    cut = [np.ptp(line.points, axis=0) for line in lines if line.layer == "PCMC-CUT"]
+    assert np.sort(cut) == pytest.approx(np.array([[2.4, 6.4], [0.6, 1.6]]))
+
+
 def test_notches_of_both_sides_lie_on_each_other(pattern):
     """In as many places, as far along both sides as on the roof."""
     for seam in pattern.seams:

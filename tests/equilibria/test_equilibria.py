@@ -24,6 +24,7 @@ from generators import (
 from pcmc import BoundaryMotion, Direction, Room, find_equilibria, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
+from pcmc.equilibria.found import Equilibria, WayDown
 from pcmc.equilibria.shapes import Shape
 from pcmc.forces.functional import patch_areas
 from pcmc.solvers.continuation import Branch, Ending
@@ -277,6 +278,20 @@ def test_numbers_of_equilibria_are_checked(caps):
     with refused(OptionError, what="to"):
         caps[0].barrier(1, 2)
     assert caps[0].barrier(1, 1) == 0.0
+
+
+def test_an_index_that_rounding_hides_is_minus_one(caps):
+    one = caps[0][1]
+    assert replace(one, certificate=replace(one.certificate, index=None)).index == -1
+
+
+def test_the_way_out_of_a_minimum_leads_to_another_shape():
+    """Of the saddles beside minimum 1 the lowest leads back to it, one beside 2 is lower still."""
+    shapes = [(0, 0.0), (0, 1.0), (1, 1.5), (1, 2.0), (1, 3.0)]
+    found = tuple(SimpleNamespace(index=index, energy=energy) for index, energy in shapes)
+    ways = [(3, 2, None), (4, 1, 1), (5, 1, 2)]
+    ways = tuple(WayDown(saddle, to) for saddle, *both in ways for to in both)
+    assert Equilibria(found, ways, (), {}).barrier(1) == 3.0
 
 
 def test_a_search_that_is_stopped_keeps_what_it_has():

@@ -252,6 +252,15 @@ def test_a_bubble_has_no_stable_equilibrium_and_one_that_is_not():
     assert certify(limp).verdict is Verdict.NO_EQUILIBRIUM
 
 
+def test_a_bubble_that_is_crumpled_tells_that_a_saddle_was_sought_too():
+    bubble = sphere(0.8)
+    crumpled = bubble.moved(bubble.vertices + np.random.default_rng(1).normal(size=bubble.vertices.shape))
+    result = solve(crumpled)
+    assert not result.converged
+    assert [attempt.way for attempt in result.tried] == ["given start", "stationary point"]
+    assert "sought as any stationary point" in result.message
+
+
 def test_a_part_that_nothing_holds_falls_under_its_weight():
     heavy = sphere(0.8).retensioned(weights={"bubble": 0.1})
     result = solve(heavy)
@@ -290,6 +299,31 @@ def test_stopped_in_the_search_the_first_result_is_the_best():
     assert result.status is Status.STOPPED
     assert [row["iteration"] for row in seen] == list(range(len(seen)))
     np.testing.assert_array_equal(result.surface.vertices, first.surface.vertices)
+
+
+@pytest.mark.parametrize("step", ["newton", "branch"])
+def test_an_empty_iterator_in_a_callback_is_no_request_to_stop_a_search(step):
+    """The first start leads nowhere; the callback fails in what is tried next."""
+    first = solve_once(paraboloid(5.0, 0.45))
+
+    def callback(progress):
+        beyond = progress.row["iteration"] > first.iterations
+        if beyond and (progress.row["step"] == "branch") == (step == "branch"):
+            next(iter([]))
+
+    with pytest.raises(RuntimeError, match="StopIteration out of next"):
+        solve(paraboloid(5.0, 0.45), callback=callback)
+
+
+def test_what_fails_on_a_finer_mesh_is_searched_for_there():
+    """One free vertex is at rest where no smooth roof would be: refined, the roof runs away, and its branch
+    folds."""
+    first = solve_once(pyramid(0.4), levels=1)
+    assert first.rows[-1]["level"] == 1
+    result = solve(pyramid(0.4), levels=1)
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert result.surface.m == first.surface.m
+    assert result.tried[-1].folds
 
 
 def test_stopped_on_the_branch_and_errors_pass_through():

@@ -13,7 +13,7 @@ from structures import FABRIC, model_of, square
 
 import pcmc
 from generators import joined_caps
-from pcmc import Material, SelfWeight, Snow, StructuralModel, cli
+from pcmc import Circle, Material, SelfWeight, Snow, StructuralModel, cli
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
@@ -68,6 +68,20 @@ def test_the_edge_of_a_flat_sheet_pulls_a_straight_beam_sideways():
     off = beam.deflection / (5 * 2.0 / 384.0 / (2.1e8 * TUBE.upright)) - 1.0
     assert off == pytest.approx(-0.8 / 8**2)  # of a load lumped at eight points
     assert beam.enough == pytest.approx(300.0 * beam.deflection)
+
+
+def test_a_beam_whose_end_slides_along_it_bends_as_one_with_both_ends_held():
+    """On a circle that touches its line, the end neither leaves the line nor turns about it."""
+    film = square(8, tension=2.0).retensioned(None, {"film": 1.0})
+    end = np.arange(film.n) == film.n - 1
+    slides = {Circle((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0): end}
+    edge = Member(polyline([[0, 1], [1, 1]]), TUBE, STEEL)
+    held, rolls = (
+        members_at_rest(model_of(surface, members=[edge], anyway=True))[0]
+        for surface in (film, film.rebuilt(fixed=film.fixed & ~end, on_line=slides))
+    )
+    assert rolls.within[:, 1:] == pytest.approx(held.within[:, 1:], abs=1e-9)
+    assert rolls.displacements[:, 1:] == pytest.approx(held.displacements[:, 1:], abs=1e-12)
 
 
 def test_beams_have_nodes_of_their_own_tied_to_the_vertices_where_these_are(tmp_path):
@@ -352,6 +366,15 @@ def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
     assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
     stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
     assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
+
+
+def test_what_sheets_carry_of_the_pull_of_a_weak_member_is_a_percentage():
+    """A beam under load with a quarter of its pull at rest: the sheets carry the other three."""
+    model = hall_with(Member("wall 1", Profile.tube(0.005, 0.0005), STEEL))
+    rest = members_at_rest(model)
+    case = tuple(replace(beam, pulls=0.25 * beam.pulls) for beam in rest)
+    [line] = [line for line in weak_members(model, [("snow", case)], Units()) if "too weak" in line]
+    assert "at rest the sheets carry 75 % of what it should" in line
 
 
 def test_a_sentence_has_the_force_that_is_largest_in_size_and_what_it_leaves():
