@@ -78,6 +78,16 @@ def test_a_roof_over_a_rectangle_has_two_umbilics_on_its_axis_with_six_sided_pan
     assert len(net.points) - len(net.beams) + len(net.panels) == 1
 
 
+def test_panels_called_umbilic_are_those_around_the_umbilics():
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], edge_length=1.3, tension=5.0)
+    net = panel_net(pcmc.solve(plan.surface()).surface, 1.5)
+    around = np.flatnonzero(net.panels["kind"] == "umbilic")
+    middles = [net.points[net.corner[net.start[k] : net.start[k + 1]]].mean(axis=0) for k in around]
+    away = np.linalg.norm(np.array(middles)[:, None] - net.umbilics, axis=2)
+    assert away.shape == (2, 2)
+    assert (away.min(axis=0) < 0.75).all()
+
+
 @pytest.fixture(scope="module")
 def walled():
     from pcmc.plan import Divider
