@@ -18,18 +18,19 @@ import importlib
 import multiprocessing
 import os
 import random
-import re
 import shutil
 import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from copy import deepcopy
 from dataclasses import dataclass
 from multiprocessing import Queue
 from pathlib import Path
+
+import pytest
 
 PAIRS = [(ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.And, ast.Or), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE)]
 PAIRS += [(ast.Eq, ast.NotEq), (ast.Is, ast.IsNot), (ast.In, ast.NotIn), (ast.USub, ast.UAdd)]
@@ -37,10 +38,9 @@ EXCHANGED = dict(PAIRS) | {there: here for here, there in PAIRS}
 TABLE = Path(".ci/mutants.toml")
 COPIED = ("pcmc", "generators", "studies", "tests", "results", "notebooks", "docs", ".ci")
 COPIED += ("pyproject.toml", "README.md", "CHANGELOG.md", "CITATION.cff", "constraints.txt")
-LOADED = ("pytest", "hypothesis", "scipy.sparse.linalg", "scipy.spatial", "pandas", "numba", "typer")
+LOADED = ("hypothesis", "scipy.sparse.linalg", "scipy.spatial", "pandas", "numba", "typer")
 LOADED += ("matplotlib.pyplot", "selenium.webdriver", "pyvista", "trimesh", "ezdxf", "ifcopenshell")
 OPTIONS = ("-q", "-n", "0", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
-TIMES = re.compile(r"^ *([0-9.]+)s (?:setup|call|teardown) +(\S.*)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,18 @@ def prepare(jobs: Path, numbers: Queue) -> None:
         importlib.import_module(library)
 
 
+class Clock:
+    """A plugin of pytest: ``times.txt`` gets a line for each test, its processor time and its name."""
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
+        start = sum(os.times()[:4])  # with programs that it starts and waits for
+        result = yield
+        with open("times.txt", "a", encoding="utf-8") as times:
+            times.write(f"{sum(os.times()[:4]) - start:.2f} {item.nodeid}\n")
+        return result
+
+
 def passed(arguments: list[str], plain: bool, seconds: float | None) -> bool:
     """Whether the tests pass, in no more than so long; ``output.txt`` has what pytest says."""
 
@@ -132,7 +144,7 @@ def passed(arguments: list[str], plain: bool, seconds: float | None) -> bool:
         if plain:
             os.environ["NUMBA_DISABLE_JIT"] = "1"
             importlib.import_module("numba").config.reload_config()
-        code = importlib.import_module("pytest").main([*OPTIONS, *arguments])
+        code = pytest.main([*OPTIONS, *arguments], plugins=[Clock()])
         sys.stdout.flush()
         os._exit(int(code))
 
@@ -148,12 +160,11 @@ def survivors(file: Path, tests: list[str], longest: float, chosen: list[Fault])
     """The faults of one file that its tests do not see, planted in turn; or how these fail without."""
     source, start = file.read_text(encoding="utf-8"), time.monotonic()
     plain = "compiled" in source or "inlined" in source
-    if not passed([str(file), *tests, "--durations=0", "--durations-min=0"], plain, None):
+    Path("times.txt").unlink(missing_ok=True)
+    if not passed([str(file), *tests], plain, None):
         return Path("output.txt").read_text(encoding="utf-8", errors="replace")[-3000:]
-    needed: dict[str, float] = {}
-    for seconds, test in TIMES.findall(Path("output.txt").read_text(encoding="utf-8", errors="replace")):
-        needed[test] = needed.get(test, 0.0) + float(seconds)
-    quick = sorted((seconds, test) for test, seconds in needed.items() if seconds <= longest)
+    needed = [line.split(" ", 1) for line in Path("times.txt").read_text(encoding="utf-8").splitlines()]
+    quick = sorted((float(seconds), test) for seconds, test in needed if float(seconds) <= longest)
     Path("tests.txt").write_text("\n".join(test for _, test in quick), encoding="utf-8")
     limit, missed = 60.0 + 5.0 * (time.monotonic() - start), []
     for fault in chosen:
@@ -172,7 +183,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2, help="files at a time, each in a copy of its own")
     parser.add_argument("--folder", type=Path, help="keep the copies here: the next run need not compile")
-    parser.add_argument("--longest", type=float, help="s that a test may take; default: that of the table")
+    parser.add_argument(
+        "--longest", type=float, help="s of a processor for a test; default: that of the table"
+    )
     parser.add_argument("--tests", nargs="*", default=[], help="tests in addition to those of the table")
     asked = parser.parse_args()
     table = tomllib.loads(TABLE.read_text(encoding="utf-8"))

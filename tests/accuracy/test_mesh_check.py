@@ -149,6 +149,20 @@ def test_a_junction_that_comes_down_changes():
     assert "the junction over 'wall' rests on the plane along 0 of its length 4, here along 4" in found.reason
 
 
+def test_near_a_junction_whose_wall_is_held_there_is_nothing_to_hold():
+    """The top of the junction of two caps is drawn up: another shape, and no end that only the mesh holds."""
+    slides = joined_caps(1.0, exact=True)
+    held = slides.rebuilt(fixed=slides.fixed | slides.on_plane, on_plane=())
+    junction = held.topology.junctions[0].vertices
+    X, top = held.vertices.copy(), junction[held.vertices[junction, 2].argmax()]
+    X[top, 2] += 2.0
+    for caps, advice in ((slides, "hold the bottom of 'wall'"), (held, "")):
+        found = compared([caps, caps.moved(X)], [certify(caps)] * 2)
+        assert found.verdict is MeshVerdict.CHANGES
+        assert found.place == pytest.approx(held.vertices[top].tolist())
+        assert found.advice.split(":")[0] == advice
+
+
 @settings(max_examples=5, deadline=None)
 @given(st.integers(-3, 3), st.integers(-3, 3))
 def test_scales_of_length_and_force_scale_the_table(length, force):

@@ -78,6 +78,16 @@ def test_a_roof_over_a_rectangle_has_two_umbilics_on_its_axis_with_six_sided_pan
     assert len(net.points) - len(net.beams) + len(net.panels) == 1
 
 
+def test_panels_called_umbilic_are_those_around_the_umbilics():
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], edge_length=1.3, tension=5.0)
+    net = panel_net(pcmc.solve(plan.surface()).surface, 1.5)
+    around = np.flatnonzero(net.panels["kind"] == "umbilic")
+    middles = [net.points[net.corner[net.start[k] : net.start[k + 1]]].mean(axis=0) for k in around]
+    away = np.linalg.norm(np.array(middles)[:, None] - net.umbilics, axis=2)
+    assert away.shape == (2, 2)
+    assert (away.min(axis=0) < 0.75).all()
+
+
 @pytest.fixture(scope="module")
 def walled():
     from pcmc.plan import Divider
@@ -147,7 +157,9 @@ def test_the_share_of_the_roof_that_panels_cover_grows_as_they_get_smaller(walle
 
 
 def test_a_net_that_leaves_the_roof_says_so(rectangle):
-    assert "far off  nodes are up to" in str(panel_net(rectangle, 3.0))
+    net = panel_net(rectangle, 3.0)
+    share = 100.0 * net.nodes["distance"].max() / 3.0
+    assert f"far off  nodes are up to {share:.0f} % of the size from the surface" in str(net)
     assert "far off" not in str(panel_net(rectangle, 0.9))
 
 
