@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,6 +11,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
+from ..base.files import atomic_write, writing
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.certificate import certified
@@ -118,7 +118,8 @@ class PanelNet:
         for k, loop in enumerate(self.polygons):
             lines += [f"g {escaped(patch[k], SPECIAL)}"] if k == 0 or patch[k] != patch[k - 1] else []
             lines.append("f " + " ".join(map(str, loop + 1)))
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with writing(path), atomic_write(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
     def offset(self, distance: float, *, torsion: bool = False) -> Floats:
         """(n,3) the nodes of a parallel net at a distance outside; with ``torsion``, along the normals."""

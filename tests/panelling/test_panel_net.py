@@ -7,7 +7,7 @@ import pytest
 
 import pcmc
 from generators import delaunay, spherical_cap, two_squares
-from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.panelling import panel_net
 from pcmc.panelling.net import CORNER, EDGE, Net
 from pcmc.panelling.net_tables import tidied
@@ -272,3 +272,17 @@ def test_a_panel_with_a_hole_is_refused():
         panel_net(roof, 3.0, "quads", anyway=True)
     net = panel_net(roof, 1.0, "quads", anyway=True)
     assert len(net.points) - len(net.beams) + len(net.panels) == 0
+
+
+def test_an_obj_file_has_the_points_and_panels_in_their_groups(rectangle, tmp_path):
+    net = panel_net(rectangle, 2.0, "quads")
+    net.write_obj(tmp_path / "net.obj")
+    words = [line.split() for line in (tmp_path / "net.obj").read_text(encoding="utf-8").splitlines()]
+    points = np.array([line[1:] for line in words if line[0] == "v"], dtype=float)
+    panels = [np.array(line[1:], dtype=int) for line in words if line[0] == "f"]
+    groups = [line[1] for line in words if line[0] == "g"]
+    assert np.array_equal(points, net.points)
+    assert [panel.tolist() for panel in panels] == [(loop + 1).tolist() for loop in net.polygons]
+    assert groups == list(dict.fromkeys(net.panels["patch"]))
+    with pytest.raises(FileError, match=r"nowhere.*cannot be written"):
+        net.write_obj(tmp_path / "nowhere" / "net.obj")
