@@ -185,6 +185,11 @@ def test_where_contact_hides_a_change_of_index_the_branch_is_followed_in_shorter
     assert steps == list(branches.LARGEST)
 
 
+def test_without_a_span_a_branch_goes_half_of_the_present_value_each_way():
+    cap = spherical_cap(0.5, alpha=2.5)
+    assert branches.TracedParameter.of(cap, Direction({"cap": 1.0}), None).span == (1.25, 3.75)
+
+
 def test_each_equilibrium_is_checked_on_finer_meshes_if_that_is_asked_for():
     found = find_equilibria(spherical_cap(0.5), (), starts=0, mesh_check=True)
     (check,) = (one.mesh_check for one in found.found)
