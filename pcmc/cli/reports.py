@@ -53,8 +53,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
     if outcome.under_load is not None:
-        said = f"{units.sentence}\n" if verdict else ""
-        print(str(outcome.under_load).removeprefix(said))
+        print(outcome.under_load.text() if verdict else outcome.under_load)
     if outcome.advice:
         print("\n  ".join(outcome.advice))
     ended(outcome.good, outcome.files)

@@ -249,9 +249,11 @@ class Outcome:
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
         from ..report import roof_report
-        from .members import model_with_members
+        from .members import model_with_members, warn_of_members
 
         analysis = self.analysis(anyway)
+        if analysis is None:
+            warn_of_members(self, "report", held=True)
         return roof_report(
             self.shown.surface,
             self.units,

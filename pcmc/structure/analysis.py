@@ -240,20 +240,23 @@ class Analysis:
         return lines
 
     def __str__(self) -> str:
-        """The main columns of the table, and the answers."""
+        """The units, the main columns of the table, and the answers."""
+        return f"{self.model.units.sentence}\n{self.text()}" if self.model.units else self.text()
+
+    def text(self) -> str:
+        """The main columns of the table, and the answers, without the units of the numbers."""
         shown = ["case", "share", "taut", "down", "up", "least_force", "largest_force", "slack_area"]
         shown += ["pressure"] if self.model.gas is not None else []
         heads = {"least_force": "least force", "largest_force": "largest", "slack_area": "slack area"}
         table = self.table[shown].rename(columns=heads)
         for name in ("share", "taut"):
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
-        units = [self.model.units.sentence] if self.model.units else []
         numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
         look: dict[str, Any] = {"index": False, "float_format": "{:.4g}".format, "na_rep": "-"}
         members = [self.members.to_string(**look)] * bool(self.model.beams)
         about = [*sentences(self.model, self.model.units), *cable_offers(self.model)]
         bars = [column_text(self.model, self.columns, self.model.units)] * bool(self.model.bars)
-        return "\n".join([*units, numbers, *members, *about, *bars, *self.answers()])
+        return "\n".join([numbers, *members, *about, *bars, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:

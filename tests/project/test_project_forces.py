@@ -145,6 +145,37 @@ def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_
     ]
 
 
+HALF_WITH_ARCH = """
+units = "m"
+force = "kN"
+
+[plan]
+edge_length = 1.2
+outline = [[0, 0], [12, 0], [12, 4], [0, 4]]
+mirrors = [[[0, 4], [12, 4]]]
+patches = {west = {tension = 1.5, pressure = 0.3}, east = {tension = 1.5, pressure = 0.3}}
+dividers = [{curve = [[6, 0], [6, 4]], wall = 0.6, member = "arch"}]
+
+[structure]
+young = 5e5
+thickness = 0.001
+members = {arch = {diameter = 0.1, thickness = 0.005, young = 2.1e8}}
+
+[output]
+report = "half.pdf"
+"""
+
+
+def test_a_report_on_a_half_says_that_it_leaves_members_out(folder):
+    (folder / "half.toml").write_text(HALF_WITH_ARCH, encoding="utf-8")
+    with pytest.warns(LostWarning, match="^report: members are left out; they are known for a part"):
+        run("half.toml")
+    (folder / "half.toml").write_text(HALF_WITH_ARCH + "whole = true\n", encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LostWarning)
+        run("half.toml")
+
+
 def test_half_of_a_roof_is_written_whole(folder, capsys):
     (folder / "half.toml").write_text(HALF_TOML, encoding="utf-8")
     outcome = run("half.toml")
