@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from pcmc.base.errors import OptionError, unknown
 
-from .alpha_grid import geometric, grid
+from .alpha_grid import geometric, grid, several
 from .corners import ends
 from .coverage import bars
 from .examples import calibration, equilibria, example1, example2, example3, example4, mesh_search
@@ -15,6 +15,7 @@ from .gallery import surfaces
 from .questions import (
     accuracy,
     bench,
+    bifurcations,
     cloth,
     curved,
     equilibria_atlas,
@@ -42,6 +43,7 @@ MODULES = (
     mesh_search,
     equilibria,
     geometric,
+    several,
     ends,
     stability,
     refinement,
@@ -52,6 +54,7 @@ MODULES = (
     bars,
     margins,
     equilibria_atlas,
+    bifurcations,
     accuracy,
     panel_families,
     panel_nets,
