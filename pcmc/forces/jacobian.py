@@ -48,7 +48,7 @@ class Linearisation:
         change = add_products(surface, classes.mesh(surface), self.X, d, np.zeros_like(self.X))
         turn = np.zeros(len(self.X))
         if classes.nodes.shape[1] == 3:
-            _add_turns(classes.faces, self.X, d, self.sheet_factor, turn)
+            _add_turns(classes.faces, classes.rows, self.X, d, self.sheet_factor, turn)
         else:
             turn = (self.sheet_factor * normal_vectors(surface, classes, self.X, d)).sum(axis=1)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
@@ -103,7 +103,7 @@ def _across_normals(
 
 
 @compiled
-def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
+def _add_turns(F: Ints, rows: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
     """Add ⟨sheet_factor, Da⟩ to turn (n,), a = Σ ½ u × w the vertices' area vectors."""
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
@@ -111,4 +111,4 @@ def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats
         Du, Dw = sub(point(D, j), point(D, i)), sub(point(D, k), point(D, i))
         Da = scaled(0.5, cross_sum(Du, w, u, Dw))
         for corner in range(3):
-            turn[F[f, corner]] += dot(point(sheet_factor, F[f, corner]), Da)
+            turn[rows[f, corner]] += dot(point(sheet_factor, rows[f, corner]), Da)

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 def hessian(surface: Surface) -> csr_array:
     """∂²E/∂X², sparse symmetric (3n,3n), supports not applied; unknown 3v + d is coordinate d of v.
 
+    Images of vertices move with these: their own rows and columns are empty.
+
     >>> from pcmc import Patch, Surface
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("t", 1.0)], fixed=[0])
     >>> H = hessian(flat.retensioned(pressures={"t": 0.0}))  # A is homogeneous of degree 2: H X = ∇A
@@ -145,12 +147,12 @@ def _assemble_triangles(
     stiffness: float,
     data: Floats,
 ) -> None:
-    F, n = mesh.faces, vector(mesh.normal)
-    for f in range(len(F)):
+    rows, n = mesh.rows, vector(mesh.normal)
+    for f in range(len(rows)):
         t = triangle(mesh, X, f, hessian, stiffness)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            v, w, offset = F[f, i], F[f, j], pattern.offset[f, i]
+            v, w, offset = rows[f, i], rows[f, j], pattern.offset[f, i]
             alone, pair, q = triangle_block(t, i, i), triangle_block(t, i, j), triangle_skew(t, k)
             if t.sixth_w == 0.0:
                 _add_diagonal(space, pattern, v, alone, None, data)
@@ -176,7 +178,7 @@ def _assemble_curved(
         fill_block(mesh, X, e, hessian, stiffness, block)
         for i in range(size):
             for j in range(i, size):
-                v, w = mesh.faces[e, i], mesh.faces[e, j]
+                v, w = mesh.rows[e, i], mesh.rows[e, j]
                 if v <= w:
                     _add_projected(block[i, j], v, w, space, pattern, data)
                 else:
@@ -232,12 +234,12 @@ def _add_projected(block: Floats, v: int, w: int, space: MotionSpace, pattern: P
 
 @compiled
 def _add_triangle_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> None:
-    F, n = mesh.faces, vector(mesh.normal)
-    for f in range(len(F)):
+    rows, n = mesh.rows, vector(mesh.normal)
+    for f in range(len(rows)):
         t = triangle(mesh, X, f, 1.0, 0.0)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            v, w = F[f, i], F[f, j]
+            v, w = rows[f, i], rows[f, j]
             d, e, q = point(D, v), point(D, w), triangle_skew(t, k)
             alone, pair, back = triangle_block(t, i, i), triangle_block(t, i, j), scaled(-1.0, q)
             if t.sixth_w == 0.0:
