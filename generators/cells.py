@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import Voronoi, cKDTree
+from scipy.special import ellipk
 
 from pcmc import Patch, Room, Surface, images_in
 from pcmc.base import validate
@@ -63,6 +64,20 @@ def minimal_cell(kind: str = "P", levels: int = 1, *, side: float = 1.0, alpha: 
         triangles = _on_level_set(kind, triangles.reshape(-1, 3)).reshape(-1, 3, 3)
     patch = np.zeros(len(triangles), dtype=int)
     return _periodic(side * triangles, patch, [Patch("film", alpha, pressure=0.0)], side * lattice)
+
+
+def minimal_cell_area(kind: str = "P", side: float = 1.0) -> float:
+    """The area of Schwarz' P or D surface or the gyroid G in a cube of this side, length².
+
+    With the complete elliptic integrals K = K(1/2) and K' = K(√3/2) it is 3 K / K' of P, 3 K' / K of D, and
+    the mean of both of G: the three are isometric, and their cells differ in size by known factors.
+
+    >>> [round(minimal_cell_area(kind), 6) for kind in "PDG"]
+    [2.345103, 3.837785, 3.091444]
+    """
+    validate.choice("kind", kind, tuple(LATTICES))
+    ratio = float(ellipk(0.25) / ellipk(0.75))
+    return 3.0 * side**2 * {"P": ratio, "D": 1.0 / ratio, "G": 0.5 * (ratio + 1.0 / ratio)}[kind]
 
 
 def kelvin_foam(levels: int = 2, *, side: float = 1.0, alpha: float = 1.0) -> Surface:

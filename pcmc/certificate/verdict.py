@@ -233,7 +233,7 @@ def _saddle(f: Findings) -> list[object]:
 
 
 def _at_volumes(f: Findings) -> str:
-    return "at these volumes" if f.surface.rooms else "in this cell"
+    return "in this cell" if f.surface.periodic and not f.surface.rooms else "at these volumes"
 
 
 def _near_fold(f: Findings) -> str:

@@ -124,7 +124,7 @@ def images_in(vertices: npt.ArrayLike, lattice: npt.ArrayLike) -> Ints:
 
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> images_in(corners, [[1, 0, 0]]).tolist()
-    [[1, 0], [2, 3]]
+    [[1, 0], [3, 2]]
     """
     X = checks.positions(vertices)
     T = np.asarray(lattice, dtype=float).reshape(-1, 3)
