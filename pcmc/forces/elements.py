@@ -71,8 +71,8 @@ class Points(NamedTuple):
     @classmethod
     def of(cls, mesh: Mesh, X: Floats) -> Points:
         """Those of the elements with their nodes at X (n,3)."""
-        N, Nu, Nv, weight = mesh.shapes
-        x, u, v = (np.einsum("qk,ekd->eqd", shape, X[mesh.faces]) for shape in (N, Nu, Nv))
+        (N, Nu, Nv, weight), nodes = mesh.shapes, X[mesh.faces]
+        x, u, v = (np.einsum("qk,ekd->eqd", shape, nodes) for shape in (N, Nu, Nv))
         return cls(x, u, v, weight[:, None] * np.cross(u, v))
 
 
