@@ -38,6 +38,10 @@ class Mesh(NamedTuple):
         """Whether the elements are no flat triangles."""
         return self.faces.shape[1] > 3
 
+    def part(self, first: int, last: int) -> Mesh:
+        """Elements first..last alone."""
+        return self._replace(faces=self.faces[first:last], patch=self.patch[first:last])
+
     def weighing(self, weight: Floats | None = None) -> Mesh:
         """With these weights alone, no tension and no pressure; None for no weights, and both as they are."""
         none = read_only(np.zeros_like(self.tension))
