@@ -21,7 +21,7 @@ from ..base.tolerances import AT_REST, COLLAPSED, NEAR_NEUTRAL, NEUTRAL
 from ..base.units import NO_UNITS, Units
 from ..forces.functional import energy
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
-from ..forces.volume_below import volume_below
+from ..forces.volume_below import volumes_below
 from ..meshing.quality import triangle_quality
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
@@ -82,10 +82,15 @@ class Certificate:
         *("leaning", "supports", "balance", "reactions"),
     )
 
+    @cached_property
+    def volumes(self) -> Floats:
+        """(k,) the volume between each patch and Π (``volumes_below``), length³."""
+        return volumes_below(self.acting.surface)
+
     @property
     def volume(self) -> float:
-        """The volume between the roof and Π (``volumes_below``), length³."""
-        return volume_below(self.acting.surface)
+        """The volume between the roof and Π, length³."""
+        return float(self.volumes[self.acting.surface.roof].sum())
 
     @cached_property
     def patches(self) -> pd.DataFrame:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
 from ..base.tolerances import EXCESS
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
@@ -57,6 +57,7 @@ def load_places(surface: Surface) -> Floats:
     return np.concatenate([places, X[surface.cable_edges.ends].mean(axis=1)])
 
 
+@kept_with_owner
 def load(surface: Surface) -> float:
     """The force of pressure, snow and weight along Π's normal."""
     return along_normal(surface, loads(surface))

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, kept_with_owner, read_only
 from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.supports import symmetric_part
@@ -47,6 +47,12 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     """
     expect_surface(surface)
     validate.choice("method", method, METHODS)
+    return _both(surface)[METHODS.index(method)]
+
+
+@kept_with_owner
+def _both(surface: Surface) -> tuple[Floats, Floats]:
+    """H (n,) by each of ``METHODS``."""
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)
     if surface.order > 1:
@@ -60,12 +66,11 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     area_vector = symmetric_part(surface.on_planes, area_vector)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)
     with np.errstate(divide="ignore", invalid="ignore"):
-        if method == "cotangent":
-            H = np.copysign(np.linalg.norm(area_gradient, axis=1), along) / (2.0 * star_area / 3.0)
-        else:
-            H = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
-    H[~_within_one_sheet(surface)] = np.nan
-    return surface.spread(H)
+        cotangent = np.copysign(np.linalg.norm(area_gradient, axis=1), along) / (2.0 * star_area / 3.0)
+        variational = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
+    outside = ~_within_one_sheet(surface)
+    cotangent[outside] = variational[outside] = np.nan
+    return read_only(surface.spread(cotangent)), read_only(surface.spread(variational))
 
 
 def target_curvature(surface: Surface) -> Floats:

@@ -39,6 +39,11 @@ class Mesh(NamedTuple):
         """Whether the elements are no flat triangles."""
         return self.faces.shape[1] > 3
 
+    def part(self, first: int, last: int) -> Mesh:
+        """Elements first..last alone."""
+        faces, rows = self.faces[first:last], self.rows[first:last]
+        return self._replace(faces=faces, rows=rows, patch=self.patch[first:last])
+
     def weighing(self, weight: Floats | None = None) -> Mesh:
         """With these weights alone, no tension and no pressure; None for no weights, and both as they are."""
         none = read_only(np.zeros_like(self.tension))
@@ -71,8 +76,8 @@ class Points(NamedTuple):
     @classmethod
     def of(cls, mesh: Mesh, X: Floats) -> Points:
         """Those of the elements with their nodes at X (n,3)."""
-        N, Nu, Nv, weight = mesh.shapes
-        x, u, v = (np.einsum("qk,ekd->eqd", shape, X[mesh.faces]) for shape in (N, Nu, Nv))
+        (N, Nu, Nv, weight), nodes = mesh.shapes, X[mesh.faces]
+        x, u, v = (np.einsum("qk,ekd->eqd", shape, nodes) for shape in (N, Nu, Nv))
         return cls(x, u, v, weight[:, None] * np.cross(u, v))
 
 

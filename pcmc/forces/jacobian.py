@@ -19,12 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.compiled import compiled
+from ..base.compiled import compiled, sum_blocks
 from ..surface import Surface
 from ..surface.geometry import accumulate, cross_sum, divided, dot, norm, point, scaled, sub, vector
 from ..surface.topology import SHEET
 from .motion_space import MotionSpace, VertexClasses, curve_chords, normal_vectors
-from .second_variation import add_products, circle_curvatures
+from .second_variation import circle_curvatures, hessian_product
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +45,14 @@ class Linearisation:
     def times(self, d: Floats) -> Floats:
         """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
         surface, classes, space = self.surface, self.classes, self.space
-        change = add_products(surface, classes.mesh(surface), self.X, d, np.zeros_like(self.X))
-        turn = np.zeros(len(self.X))
+        change = hessian_product(surface, classes.mesh(surface), self.X, d)
         if classes.nodes.shape[1] == 3:
-            _add_turns(classes.faces, classes.rows, self.X, d, self.sheet_factor, turn)
+
+            def work(first: int, last: int, turn: Floats) -> None:
+                faces, rows = classes.faces[first:last], classes.rows[first:last]
+                _add_turns(faces, rows, self.X, d, self.sheet_factor, turn)
+
+            turn = sum_blocks(work, len(classes.faces), self.X.shape[:1])
         else:
             turn = (self.sheet_factor * normal_vectors(surface, classes, self.X, d)).sum(axis=1)
         turned = curve_chords(surface, classes, d)[self.curve_rows]

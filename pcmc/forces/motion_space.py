@@ -34,6 +34,7 @@ from ..surface.geometry import (
     norm,
     point,
     scaled,
+    squared_sides,
     sub,
     vector,
     vertex_area_vectors,
@@ -296,9 +297,16 @@ def force_scale(surface: Surface, of: VertexClasses | Surface, X: Floats) -> flo
 
     Of the active triangles, or of all; with a weight, α + w z stands for α; 1 without tension.
     """
-    F = of.faces
-    sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, of.patch_of_face))
-    return (sqrt(sheets**2 + squared_cable_forces(surface, X).sum()) if surface.cables else sheets) or 1.0
+    squared = float(squared_forces(surface, of, X).sum())
+    if surface.cables:
+        squared += float(squared_cable_forces(surface, X).sum())
+    return sqrt(squared) or 1.0
+
+
+def squared_forces(surface: Surface, of: VertexClasses | Surface, X: Floats) -> Floats:
+    """(m,) the squared tension forces ½ α |e| of each triangle, added up, force²; α + w z with a weight."""
+    tension = effective_tensions(surface, X, of.faces, of.patch_of_face)
+    return np.asarray(0.25 * tension**2 * squared_sides(X, of.faces))
 
 
 @inlined
@@ -322,18 +330,6 @@ def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
         for d in range(3):
             out[0, v, d], out[1, v, d] = first[d], second[d]
     return out[0], out[1]
-
-
-@compiled
-def _norm_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
-    total = 0.0
-    for f in range(len(F)):
-        square = 0.0
-        for i in range(3):
-            edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
-            square += dot(edge, edge)
-        total += 0.25 * tension[f] ** 2 * square
-    return sqrt(total)
 
 
 @compiled

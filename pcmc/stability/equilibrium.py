@@ -126,6 +126,8 @@ class Equilibrium:
     def forces(self) -> Floats:
         """r = Bᵀ∇E (N,), force; along the motions ``carried`` theirs, not that of their part across."""
         r, (modes, motions) = self.space.to_coordinates(self.gradient), self.carried
+        if not len(motions):
+            return r
         return r + modes @ (net_forces(motions, self.X, self.gradient) - modes.T @ r)
 
     @cached_property

@@ -108,6 +108,21 @@ def vertex_area_vectors(X: Floats, F: Ints, rows: Ints | None = None) -> tuple[F
 
 
 @compiled
+def squared_sides(X: Floats, F: Ints) -> Floats:
+    """(m,) the squared lengths of each triangle's sides, added up, length².
+
+    >>> squared_sides(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).tolist()
+    [4.0]
+    """
+    out = np.empty(len(F))
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        u, v, w = sub(c, b), sub(a, c), sub(b, a)
+        out[f] = dot(u, u) + dot(v, v) + dot(w, w)
+    return out
+
+
+@compiled
 def bounding_size(X: Floats) -> float:
     """Diagonal of the bounding box of points (n,d), length; 0 for none.
 
