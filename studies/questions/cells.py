@@ -96,10 +96,12 @@ def data(folder: Folder, short: bool) -> None:
                 "quality": found.quality,
                 "area": cell.normalised(surface),
                 "index": -1 if found.index is None else found.index,
-                "index_at_volumes": _index_at_volumes(surface) if not cell.bubbles else found.index,
+                "index_at_volumes": -1 if found.index is None else found.index,
                 "pressure_range": float(np.ptp(found.rooms["pressure"])) if surface.rooms else 0.0,
                 "from_program": np.nan,
             }
+            if not cell.bubbles:
+                row["index_at_volumes"] = _index_at_volumes(surface) if number == DRAWN else -1
             if number == DRAWN:
                 folder.write_mesh(cell.name, {"solved": surface})
                 if evolver.available():
@@ -138,7 +140,7 @@ def table(folder: Folder) -> dict[str, float]:
                 "order": order.order,
                 "standard_error": order.standard_error,
                 "index": int(mine["index"].iloc[-1]),
-                "index_at_volumes": int(mine.index_at_volumes.iloc[-1]),
+                "index_at_volumes": int(mine.index_at_volumes.max()),
                 "pressure_range": float(mine.pressure_range.iloc[-1]),
                 "from_program": float(mine.from_program.max()),
             }
@@ -164,7 +166,7 @@ def figure(folder: Folder) -> None:
 
     shown = [_shown(cell, folder.read_mesh(cell.name)["solved"]) for cell in CELLS]
     path, titles = folder.figure("cells"), [cell.title for cell in CELLS]
-    panel(shown, path, views="diagonal", one_scale=False, supports=False, columns=3, titles=titles)
+    panel(shown, path, views="diagonal", one_scale=False, supports=False, columns=3, titles=titles, width=960)
 
 
 def _shown(cell: Cell, surface: Surface) -> Surface:
