@@ -89,7 +89,7 @@ class Certificate:
 
     @property
     def volume(self) -> float:
-        """The volume between the roof and Π, length³."""
+        """The volume between the roof and Π, length³; NaN where a periodic surface leaves Π."""
         return float(self.volumes[self.acting.surface.roof].sum())
 
     @cached_property
@@ -223,7 +223,7 @@ class Certificate:
             ("units", units.sentence if units else ""),
             ("residual", f"{self.residual:.2e} of {self.scale:.4g}"),
             ("energy", f"{self.energy:.10g}{units.behind('energy')}"),
-            ("volume", f"{self.volume:.6g}{units.behind('volume')}"),
+            ("volume", "" if math.isnan(self.volume) else f"{self.volume:.6g}{units.behind('volume')}"),
             ("Morse index", "-" if self.index is None else str(self.index)),
             ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),
             ("lowest eigenvalue", f"{lowest[0]:.4g}{units.behind('eigenvalue')}" if len(lowest) else "-"),
