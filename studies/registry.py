@@ -15,6 +15,7 @@ from .gallery import surfaces
 from .questions import (
     accuracy,
     bench,
+    cells,
     cloth,
     curved,
     equilibria_atlas,
@@ -57,6 +58,7 @@ MODULES = (
     panel_nets,
     cloth,
     surfaces,
+    cells,
     checks,
     structure,
     programs,

@@ -300,7 +300,7 @@ def certify(
         evidence=evidence,
         tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
-        rigid=at.rigid.shape[1] if surface.rooms else 0,
+        rigid=at.rigid.shape[1] if surface.rooms or surface.periodic else 0,
         pulled=tuple(np.flatnonzero(at.excess_pull).tolist()),
         left_over=pressures_left_over(standing),
     )
@@ -379,7 +379,7 @@ def _own_residuals(equilibrium: Equilibrium) -> Floats:
     island = islands(surface.topology)[classes.active]
     own = squared_forces(surface, classes, surface.vertices)
     island_of_vertex = np.zeros(surface.n, dtype=np.int64)
-    island_of_vertex[classes.faces] = island[:, None]
+    island_of_vertex[classes.topology.faces] = island[:, None]
     inside = equilibrium.unbalanced * (classes.kind == SHEET)[:, None]
     out = np.zeros(len(surface.patches))
     np.maximum.at(out, classes.patch_of_face, ratios(inside, island_of_vertex, own, island)[island])

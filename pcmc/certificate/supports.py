@@ -58,7 +58,7 @@ def support_table(acting: Forces) -> pd.DataFrame:
     the support on the surface; ``moment_x``, …, that of these forces about the middle; ``per_length_max``,
     the largest of the ``pulls`` along its edges, NaN for points.
     """
-    rows, X, edges = [], acting.surface.vertices, acting.surface.topology.edges
+    rows, X, edges = [], acting.surface.vertices, acting.surface.topology.sides
     for part in _labelled(acting):
         at = np.where(np.abs(part.place) <= SAME_PLACE * acting.surface.size, 0.0, part.place)
         moment = np.cross(X[part.vertices] - at, part.forces).sum(axis=0)
@@ -80,7 +80,7 @@ def pull_table(acting: Forces) -> pd.DataFrame:
     rows: list[tuple[object, ...]] = []
     for part in _labelled(acting):
         edges, pulls = _pulled(acting, part)
-        ends = topo.edges[edges]
+        ends = topo.sides[edges]
         numbers = [*X[ends].mean(axis=1).T, segment_lengths(X, ends), *pulls.T]
         rows += zip([part.label] * len(ends), *numbers, strict=True)
     return pd.DataFrame(rows, columns=["support", *"xyz", "length", "pull_x", "pull_y", "pull_z"])

@@ -54,7 +54,7 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
 def _both(surface: Surface) -> tuple[Floats, Floats]:
     """H (n,) by each of ``METHODS``."""
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
-    area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
+    area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)
     if surface.order > 1:
         normal = normal_vectors(surface, vertex_classes(surface), surface.vertices)
         symmetric_part(surface.on_planes, normal)
@@ -70,7 +70,7 @@ def _both(surface: Surface) -> tuple[Floats, Floats]:
         variational = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
     outside = ~_within_one_sheet(surface)
     cotangent[outside] = variational[outside] = np.nan
-    return read_only(cotangent), read_only(variational)
+    return read_only(surface.spread(cotangent)), read_only(surface.spread(variational))
 
 
 def target_curvature(surface: Surface) -> Floats:
@@ -98,7 +98,9 @@ def _target_and_scale(surface: Surface) -> tuple[Floats, Floats]:
     target = np.array([p.target_curvature for p in surface.patches])[patch]
     scale, weight, press = target, surface.weights[patch], surface.net_pressures[patch]
     if (heavy := weight != 0.0).any():
-        vector = vertex_area_vectors(surface.vertices, surface.faces)[0]
+        vector = surface.spread(
+            vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)[0]
+        )
         length = np.linalg.norm(vector, axis=1)
         upright = (vector @ np.array(surface.plane.normal)) / np.where(length > 0.0, length, 1.0)
         pull = surface.tensions[patch] + weight * surface.plane.height(surface.vertices)
@@ -139,4 +141,4 @@ def _within_one_sheet(surface: Surface) -> Bools:
     inside[topo.edges[topo.curve_edge & ~surface.mirror_edge]] = False
     for plane, mask in surface.on_planes:
         inside &= plane.mirror | ~mask
-    return inside & (topo.fans == 1)
+    return surface.spread(inside & (topo.fans == 1))

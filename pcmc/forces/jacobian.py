@@ -48,7 +48,8 @@ class Linearisation:
         if classes.nodes.shape[1] == 3:
 
             def work(first: int, last: int, turn: Floats) -> None:
-                _add_turns(classes.faces[first:last], self.X, d, self.sheet_factor, turn)
+                faces, rows = classes.faces[first:last], classes.rows[first:last]
+                _add_turns(faces, rows, self.X, d, self.sheet_factor, turn)
 
             turn = sum_blocks(work, len(classes.faces), self.X.shape[:1])
         else:
@@ -105,7 +106,7 @@ def _across_normals(
 
 
 @compiled
-def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
+def _add_turns(F: Ints, rows: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
     """Add ⟨sheet_factor, Da⟩ to turn (n,), a = Σ ½ u × w the vertices' area vectors."""
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
@@ -113,7 +114,7 @@ def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats
         Du, Dw = sub(point(D, j), point(D, i)), sub(point(D, k), point(D, i))
         Da = scaled(0.5, cross_sum(Du, w, u, Dw))
         for corner in range(3):
-            turn[F[f, corner]] += dot(point(sheet_factor, F[f, corner]), Da)
+            turn[rows[f, corner]] += dot(point(sheet_factor, rows[f, corner]), Da)
 
 
 @compiled

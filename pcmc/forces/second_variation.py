@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 def hessian(surface: Surface) -> csr_array:
     """∂²E/∂X², sparse symmetric (3n,3n), supports not applied; unknown 3v + d is coordinate d of v.
 
+    Images of vertices move with these: their own rows and columns are empty.
+
     >>> from pcmc import Patch, Surface
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("t", 1.0)], fixed=[0])
     >>> H = hessian(flat.retensioned(pressures={"t": 0.0}))  # A is homogeneous of degree 2: H X = ∇A
@@ -166,12 +168,12 @@ def _assemble_triangles(
     stiffness: float,
     data: Floats,
 ) -> None:
-    F, n = mesh.faces, vector(mesh.normal)
-    for f in range(len(F)):
+    rows, n = mesh.rows, vector(mesh.normal)
+    for f in range(len(rows)):
         t = triangle(mesh, X, f, hessian, stiffness)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            v, w, offset = F[f, i], F[f, j], pattern.offset[f, i]
+            v, w, offset = rows[f, i], rows[f, j], pattern.offset[f, i]
             alone, pair, q = triangle_block(t, i, i), triangle_block(t, i, j), triangle_skew(t, k)
             if t.sixth_w == 0.0:
                 _add_diagonal(space, pattern, v, alone, None, data)
@@ -197,7 +199,7 @@ def _assemble_curved(
         fill_block(mesh, X, e, hessian, stiffness, block)
         for i in range(size):
             for j in range(i, size):
-                v, w = mesh.faces[e, i], mesh.faces[e, j]
+                v, w = mesh.rows[e, i], mesh.rows[e, j]
                 if v <= w:
                     _add_projected(block[i, j], v, w, space, pattern, data)
                 else:
@@ -254,7 +256,13 @@ def _add_projected(block: Floats, v: int, w: int, space: MotionSpace, pattern: P
 @compiled
 def _add_triangle_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> None:
     """Add (∂²E) d to change (n,3): how ∇E of ``measure_block`` changes along D."""
-    F, origin, ground, n = mesh.faces, vector(mesh.origin), vector(mesh.ground), vector(mesh.normal)
+    F, rows, origin, ground, n = (
+        mesh.faces,
+        mesh.rows,
+        vector(mesh.origin),
+        vector(mesh.ground),
+        vector(mesh.normal),
+    )
     for f in range(len(F)):
         i, j, k, patch = F[f, 0], F[f, 1], F[f, 2], mesh.patch[f]
         a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
@@ -278,6 +286,6 @@ def _add_triangle_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> 
         on_a = add(cross_sum(dpull, e, pull, de), scaled(sixth_p, cross_sum(db, c, b, dc)))
         on_b = add(cross_sum(v, dpull, dv, pull), scaled(sixth_p, cross_sum(dc, a, c, da)))
         on_c = add(cross_sum(dpull, u, pull, du), scaled(sixth_p, cross_sum(da, b, a, db)))
-        accumulate(change, i, add(on_a, down))
-        accumulate(change, j, add(on_b, down))
-        accumulate(change, k, add(on_c, down))
+        accumulate(change, rows[f, 0], add(on_a, down))
+        accumulate(change, rows[f, 1], add(on_b, down))
+        accumulate(change, rows[f, 2], add(on_c, down))

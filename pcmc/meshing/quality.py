@@ -95,7 +95,7 @@ def minimum_angle(surface: Surface) -> float:
 
 def edge_lengths(surface: Surface) -> Floats:
     """(e,) length of each edge, in the order of ``surface.topology.edges``."""
-    return segment_lengths(surface.vertices, surface.topology.edges)
+    return segment_lengths(surface.vertices, surface.topology.sides)
 
 
 def towards_star_centres(
