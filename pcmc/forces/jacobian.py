@@ -35,8 +35,7 @@ class Linearisation:
     classes: VertexClasses
     space: MotionSpace
     X: Floats
-    sheet_rows: Ints  # (s,) vertices inside sheets whose normal may turn
-    sheet_factor: Floats  # (n,3) (∇E - n n·∇E) / |a| there, which Da is multiplied with; zero elsewhere
+    sheet_factor: Floats  # (n,3) (∇E - n n·∇E) / |a| where a sheet may turn; Da is multiplied with it
     curve_rows: Ints  # (b,) numbers in ``classes.curve`` of the vertices whose curve may turn
     curve_factor: Floats  # (b,) -(t·∇E) / |c| there, which Dc is multiplied with
     circle_rows: Ints  # (k,) and (k,3) as ``circle_curvatures`` gives them
@@ -58,7 +57,7 @@ class Linearisation:
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
-        out[space.start[self.sheet_rows]] += turn[self.sheet_rows]
+        _add_to_first(space, turn, out)
         out[space.start[self.circle_rows]] += (self.circle_factor * d[self.circle_rows]).sum(axis=1)
         return out
 
@@ -78,8 +77,8 @@ def linearise(
     chord -= np.einsum("ij,ij->i", chord, across)[:, None] * across
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[vertices])
-    sheets, circles = (np.flatnonzero(single), sheet_factor), circle_curvatures(surface, space, X)
-    return Linearisation(surface, classes, space, X, *sheets, rows, -along / square, *circles)
+    circles = circle_curvatures(surface, space, X)
+    return Linearisation(surface, classes, space, X, sheet_factor, rows, -along / square, *circles)
 
 
 @compiled
@@ -116,3 +115,11 @@ def _add_turns(F: Ints, rows: Ints, X: Floats, D: Floats, sheet_factor: Floats, 
         Da = scaled(0.5, cross_sum(Du, w, u, Dw))
         for corner in range(3):
             turn[rows[f, corner]] += dot(point(sheet_factor, rows[f, corner]), Da)
+
+
+@compiled
+def _add_to_first(space: MotionSpace, turn: Floats, out: Floats) -> None:
+    """Add turn (n,) to the first unknown of each vertex."""
+    for v in range(len(turn)):
+        if space.dimension[v] > 0:
+            out[space.start[v]] += turn[v]

@@ -240,7 +240,7 @@ class Equilibrium:
         unknown: so a patch that pulls far less than another still counts.
         """
         pattern, patch = hessian_pattern(self.classes, self.space), self.classes.patch_of_face
-        tension, units = self.surface.tensions[np.unique(patch)], None
+        tension, units = self.surface.tensions[np.flatnonzero(np.bincount(patch))], None
         if len(tension) and tension.min() < STRONG * tension.max():
             strongest = np.zeros(len(self.X))
             np.maximum.at(strongest, self.classes.topology.faces, self.surface.tensions[patch, None])
