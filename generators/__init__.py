@@ -3,6 +3,7 @@
 from .barrel import barrel
 from .bezier_hall import bezier_hall
 from .catenary import catenary
+from .cells import kelvin_foam, minimal_cell, minimal_cell_area, weaire_phelan_foam
 from .delaunay import delaunay, delaunay_exact, delaunay_force, delaunay_limit, unduloid_length
 from .double_bubble import double_bubble, double_bubble_exact
 from .enneper import enneper, enneper_exact, enneper_wire
@@ -50,9 +51,12 @@ __all__ = [
     "hypar_roof_edge",
     "joined_caps",
     "joined_caps_exact",
+    "kelvin_foam",
     "lens",
     "lens_circle",
     "lens_exact",
+    "minimal_cell",
+    "minimal_cell_area",
     "schwarz_p",
     "skew_quadrilateral",
     "skew_quadrilateral_exact",
@@ -68,4 +72,5 @@ __all__ = [
     "two_caps",
     "two_squares",
     "unduloid_length",
+    "weaire_phelan_foam",
 ]

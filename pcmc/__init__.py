@@ -59,7 +59,7 @@ if TYPE_CHECKING:
         read_results,
         write_structure,
     )
-    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, images_in, mirrored
 
 __all__ = [
     "BoundaryMotion",
@@ -108,6 +108,7 @@ __all__ = [
     "follow",
     "gradient",
     "hessian",
+    "images_in",
     "margin",
     "mean_curvature",
     "meet",
@@ -158,7 +159,9 @@ _NAMES = {
     "solvers": ("solve",),
     "solvers.continuation": ("BoundaryMotion", "Direction", "follow"),
     "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
+    "surface.images": ("images_in",),
+    "surface.symmetry": ("cut", "mirrored"),
     "certificate.theorem": ("Theorem", "verify"),
 }
 

@@ -103,5 +103,6 @@ def check_hessian(surface: Surface, seed: int = 0) -> TaylorTest:
 
 def _move(surface: Surface, seed: int) -> Floats:
     """(n,3) random moves, of a tenth of a mean edge."""
-    edge = float(segment_lengths(surface.vertices, surface.topology.edges).mean())
-    return 0.1 * edge * np.random.default_rng(seed).standard_normal((surface.n, 3))
+    edge = float(segment_lengths(surface.vertices, surface.topology.sides).mean())
+    moves = 0.1 * edge * np.random.default_rng(seed).standard_normal((surface.n, 3))
+    return np.asarray(surface.spread(moves))

@@ -81,6 +81,20 @@ def blocks(count: int, workers: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
+def sum_blocks(
+    work: Callable[[int, int, Any], None], count: int, shape: tuple[int, ...], workers: int | None = None
+) -> Any:
+    """The sum of what ``work(first, last, out)`` adds to arrays of this shape, one for each block.
+
+    They are added in order: the same number of workers gives the same bytes.
+    """
+    out = [np.zeros(shape) for _ in blocks(count, workers or threads())]
+    run_blocks(lambda part, first, last: work(first, last, out[part]), count, workers)
+    for other in out[1:]:
+        out[0] += other
+    return out[0]
+
+
 def run_blocks(work: Callable[[int, int, int], None], count: int, workers: int | None) -> int:
     """Call ``work(part, first, last)`` for each block, on threads if there are several; return how many.
 

@@ -100,7 +100,7 @@ def _capacity(surface: Surface, carrying: Bools) -> float:
         pull += weight * (height.sum(axis=1, keepdims=True) - height) / 2.0
     pull = np.abs(pull)
     sheets = np.bincount(topo.edge_of_face.ravel(), pull.ravel(), len(topo.edges))
-    lengths = segment_lengths(X, topo.edges[carrying])
+    lengths = segment_lengths(X, topo.sides[carrying])
     slides = ~surface.pinned[topo.edges[carrying]].all(axis=1)
     for plane, mask in surface.on_planes:  # a plane carries across itself; a mirror plane nothing at all
         steep = 0.0 if plane.mirror else abs(float(np.dot(plane.normal, surface.plane.normal)))
@@ -128,7 +128,7 @@ def coarseness(surface: Surface) -> float:
     4.0
     """
     X, topo = surface.vertices, surface.topology
-    length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
+    length = segment_lengths(X, topo.sides[topo.boundary_edge & ~surface.mirror_edge])
     corners = X[surface.faces[~surface.auxiliary[surface.patch_of_face]]]
     plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
@@ -245,6 +245,7 @@ def _scaled(surface: Surface) -> list[tuple[int, bool]]:
     held = given.fixed.copy()
     for _, along in given.on_line:
         held |= along
+    held[surface.images] = True  # it goes on: scaled, it would no longer meet itself
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
     held[surface.cable_edges.ends[surface.cable_edges.weight != 0.0]] = True

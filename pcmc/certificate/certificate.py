@@ -21,7 +21,7 @@ from ..base.tolerances import AT_REST, COLLAPSED, NEAR_NEUTRAL, NEUTRAL
 from ..base.units import NO_UNITS, Units
 from ..forces.functional import energy
 from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
-from ..forces.volume_below import volume_below
+from ..forces.volume_below import volumes_below
 from ..meshing.quality import triangle_quality
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
@@ -82,10 +82,15 @@ class Certificate:
         *("leaning", "supports", "balance", "reactions"),
     )
 
+    @cached_property
+    def volumes(self) -> Floats:
+        """(k,) the volume between each patch and Π (``volumes_below``), length³."""
+        return volumes_below(self.acting.surface)
+
     @property
     def volume(self) -> float:
-        """The volume between the roof and Π (``volumes_below``), length³."""
-        return volume_below(self.acting.surface)
+        """The volume between the roof and Π, length³; NaN where a periodic surface leaves Π."""
+        return float(self.volumes[self.acting.surface.roof].sum())
 
     @cached_property
     def patches(self) -> pd.DataFrame:
@@ -218,7 +223,7 @@ class Certificate:
             ("units", units.sentence if units else ""),
             ("residual", f"{self.residual:.2e} of {self.scale:.4g}"),
             ("energy", f"{self.energy:.10g}{units.behind('energy')}"),
-            ("volume", f"{self.volume:.6g}{units.behind('volume')}"),
+            ("volume", "" if math.isnan(self.volume) else f"{self.volume:.6g}{units.behind('volume')}"),
             ("Morse index", "-" if self.index is None else str(self.index)),
             ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),
             ("lowest eigenvalue", f"{lowest[0]:.4g}{units.behind('eigenvalue')}" if len(lowest) else "-"),
@@ -295,7 +300,7 @@ def certify(
         evidence=evidence,
         tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
-        rigid=at.rigid.shape[1] if surface.rooms else 0,
+        rigid=at.rigid.shape[1] if surface.rooms or surface.periodic else 0,
         pulled=tuple(np.flatnonzero(at.excess_pull).tolist()),
         left_over=pressures_left_over(standing),
     )
@@ -374,7 +379,7 @@ def _own_residuals(equilibrium: Equilibrium) -> Floats:
     island = islands(surface.topology)[classes.active]
     own = squared_forces(surface, classes, surface.vertices)
     island_of_vertex = np.zeros(surface.n, dtype=np.int64)
-    island_of_vertex[classes.faces] = island[:, None]
+    island_of_vertex[classes.topology.faces] = island[:, None]
     inside = equilibrium.unbalanced * (classes.kind == SHEET)[:, None]
     out = np.zeros(len(surface.patches))
     np.maximum.at(out, classes.patch_of_face, ratios(inside, island_of_vertex, own, island)[island])

@@ -102,9 +102,9 @@ def _cut(surface: Surface, groups: Ints, lengths: Floats, number: int) -> Neck |
     if not 0.0 < shorter < np.inf or len(np.intersect1d(starts, ends)):
         return None
     inner = np.flatnonzero(topo.valence > 1)
-    cut = inner[_minimal_cut(topo.edge_of_face, inner, segment_lengths(X, topo.edges[inner]), starts, ends)]
-    girth = segment_lengths(X, topo.edges[cut])
-    place = (girth @ X[topo.edges[cut]].mean(axis=1)) / (girth.sum() or 1.0)
+    cut = inner[_minimal_cut(topo.edge_of_face, inner, segment_lengths(X, topo.sides[inner]), starts, ends)]
+    girth = segment_lengths(X, topo.sides[cut])
+    place = (girth @ X[topo.sides[cut]].mean(axis=1)) / (girth.sum() or 1.0)
     return Neck(float(girth.sum()), place, float(girth.sum()) / shorter)
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
 from ..base.tolerances import EXCESS
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
@@ -57,6 +57,7 @@ def load_places(surface: Surface) -> Floats:
     return np.concatenate([places, X[surface.cable_edges.ends].mean(axis=1)])
 
 
+@kept_with_owner
 def load(surface: Surface) -> float:
     """The force of pressure, snow and weight along Π's normal."""
     return along_normal(surface, loads(surface))
@@ -82,7 +83,7 @@ def reactions(surface: Surface) -> Floats:
     add_weights(surface, X, weight)
     pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
     np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))
-    total = -tension - cable - weight + pressure
+    total = surface.folded(-tension - cable - weight + pressure)
     return apply_supports(surface, total.copy()) - total
 
 
@@ -134,7 +135,7 @@ class Forces:
         boundary, held = held_boundary(surface), standing.fixed | standing.on_plane
         on_boundary, used = np.zeros((2, surface.n), dtype=bool)
         on_boundary[topo.edges[boundary]] = True
-        used[standing.faces] = used[standing.cable_edges.ends] = True
+        used[standing.topology.faces] = used[standing.cable_edges.ends] = True
         for plane, mask in standing.on_planes:
             held = held | (mask & (not plane.mirror))
         single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
@@ -145,7 +146,7 @@ class Forces:
         lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
 
         some = np.flatnonzero(lines.any(axis=1))
-        half = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[some])[:, None], 2, axis=1)
+        half = np.repeat(0.5 * segment_lengths(surface.vertices, topo.sides[some])[:, None], 2, axis=1)
         lengths = np.bincount(topo.edges[some][lines[some]], half[lines[some]], surface.n).astype(float)
         pulls = np.zeros((len(lines), 3))
         pulls[some] = sheet_pulls(standing, topo.edges[some])
@@ -177,7 +178,8 @@ class Forces:
     def per_length(self) -> Floats:
         """(n,3) the mean of ``pulls`` along the lines at a vertex, force/length; NaN where there is none."""
         edges, force = self.surface.topology.edges, np.zeros_like(self.reactions)
-        half = 0.5 * segment_lengths(self.surface.vertices, edges)[:, None] * self.pulls
+        sides = self.surface.topology.sides
+        half = 0.5 * segment_lengths(self.surface.vertices, sides)[:, None] * self.pulls
         for side in (0, 1):
             np.add.at(force, edges[:, side], half * self.lines[:, [side]])
         share = self.lengths[:, None]

@@ -16,7 +16,6 @@ from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..forces.cables import pull_along
 from ..forces.rooms import refuse_varied_pressure
-from ..forces.volume_below import volumes_below
 from ..surface import Surface, values
 from ..surface.values import part_index, part_values
 from .cables import chord
@@ -115,7 +114,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         rows.extend(Figure(quantity, of, owner, value) for quantity, value in values.items())
 
     height, area = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
-    volume, acting, roof = volumes_below(surface), certificate.acting, surface.roof
+    volume, acting, roof = certificate.volumes, certificate.acting, surface.roof
     for k, patch in enumerate(surface.patches):
         weight = {"weight": patch.weight} if patch.weight else {}
         if not roof[k]:

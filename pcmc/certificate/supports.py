@@ -58,7 +58,7 @@ def support_table(acting: Forces) -> pd.DataFrame:
     the support on the surface; ``moment_x``, …, that of these forces about the middle; ``per_length_max``,
     the largest of the ``pulls`` along its edges, NaN for points.
     """
-    rows, X, edges = [], acting.surface.vertices, acting.surface.topology.edges
+    rows, X, edges = [], acting.surface.vertices, acting.surface.topology.sides
     for part in _labelled(acting):
         at = np.where(np.abs(part.place) <= SAME_PLACE * acting.surface.size, 0.0, part.place)
         moment = np.cross(X[part.vertices] - at, part.forces).sum(axis=0)
@@ -80,7 +80,7 @@ def pull_table(acting: Forces) -> pd.DataFrame:
     rows: list[tuple[object, ...]] = []
     for part in _labelled(acting):
         edges, pulls = _pulled(acting, part)
-        ends = topo.edges[edges]
+        ends = topo.sides[edges]
         numbers = [*X[ends].mean(axis=1).T, segment_lengths(X, ends), *pulls.T]
         rows += zip([part.label] * len(ends), *numbers, strict=True)
     return pd.DataFrame(rows, columns=["support", *"xyz", "length", "pull_x", "pull_y", "pull_z"])
@@ -113,8 +113,9 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     mesh at rest balances along its normals; along the sheets forces are left, smaller ones on finer meshes.
 
     Columns: ``of``; ``force_x``, …, and ``moment_x``, …, about the middle of the surface's bounding box at
-    ``x``, ``y``, ``z``; ``force_share``, ``moment_share``, the largest component over the sum of the loads'
-    sizes, triangle by triangle; without loads, over that of the supports.
+    ``x``, ``y``, ``z`` (what remains of moments is NaN of a periodic surface); ``force_share``,
+    ``moment_share``, the largest component over the sum of the loads' sizes, triangle by triangle; without
+    loads, over that of the supports.
     """
     X, force, columns = acting.standing.vertices, acting.loads, [*FORCE, *MOMENT, *"xyz"]
     about = 0.5 * (X.min(axis=0) + X.max(axis=0))
@@ -126,6 +127,8 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     sizes, away = (np.linalg.norm(part, axis=1) for part in each)
     scale = np.array([sizes.sum(), sizes @ away])
     parts = np.array([loads, carried, loads + carried])
+    if acting.surface.periodic:  # the forces across the seam have moments, and no resultant
+        parts[2, 1] = np.nan
     shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
     values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
     columns = ["of", *columns, "force_share", "moment_share"]
@@ -136,7 +139,10 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
     left = table.iloc[-1]
     force, moment = left["force_share"], left["moment_share"]
-    share = f"to {force:.1g} of them in x, y and z, and to {moment:.1g} in moments"
+    share = f"to {force:.1g} of them in x, y and z"
+    if np.isnan(moment):  # of a periodic surface
+        return f"the supports carry the loads {share}" if table.iloc[0][[*FORCE]].any() else ""
+    share += f", and to {moment:.1g} in moments"
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
     place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")

@@ -28,14 +28,30 @@ def names_of(surface: Surface, patches: Iterable[int]) -> str:
     return " | ".join(surface.patches[i].name for i in patches)
 
 
+def curve_lengths(surface: Surface, curve: EdgeCurve) -> Floats:
+    """(k,) the lengths of the edges of a curve, in order."""
+    topo = surface.topology
+    return segment_lengths(surface.vertices, topo.sides[topo.edge_numbers(curve.pairs)])
+
+
+def curve_points(surface: Surface, curve: EdgeCurve) -> Floats:
+    """(k+1,3) the ends of the edges of a curve, in order; of a periodic surface going on out of its cell."""
+    X, topo, pairs = surface.vertices, surface.topology, curve.pairs
+    if not surface.periodic:
+        return X[np.append(pairs[:, 0], pairs[-1:, 1])]
+    number = topo.edge_numbers(pairs)
+    steps = X[topo.sides[number, 1]] - X[topo.sides[number, 0]]
+    steps[topo.edges[number, 0] != pairs[:, 0]] *= -1.0
+    return np.asarray(X[pairs[0, 0]] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+
+
 def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
     """The point half way along a curve, or the centre of a closed one; tells curves of one name apart."""
-    ends, lengths = surface.vertices[curve.pairs], segment_lengths(surface.vertices, curve.pairs)
+    points, lengths = curve_points(surface, curve), curve_lengths(surface, curve)
     if curve.closed:
-        place = lengths @ ends.mean(axis=1) / (lengths.sum() or 1.0)
+        place = lengths @ (points[:-1] + points[1:]) / (2.0 * lengths.sum() or 1.0)
     else:
         along = np.concatenate([[0.0], np.cumsum(lengths)])
-        points = surface.vertices[curve.vertices]
         place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
     place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
@@ -116,7 +132,7 @@ def _along_curve(
     surface: Surface, curve: EdgeCurve, left: Floats, load: Floats | float = 0.0
 ) -> tuple[Floats, Floats, dict[str, float]]:
     """Lengths, |Σ α n + load| (k,) of a curve's edges; its length, middle, largest force left per length."""
-    lengths = segment_lengths(surface.vertices, curve.pairs)
+    lengths = curve_lengths(surface, curve)
     sums = np.linalg.norm(sheet_pulls(surface, curve.pairs) + load, axis=1)
     most = float(np.linalg.norm(left, axis=1).max(initial=0.0)) / (float(lengths.mean()) or 1.0)
     return lengths, sums, {"length": float(lengths.sum()), **middle(surface, curve), "force_left": most}

@@ -22,7 +22,7 @@ from .proof import Attempt, Overload, Proof
 
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
 NO_TENSION = "no patch has a tension: every shape is at rest"
-FREE = "nothing resists {} rigid motions; every change of shape at these volumes raises E"
+FREE = "nothing resists {} rigid motions; every change of shape {} raises E"
 
 
 class Verdict(Enum):
@@ -232,6 +232,10 @@ def _saddle(f: Findings) -> list[object]:
     return [describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode), _near_fold(f)]
 
 
+def _at_volumes(f: Findings) -> str:
+    return "in this cell" if f.surface.periodic and not f.surface.rooms else "at these volumes"
+
+
 def _near_fold(f: Findings) -> str:
     """Names what nearly lets go, so that the certificate of a fold says where it is; else empty."""
     count, band = (f.spectrum.soft, NEUTRAL) if f.spectrum.soft else (f.spectrum.near, NEAR_NEUTRAL)
@@ -258,7 +262,7 @@ RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], s
     (Verdict.SADDLE, lambda f: compressed_cables(f.surface).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
-    (Verdict.NEUTRAL, lambda f: f.rigid > 0, lambda f: FREE.format(f.rigid)),
+    (Verdict.NEUTRAL, lambda f: f.rigid > 0, lambda f: FREE.format(f.rigid, _at_volumes(f))),
     (Verdict.NEUTRAL, lambda f: f.spectrum.soft, _near_fold),
     (Verdict.STABLE, lambda f: True, _near_fold),
 )

@@ -21,6 +21,7 @@ from ..certificate import Certificate
 from ..certificate.certificate import certified, warning_mark
 from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
+from ..surface.images import expect_no_images
 from . import dxf, views
 from .panel_sheets import flat_panels, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
@@ -163,6 +164,7 @@ def drawing_set(
     '1:10'
     """
     expect_surface(surface)
+    expect_no_images(surface, "drawings")
     units = as_units(units)
     length = expect_length(units.length, "a drawing")
     millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]

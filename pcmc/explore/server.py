@@ -20,6 +20,7 @@ from ..project import load
 from ..project.members import has_members, members_drawn
 from ..project.writing import certified_files
 from ..surface import Surface
+from ..surface.images import expect_no_images
 from . import page_data
 from .following import ProjectFallback, Stop
 from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, check_request, listen, pack
@@ -42,6 +43,7 @@ class Explorer:
         if not isinstance(roof.surface, Surface):
             found = type(roof.surface).__name__
             raise SurfaceError(f"explore: expected a Surface, found {found}", what="surface", found=found)
+        expect_no_images(roof.surface, "explore")
         self._server = listen(host, port, PageHandler)
         self._server.explorer = self
         self.local = host in LOOPBACK

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, kept_with_owner, read_only
 from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.supports import symmetric_part
@@ -47,8 +47,14 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     """
     expect_surface(surface)
     validate.choice("method", method, METHODS)
+    return _both(surface)[METHODS.index(method)]
+
+
+@kept_with_owner
+def _both(surface: Surface) -> tuple[Floats, Floats]:
+    """H (n,) by each of ``METHODS``."""
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
-    area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
+    area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)
     if surface.order > 1:
         normal = normal_vectors(surface, vertex_classes(surface), surface.vertices)
         symmetric_part(surface.on_planes, normal)
@@ -60,12 +66,11 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     area_vector = symmetric_part(surface.on_planes, area_vector)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)
     with np.errstate(divide="ignore", invalid="ignore"):
-        if method == "cotangent":
-            H = np.copysign(np.linalg.norm(area_gradient, axis=1), along) / (2.0 * star_area / 3.0)
-        else:
-            H = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
-    H[~_within_one_sheet(surface)] = np.nan
-    return H
+        cotangent = np.copysign(np.linalg.norm(area_gradient, axis=1), along) / (2.0 * star_area / 3.0)
+        variational = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
+    outside = ~_within_one_sheet(surface)
+    cotangent[outside] = variational[outside] = np.nan
+    return read_only(surface.spread(cotangent)), read_only(surface.spread(variational))
 
 
 def target_curvature(surface: Surface) -> Floats:
@@ -93,7 +98,9 @@ def _target_and_scale(surface: Surface) -> tuple[Floats, Floats]:
     target = np.array([p.target_curvature for p in surface.patches])[patch]
     scale, weight, press = target, surface.weights[patch], surface.net_pressures[patch]
     if (heavy := weight != 0.0).any():
-        vector = vertex_area_vectors(surface.vertices, surface.faces)[0]
+        vector = surface.spread(
+            vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)[0]
+        )
         length = np.linalg.norm(vector, axis=1)
         upright = (vector @ np.array(surface.plane.normal)) / np.where(length > 0.0, length, 1.0)
         pull = surface.tensions[patch] + weight * surface.plane.height(surface.vertices)
@@ -134,4 +141,4 @@ def _within_one_sheet(surface: Surface) -> Bools:
     inside[topo.edges[topo.curve_edge & ~surface.mirror_edge]] = False
     for plane, mask in surface.on_planes:
         inside &= plane.mirror | ~mask
-    return inside & (topo.fans == 1)
+    return surface.spread(inside & (topo.fans == 1))

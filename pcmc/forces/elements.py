@@ -24,6 +24,7 @@ class Mesh(NamedTuple):
     """Elements with the weights of their energy, as one argument of compiled loops; positions are another."""
 
     faces: Ints  # (e,k) nodes: of flat triangles the corners
+    rows: Ints  # (e,k) the vertices that these are images of, or the same: where forces and blocks belong
     patch: Ints  # (e,) of each element
     origin: Floats  # (3,) the reference point of volumes
     tension: Floats  # (k,) α of each patch; p and w below
@@ -37,6 +38,11 @@ class Mesh(NamedTuple):
     def curved(self) -> bool:
         """Whether the elements are no flat triangles."""
         return self.faces.shape[1] > 3
+
+    def part(self, first: int, last: int) -> Mesh:
+        """Elements first..last alone."""
+        faces, rows = self.faces[first:last], self.rows[first:last]
+        return self._replace(faces=faces, rows=rows, patch=self.patch[first:last])
 
     def weighing(self, weight: Floats | None = None) -> Mesh:
         """With these weights alone, no tension and no pressure; None for no weights, and both as they are."""
@@ -53,7 +59,10 @@ def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Float
     pressure = surface.net_pressures if pressure is None else read_only(pressure)
     plane = np.array(surface.plane.point), np.array(surface.plane.normal)
     patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
-    return Mesh(surface.nodes, patch, surface.origin, tension, pressure, surface.weights, *plane, of_elements)
+    nodes = surface.nodes
+    rows = surface.topology.faces if surface.periodic else nodes
+    of_patches = tension, pressure, surface.weights
+    return Mesh(nodes, rows, patch, surface.origin, *of_patches, *plane, of_elements)
 
 
 class Points(NamedTuple):
@@ -67,8 +76,8 @@ class Points(NamedTuple):
     @classmethod
     def of(cls, mesh: Mesh, X: Floats) -> Points:
         """Those of the elements with their nodes at X (n,3)."""
-        N, Nu, Nv, weight = mesh.shapes
-        x, u, v = (np.einsum("qk,ekd->eqd", shape, X[mesh.faces]) for shape in (N, Nu, Nv))
+        (N, Nu, Nv, weight), nodes = mesh.shapes, X[mesh.faces]
+        x, u, v = (np.einsum("qk,ekd->eqd", shape, nodes) for shape in (N, Nu, Nv))
         return cls(x, u, v, weight[:, None] * np.cross(u, v))
 
 

@@ -12,6 +12,13 @@ too. Where the boundary leaves plane k for a plane j, the piece ends along the l
 c is chosen on as many of these lines as possible, and then as near to o as possible. On others, with c' the
 point of the line nearest to o, V += ∓(1/6) ⟨c, v × c'⟩ =: ⟨n, v⟩ for the vertex v there (- at the head of the
 last side, + at the tail of the first), so ∂V/∂v = n. It all costs nothing where every plane passes through o.
+
+Where a surface is periodic, the cones of neighbours across its seam are seen from places that are a
+translation apart, and the force on a vertex would depend on o. Each side a → b of a triangle is shifted by s
+from where the edge's first triangle has it; a piece with c = s takes it back there. With the shift u of the
+triangle's corner from the vertex that it is an image of, and the shifts w and w' of the ends of the first
+triangles' sides before and after that corner, n = -(1/6) (w - w') × u: at every vertex the forces then add up
+to those of its closed star. The volume of what wraps around a cell is counted up to a constant.
 """
 
 from __future__ import annotations
@@ -22,7 +29,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner
-from ..base.tolerances import PARALLEL, SAME_PLACE
+from ..base.errors import SurfaceError
+from ..base.tolerances import ON, PARALLEL, SAME_PLACE
 from ..surface import Plane, Surface
 from ..surface.checks import lying
 from ..surface.lagrange import expect_flat
@@ -56,7 +64,7 @@ def volumes(surface: Surface, X: Floats) -> list[tuple[Ints, Elements]]:
     """The volumes of the flat pieces, by sides and by ends, and the patch of each; vertices at X (n,3)."""
     if not (pieces := flat_pieces(surface)):
         return []
-    ends, c = np.stack(pieces.sides(surface), axis=1), pieces.apex
+    ends, c, vertex = np.stack(pieces.sides(surface), axis=1), pieces.apex, surface.original
     seen = X - surface.origin
     a, b = seen[ends[:, 0]], seen[ends[:, 1]]
 
@@ -68,10 +76,10 @@ def volumes(surface: Surface, X: Floats) -> list[tuple[Ints, Elements]]:
     def gradient() -> Floats:
         return np.stack([np.cross(c, b), -np.cross(c, a)], axis=1) / 6.0
 
-    sides = Elements(ends, -np.einsum("ij,ij->i", c, np.cross(a, b)) / 6.0, gradient, hessian)
+    sides = Elements(vertex[ends], -np.einsum("ij,ij->i", c, np.cross(a, b)) / 6.0, gradient, hessian)
     at_ends = np.einsum("ij,ij->i", pieces.normal, seen[pieces.end])
     zero = np.zeros((len(pieces.end), 1, 1, 3, 3))
-    points = Elements(pieces.end[:, None], at_ends, lambda: pieces.normal[:, None], lambda: zero)
+    points = Elements(vertex[pieces.end[:, None]], at_ends, lambda: pieces.normal[:, None], lambda: zero)
     return [(surface.patch_of_face[pieces.face], sides), (pieces.end_patch, points)]
 
 
@@ -97,6 +105,8 @@ def ground(surface: Surface) -> Bools:
 @kept_with_owner
 def flat_pieces(surface: Surface) -> FlatPieces:
     """The flat pieces of a surface, computed once; ``NONE`` where all planes pass through its origin."""
+    if surface.periodic:
+        return _seam_pieces(surface)
     if not surface.on_planes:
         return NONE
     masks = [(surface.plane, ground(surface)), *surface.on_planes]
@@ -122,6 +132,27 @@ def flat_pieces(surface: Surface) -> FlatPieces:
         return NONE
     expect_flat(surface, "boundaries that slide on planes through no common point")
     return FlatPieces(*(np.concatenate(column) for column in zip(*columns, strict=True)))
+
+
+def _seam_pieces(surface: Surface) -> FlatPieces:
+    """The pieces along the seams of a periodic surface."""
+    topo, F = surface.topology, surface.faces
+    if surface.uncancelled.any():
+        text = "a pressure that does not cancel at a free edge of a periodic surface; fix that edge, let it"
+        raise SurfaceError(f"{text} slide on the plane, or take the pressure away", what="images")
+    shift = surface.vertices[F] - surface.vertices[topo.faces]
+    start, end = shift[:, [1, 2, 0]], shift[:, [2, 0, 1]]  # of the sides opposite the corners
+    ascends = (topo.sense > 0)[..., None]
+    first = np.unique(topo.edge_of_face, return_index=True)[1]
+    low, high = (np.where(ascends, *ends).reshape(-1, 3)[first] for ends in ((start, end), (end, start)))
+    low, high = low[topo.edge_of_face], high[topo.edge_of_face]
+    at_start, at_end = np.where(ascends, low, high), np.where(ascends, high, low)
+    apex, tiny = start - at_start, ON * surface.size
+    face, opposite = np.nonzero(np.linalg.norm(apex, axis=2) > tiny)
+    normal = -np.cross(at_end[:, [1, 2, 0]] - at_start[:, [2, 0, 1]], shift) / 6.0
+    ends = np.nonzero(np.linalg.norm(normal, axis=2) > tiny**2)
+    apex, normal = apex[face, opposite], normal[ends]
+    return FlatPieces(face, (opposite + 1) % 3, apex, F[ends], surface.patch_of_face[ends[0]], normal)
 
 
 def _ends(

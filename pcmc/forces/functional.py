@@ -83,6 +83,8 @@ def energy_and_gradient(
 ) -> tuple[float, Floats]:
     """E and ∇E (n,3) in one pass over the triangles, at X or at the surface's own vertices.
 
+    The forces on images of vertices are in those on the vertices, and zero at the images.
+
     ``supports=False`` keeps the forces at held vertices, which the supports must carry.
 
     >>> from pcmc import Patch
@@ -96,6 +98,7 @@ def energy_and_gradient(
     X = surface.vertices if X is None else X
     areas, volumes, gradient = measure(energy_mesh(surface), X, workers)
     further = add_forces(surface, X, gradient)
+    surface.folded(gradient)
     if supports:
         apply_supports(surface, gradient, X)
     return total(surface.tensions, areas, surface.net_pressures, volumes) + further, gradient
@@ -127,7 +130,7 @@ def weighted(
     X = surface.vertices if X is None else X
     areas, volumes, forces = measure(energy_mesh(surface, alpha, p), X)
     add_values(flat_pieces.elements(surface, X, p), forces)
-    return areas, add_plane_volumes(surface, X, volumes), forces
+    return areas, add_plane_volumes(surface, X, volumes), surface.folded(forces)
 
 
 def patch_areas(surface: Surface) -> Floats:
@@ -171,6 +174,7 @@ def gradient_by(surface: Surface, rates: Rates, X: Floats | None = None) -> Floa
         out = weighted(surface, rates.get("tensions", none), net, X)[2]
     if "weights" in rates:
         moments(surface, X, rates["weights"], out)
+        surface.folded(out)
     _cables_by(surface, rates, X, out)
     return out
 

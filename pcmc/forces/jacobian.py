@@ -19,12 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.compiled import compiled
+from ..base.compiled import compiled, sum_blocks
 from ..surface import Surface
 from ..surface.geometry import accumulate, cross_sum, divided, dot, norm, point, scaled, sub, vector
 from ..surface.topology import SHEET
 from .motion_space import MotionSpace, VertexClasses, curve_chords, normal_vectors
-from .second_variation import add_products, circle_curvatures
+from .second_variation import circle_curvatures, hessian_product
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,7 @@ class Linearisation:
     classes: VertexClasses
     space: MotionSpace
     X: Floats
-    sheet_rows: Ints  # (s,) vertices inside sheets whose normal may turn
-    sheet_factor: Floats  # (n,3) (∇E - n n·∇E) / |a| there, which Da is multiplied with; zero elsewhere
+    sheet_factor: Floats  # (n,3) (∇E - n n·∇E) / |a| where a sheet may turn; Da is multiplied with it
     curve_rows: Ints  # (b,) numbers in ``classes.curve`` of the vertices whose curve may turn
     curve_factor: Floats  # (b,) -(t·∇E) / |c| there, which Dc is multiplied with
     circle_rows: Ints  # (k,) and (k,3) as ``circle_curvatures`` gives them
@@ -45,16 +44,20 @@ class Linearisation:
     def times(self, d: Floats) -> Floats:
         """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
         surface, classes, space = self.surface, self.classes, self.space
-        change = add_products(surface, classes.mesh(surface), self.X, d, np.zeros_like(self.X))
-        turn = np.zeros(len(self.X))
+        change = hessian_product(surface, classes.mesh(surface), self.X, d)
         if classes.nodes.shape[1] == 3:
-            _add_turns(classes.faces, self.X, d, self.sheet_factor, turn)
+
+            def work(first: int, last: int, turn: Floats) -> None:
+                faces, rows = classes.faces[first:last], classes.rows[first:last]
+                _add_turns(faces, rows, self.X, d, self.sheet_factor, turn)
+
+            turn = sum_blocks(work, len(classes.faces), self.X.shape[:1])
         else:
             turn = (self.sheet_factor * normal_vectors(surface, classes, self.X, d)).sum(axis=1)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
-        out[space.start[self.sheet_rows]] += turn[self.sheet_rows]
+        _add_to_first(space, turn, out)
         out[space.start[self.circle_rows]] += (self.circle_factor * d[self.circle_rows]).sum(axis=1)
         return out
 
@@ -74,8 +77,8 @@ def linearise(
     chord -= np.einsum("ij,ij->i", chord, across)[:, None] * across
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[vertices])
-    sheets, circles = (np.flatnonzero(single), sheet_factor), circle_curvatures(surface, space, X)
-    return Linearisation(surface, classes, space, X, *sheets, rows, -along / square, *circles)
+    circles = circle_curvatures(surface, space, X)
+    return Linearisation(surface, classes, space, X, sheet_factor, rows, -along / square, *circles)
 
 
 @compiled
@@ -103,7 +106,7 @@ def _across_normals(
 
 
 @compiled
-def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
+def _add_turns(F: Ints, rows: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
     """Add ⟨sheet_factor, Da⟩ to turn (n,), a = Σ ½ u × w the vertices' area vectors."""
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
@@ -111,4 +114,12 @@ def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats
         Du, Dw = sub(point(D, j), point(D, i)), sub(point(D, k), point(D, i))
         Da = scaled(0.5, cross_sum(Du, w, u, Dw))
         for corner in range(3):
-            turn[F[f, corner]] += dot(point(sheet_factor, F[f, corner]), Da)
+            turn[rows[f, corner]] += dot(point(sheet_factor, rows[f, corner]), Da)
+
+
+@compiled
+def _add_to_first(space: MotionSpace, turn: Floats, out: Floats) -> None:
+    """Add turn (n,) to the first unknown of each vertex."""
+    for v in range(len(turn)):
+        if space.dimension[v] > 0:
+            out[space.start[v]] += turn[v]

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..surface import Surface
+from ..surface.geometry import squared_sides
 from ..surface.topology import Topology, components
 from .cables import squared_cable_forces
-from .motion_space import VertexClasses, force_scale
-from .triangles import effective_tensions
+from .motion_space import VertexClasses, force_scale, squared_forces
 
 
 def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: Floats) -> float:
@@ -40,22 +40,11 @@ def rounding_left(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     True
     """
     parts = surface.topology.components[classes.faces[:, 0]]
-    sides = X[classes.faces[:, [1, 2, 0]]] - X[classes.faces]
-    squares = np.bincount(parts, np.einsum("fij,fij->f", sides, sides))
+    squares = np.bincount(parts, squared_sides(X, classes.faces))
     counts = np.bincount(parts)
     edges = np.sqrt(squares[counts > 0] / (3.0 * counts[counts > 0]))
     shortest = edges[edges > 0.0].min(initial=np.inf)
     return float(np.finfo(float).eps * np.abs(X).max(initial=0.0) / shortest)
-
-
-def squared_forces(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
-    """(m,) the squared tension forces ½ α |e| of each active triangle, added up, force².
-
-    With a weight, α + w z stands for α.
-    """
-    sides = X[classes.faces[:, [1, 2, 0]]] - X[classes.faces]
-    tension = effective_tensions(surface, X, classes.faces, classes.patch_of_face)
-    return np.asarray(0.25 * tension**2 * np.einsum("fij,fij->f", sides, sides))
 
 
 def ratios(left: Floats, part: Ints, own: Floats, part_of_face: Ints) -> Floats:

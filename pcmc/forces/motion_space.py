@@ -34,6 +34,7 @@ from ..surface.geometry import (
     norm,
     point,
     scaled,
+    squared_sides,
     sub,
     vector,
     vertex_area_vectors,
@@ -46,13 +47,15 @@ from ..surface.topology import (
     SHEET,
     Topology,
     curve_neighbours,
+    edge_places,
     one_sided_copies,
-    topology,
     vertex_kind,
 )
 from .cables import laws_on, squared_cable_forces
 from .elements import Mesh, energy_mesh
 from .triangles import effective_tensions
+
+NO_IMAGES: Ints = read_only(np.empty(0, dtype=np.int32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +69,20 @@ class VertexClasses:
     kind: Ints  # (n,) SHEET, CURVE or POINT: by the edges at which sheets meet, end, or change law or side
     curve: Ints  # (c,) vertices on a curve
     beside: Ints  # (c,2) their neighbours along it
-    idle: Bools  # (n,) vertices of no active face
+    seen: Ints  # (c,2) images of the curve vertices as these neighbours have them; (0,2) without images
+    idle: Bools  # (n,) vertices of no active face, and images
     level: Bools  # (n,) curve vertices beside one that rests on Π: their tangent is taken along Π
     nodes: Ints  # (e,k) of the active elements; of flat ones ``faces``
 
     def mesh(self, surface: Surface) -> Mesh:
         """The active elements, with the tensions and pressures of a surface of these classes."""
-        patch = self.patch_of_face[:: surface.order**2]
-        return energy_mesh(surface)._replace(faces=self.nodes, patch=np.ascontiguousarray(patch))
+        patch = np.ascontiguousarray(self.patch_of_face[:: surface.order**2])
+        return energy_mesh(surface)._replace(faces=self.nodes, rows=self.rows, patch=patch)
+
+    @property
+    def rows(self) -> Ints:
+        """(e,k) the vertices that ``nodes`` are images of, or the same."""
+        return self.nodes if self.topology.placed is None else self.topology.faces
 
 
 class MotionSpace(NamedTuple):
@@ -82,11 +91,13 @@ class MotionSpace(NamedTuple):
     basis: Floats  # (n,3,3) basis[v, c] for c < dimension[v] are unit vectors, the rest zero
     dimension: Ints  # (n,) 0 to 3
     start: Ints  # (n+1,) the first unknown of each vertex; the last entry is the number of unknowns
+    original: Ints = NO_IMAGES  # (n,) the vertex that each is an image of; of a surface without any (0,)
 
     @classmethod
-    def of(cls, basis: Floats, dimension: Ints) -> MotionSpace:
+    def of(cls, basis: Floats, dimension: Ints, original: Ints = NO_IMAGES) -> MotionSpace:
         """The space of a basis, with its unknowns numbered vertex by vertex."""
-        return cls(basis, dimension, np.append(0, np.cumsum(dimension)).astype(np.int64))
+        start = np.append(0, np.cumsum(dimension)).astype(np.int64)
+        return cls(basis, dimension, start, original)
 
     @property
     def size(self) -> int:
@@ -98,8 +109,9 @@ class MotionSpace(NamedTuple):
         return _to_coordinates(self, vectors)
 
     def to_vectors(self, components: Floats) -> Floats:
-        """B s (n,3): the vectors that have these components (size,)."""
-        return _to_vectors(self, components)
+        """B s (n,3): the vectors that have these components (size,); images have those of their vertex."""
+        vectors: Floats = _to_vectors(self, components)
+        return vectors[self.original] if len(self.original) else vectors
 
     def from_other(self, other: MotionSpace, components: Floats) -> Floats:
         """Bᵀ B' s (size,): the components here of the vectors that have these in another space."""
@@ -134,7 +146,7 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     if active.all():
         topo = replace(surface.topology, patch_of_face=alike)
     else:
-        topo = topology(faces, alike, surface.n)
+        topo = surface.topology_of(faces, alike)
     if (topo.one_way_edge & ~topo.seam_edge).any():
         # faces to turn over so that each sheet has one side; none of a sheet that has only one
         m, smooth = len(faces), (topo.valence == 2) & ~topo.seam_edge
@@ -142,7 +154,7 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
         label = one_sided_copies(one, other, topo.one_way_edge[smooth], m)
         turned = (label[:m] > label[m:]) & ((surface.net_pressures == 0.0) & ~in_room)[patch]
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
-        topo = topology(faces, alike, surface.n)
+        topo = surface.topology_of(faces, alike)
     faces.setflags(write=False)  # compiled loops then see one type of array
     patch.setflags(write=False)
     on_curve = topo.curve_edge | topo.one_way_edge
@@ -168,10 +180,17 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
         shared[crest[:, 0]] = False
     kind[shared] = POINT
     curve, beside = curve[~shared[curve]], beside[~shared[curve]]
-    idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
+    idle = np.bincount(topo.faces.ravel(), minlength=surface.n) == 0
     level = np.zeros(surface.n, dtype=bool) if level is None else level
     nodes = faces if surface.order == 1 else read_only(surface.nodes[active[:: surface.order**2]])
-    return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level, nodes)
+    seen = np.empty((0, 2), dtype=np.int64)
+    if surface.periodic:  # along the sides of faces, which do not leave the cell
+        place = edge_places(np.stack([np.stack([curve, b], axis=1) for b in beside.T], axis=1), topo.edges)
+        later = topo.edges[place, 1] == curve[:, None]
+        seen, beside = (
+            np.where(later == end, topo.sides[place, 1], topo.sides[place, 0]) for end in (True, False)
+        )
+    return VertexClasses(active, faces, patch, topo, kind, curve, beside, seen, idle, level, nodes)
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
@@ -190,7 +209,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     basis, dimension = np.zeros((surface.n, 3, 3)), np.zeros(surface.n, dtype=np.int64)
     area_vector = normal_vectors(surface, classes, X)
     _fill(classes.kind, area_vector, chord, freedom, axis, basis, dimension)
-    return MotionSpace.of(basis, dimension)
+    return MotionSpace.of(basis, dimension, surface.original if surface.periodic else NO_IMAGES)
 
 
 @compiled
@@ -241,7 +260,7 @@ def normal_vectors(surface: Surface, classes: VertexClasses, X: Floats, d: Float
     these, how they change along it, their lengths kept.
     """
     if classes.nodes.shape[1] == 3:
-        return vertex_area_vectors(X, classes.faces)[0]
+        return vertex_area_vectors(X, classes.faces, classes.topology.faces)[0]
     law, n, nodes = classes.topology.patch_of_face, len(X), classes.nodes
     sheets, faces = int(law.max(initial=0)) + 1, classes.faces + n * law[:, None]
 
@@ -266,6 +285,8 @@ def normal_vectors(surface: Surface, classes: VertexClasses, X: Floats, d: Float
 def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
     """(c,3) from the vertex before to the one after each curve vertex: along its tangent."""
     chord = X[classes.beside[:, 1]] - X[classes.beside[:, 0]]
+    if len(classes.seen):
+        chord += X[classes.seen[:, 0]] - X[classes.seen[:, 1]]
     level = classes.level[classes.curve]
     chord[level] = surface.plane.along(chord[level])
     return np.asarray(chord)
@@ -276,9 +297,16 @@ def force_scale(surface: Surface, of: VertexClasses | Surface, X: Floats) -> flo
 
     Of the active triangles, or of all; with a weight, α + w z stands for α; 1 without tension.
     """
-    F = of.faces
-    sheets: float = _norm_of_forces(X, F, effective_tensions(surface, X, F, of.patch_of_face))
-    return (sqrt(sheets**2 + squared_cable_forces(surface, X).sum()) if surface.cables else sheets) or 1.0
+    squared = float(squared_forces(surface, of, X).sum())
+    if surface.cables:
+        squared += float(squared_cable_forces(surface, X).sum())
+    return sqrt(squared) or 1.0
+
+
+def squared_forces(surface: Surface, of: VertexClasses | Surface, X: Floats) -> Floats:
+    """(m,) the squared tension forces ½ α |e| of each triangle, added up, force²; α + w z with a weight."""
+    tension = effective_tensions(surface, X, of.faces, of.patch_of_face)
+    return np.asarray(0.25 * tension**2 * squared_sides(X, of.faces))
 
 
 @inlined
@@ -302,18 +330,6 @@ def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
         for d in range(3):
             out[0, v, d], out[1, v, d] = first[d], second[d]
     return out[0], out[1]
-
-
-@compiled
-def _norm_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
-    total = 0.0
-    for f in range(len(F)):
-        square = 0.0
-        for i in range(3):
-            edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
-            square += dot(edge, edge)
-        total += 0.25 * tension[f] ** 2 * square
-    return sqrt(total)
 
 
 @compiled

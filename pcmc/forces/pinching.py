@@ -27,6 +27,7 @@ from ..base.tolerances import EXCESS
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import segment_lengths
+from ..surface.images import expect_no_images
 from ..surface.supports import apply_supports
 from ..surface.topology import topology
 from .functional import energy_and_gradient
@@ -95,6 +96,8 @@ class StandingPart:
             message = f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only"
             message += " flat triangles have contact; give order=1"
             raise CurvedContactError(message, what="order", found=whole.order, expected=1)
+        if resting.any():
+            expect_no_images(whole, "a junction that comes to rest on the plane")
         if resting.any():  # vertices of the walls left out belong to no face
             X, held = _put_down(whole, walls, whole.vertices, resting), resting & walls.held
             owner, given = _owners(whole.n, walls, resting), whole.given_supports

@@ -21,7 +21,7 @@ def rigid_motions(surface: Surface) -> Floats:
     held, free = surface.fixed, np.eye(6)
     for _, along in surface.on_line:
         held = held & ~along
-    if not surface.free.all():
+    if surface.periodic or not surface.free.all():
         rows = [_row(arm[held], axis) for axis in np.eye(3)]
         for line, along in surface.on_line:
             if isinstance(line, Circle):
@@ -31,6 +31,8 @@ def rigid_motions(surface: Surface) -> Floats:
                 across = list(perpendicular(np.array([line.direction])))
             rows += [_row(arm[along], axis) for axis in across]
         rows += [_row(arm[mask], np.array(plane.normal)) for plane, mask in surface.sliding]
+        between = arm[surface.images[:, 0]] - arm[surface.images[:, 1]]  # rotations would turn translations
+        rows += [_row(between, axis) * [0, 0, 0, 1, 1, 1] for axis in np.eye(3)]
         resisted = np.concatenate(rows)
         _, s, vt = np.linalg.svd(resisted.T @ resisted)
         free = vt[s <= 1e-10 * s[0]]

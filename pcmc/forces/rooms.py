@@ -16,16 +16,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
+from ..surface.geometry import area_vectors
+from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
 from ..surface.supports import apply_supports
 from ..surface.topology import components
 from .functional import patch_volumes, weighted
+
+SAMPLES = 12  # places along each side of a cell
+MOST_FACES = 4000  # of a room, among which the nearest is sought
+CLEAR = 0.3  # of a sixth of the cell: how far the places may be off
 
 
 def room_volumes(surface: Surface) -> Floats:
@@ -154,7 +161,41 @@ def closing_volumes(surface: Surface) -> Floats:
     SurfaceError where a room has an open edge.
     """
     rows = zip(surface.rooms, surface.room_signs, strict=True)
-    return np.array([sum(_fans(surface, room, row)) for room, row in rows], dtype=float)
+    fans = np.array([sum(_fans(surface, room, row)) for room, row in rows], dtype=float)
+    return fans + _whole_sixths(surface) if len(lattice_of(surface)) == 3 else fans
+
+
+def _whole_sixths(surface: Surface) -> Floats:
+    """(r,) what cones and pieces leave out of the volumes where a cell is periodic in three directions.
+
+    It is a whole number of sixths of the cell, by which vertices stand for their images alone. Places all
+    over the cell tell it: how many are inside a room, on the inner side of its triangle that is nearest.
+    """
+    T = lattice_of(surface)
+    sixth = abs(float(np.linalg.det(T))) / 6.0
+    grid = np.stack(np.meshgrid(*[(np.arange(SAMPLES) + 0.37) / SAMPLES] * 3, indexing="ij"), axis=-1)
+    places, shifts = grid.reshape(-1, 3) @ T, np.argwhere(np.ones((3, 3, 3))) - 1.0
+    reached = surface.room_signs @ patch_volumes(surface)
+    found = np.zeros(len(surface.rooms))
+    for r, signs in enumerate(surface.room_signs):
+        own = np.flatnonzero(signs[surface.patch_of_face])
+        own = own[:: 1 + len(own) // MOST_FACES]
+        corners = surface.vertices[surface.faces[own]]
+        out = area_vectors(corners) * signs[surface.patch_of_face[own], None]
+        middle = corners.mean(axis=1)
+        middle -= np.floor(middle @ np.linalg.inv(T)) @ T
+        every = (middle + (shifts @ T)[:, None]).reshape(-1, 3)
+        near = cKDTree(every).query(places)[1]
+        inside = np.einsum("ij,ij->i", places - every[near], out[near % len(own)]) < 0.0
+        found[r] = (inside.mean() * 6.0) - reached[r] / sixth
+    unclear = np.flatnonzero(np.abs(found - np.round(found)) > CLEAR)
+    if len(unclear):
+        name = surface.rooms[unclear[0]].name
+        message = (
+            f"room {name!r}: the mesh is too coarse to tell which side of its patches lies in it; refine it"
+        )
+        raise SurfaceError(f"{message}, and check their signs", what="rooms", where=name)
+    return np.asarray(np.round(found) * sixth)
 
 
 def _left_over(surface: Surface, signs: Floats) -> Floats:

@@ -6,8 +6,8 @@ For corners i and j of an element, ∂²E/∂x_i∂x_j is the 3×3 matrix
 
 for triangles (``triangles``), and given by each of the other forces (``elements``); a vertex that slides
 along a circle adds ⟨κ, ∇E⟩ along its tangent (``circle_curvatures``). The *stiffness* L has only k.
-``assemble`` projects hessian · ∂²E + stiffness · L into the motion space; ``add_products`` multiplies ∂²E by
-a motion.
+``assemble`` projects hessian · ∂²E + stiffness · L into the motion space; ``hessian_product`` multiplies ∂²E
+by a motion.
 """
 
 from __future__ import annotations
@@ -18,9 +18,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled, inlined
+from ..base.compiled import compiled, inlined, sum_blocks
 from ..surface import Surface, expect_surface
-from ..surface.geometry import Vector, accumulate, add, cross, dot, point, scaled, vector
+from ..surface.geometry import (
+    Vector,
+    accumulate,
+    add,
+    cross,
+    cross_sum,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+)
 from .curved import add_element_products, fill_block
 from .elements import Elements, Mesh, add_hessian_products, energy_mesh
 from .functional import elements, energy_and_gradient
@@ -34,6 +46,8 @@ if TYPE_CHECKING:
 
 def hessian(surface: Surface) -> csr_array:
     """∂²E/∂X², sparse symmetric (3n,3n), supports not applied; unknown 3v + d is coordinate d of v.
+
+    Images of vertices move with these: their own rows and columns are empty.
 
     >>> from pcmc import Patch, Surface
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("t", 1.0)], fixed=[0])
@@ -58,9 +72,13 @@ def assemble(
 ) -> Floats:
     """Values of hessian · Bᵀ(∂²E)B + stiffness · BᵀLB in the pattern; without classes of all elements."""
     mesh = energy_mesh(surface) if classes is None else classes.mesh(surface)
-    data = np.zeros(len(pattern.indices))
     fill = _assemble_curved if mesh.curved else _assemble_triangles
-    fill(mesh, X, space, pattern, hessian, stiffness, data)
+
+    def work(first: int, last: int, data: Floats) -> None:
+        some = pattern._replace(offset=pattern.offset[first:last])
+        fill(mesh.part(first, last), X, space, some, hessian, stiffness, data)
+
+    data: Floats = sum_blocks(work, len(mesh.faces), pattern.indices.shape)
     add_blocks(elements(surface, X), space, pattern, hessian, stiffness, data)
     if hessian:
         rows, factor = circle_curvatures(surface, space, X)
@@ -85,9 +103,14 @@ def circle_curvatures(surface: Surface, space: MotionSpace, X: Floats) -> tuple[
     return np.concatenate(rows), np.concatenate(factors)
 
 
-def add_products(surface: Surface, mesh: Mesh, X: Floats, d: Floats, change: Floats) -> Floats:
-    """(∂²E) d added to ``change`` (n,3), in place, for a motion d (n,3); ``mesh`` has the elements."""
-    (add_element_products if mesh.curved else _add_triangle_products)(mesh, X, d, change)
+def hessian_product(surface: Surface, mesh: Mesh, X: Floats, d: Floats) -> Floats:
+    """(∂²E) d (n,3) for a motion d (n,3); ``mesh`` has the elements."""
+    add_products = add_element_products if mesh.curved else _add_triangle_products
+
+    def work(first: int, last: int, change: Floats) -> None:
+        add_products(mesh.part(first, last), X, d, change)
+
+    change: Floats = sum_blocks(work, len(mesh.faces), X.shape)
     add_hessian_products(elements(surface, X), d, change)
     return change
 
@@ -145,12 +168,12 @@ def _assemble_triangles(
     stiffness: float,
     data: Floats,
 ) -> None:
-    F, n = mesh.faces, vector(mesh.normal)
-    for f in range(len(F)):
+    rows, n = mesh.rows, vector(mesh.normal)
+    for f in range(len(rows)):
         t = triangle(mesh, X, f, hessian, stiffness)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            v, w, offset = F[f, i], F[f, j], pattern.offset[f, i]
+            v, w, offset = rows[f, i], rows[f, j], pattern.offset[f, i]
             alone, pair, q = triangle_block(t, i, i), triangle_block(t, i, j), triangle_skew(t, k)
             if t.sixth_w == 0.0:
                 _add_diagonal(space, pattern, v, alone, None, data)
@@ -176,7 +199,7 @@ def _assemble_curved(
         fill_block(mesh, X, e, hessian, stiffness, block)
         for i in range(size):
             for j in range(i, size):
-                v, w = mesh.faces[e, i], mesh.faces[e, j]
+                v, w = mesh.rows[e, i], mesh.rows[e, j]
                 if v <= w:
                     _add_projected(block[i, j], v, w, space, pattern, data)
                 else:
@@ -232,20 +255,37 @@ def _add_projected(block: Floats, v: int, w: int, space: MotionSpace, pattern: P
 
 @compiled
 def _add_triangle_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> None:
-    F, n = mesh.faces, vector(mesh.normal)
+    """Add (∂²E) d to change (n,3): how ∇E of ``measure_block`` changes along D."""
+    F, rows, origin, ground, n = (
+        mesh.faces,
+        mesh.rows,
+        vector(mesh.origin),
+        vector(mesh.ground),
+        vector(mesh.normal),
+    )
     for f in range(len(F)):
-        t = triangle(mesh, X, f, 1.0, 0.0)
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            v, w = F[f, i], F[f, j]
-            d, e, q = point(D, v), point(D, w), triangle_skew(t, k)
-            alone, pair, back = triangle_block(t, i, i), triangle_block(t, i, j), scaled(-1.0, q)
-            if t.sixth_w == 0.0:
-                at_v = add(_times(alone, None, None, d), _times(pair, q, None, e))
-                at_w = _times(pair, back, None, d)
-            else:
-                at_v = _times(alone, None, triangle_tilt(t, n, i, i), d)
-                at_v = add(at_v, _times(pair, q, triangle_tilt(t, n, i, j), e))
-                at_w = _times(pair, back, triangle_tilt(t, n, j, i), d)
-            accumulate(change, v, at_v)
-            accumulate(change, w, at_w)
+        i, j, k, patch = F[f, 0], F[f, 1], F[f, 2], mesh.patch[f]
+        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
+        da, db, dc = point(D, i), point(D, j), point(D, k)
+        u, v, du, dv = sub(b, a), sub(c, a), sub(db, da), sub(dc, da)
+        normal, change_of_normal = cross(u, v), cross_sum(du, v, u, dv)
+        twice_area = norm(normal)
+        scale = 1.0 / twice_area if twice_area > 0.0 else 0.0
+        nu = scaled(scale, normal)
+        growth = dot(nu, change_of_normal)  # of twice the area
+        half, turn, w = 0.5 * mesh.tension[patch], 0.0, mesh.weight[patch]
+        if w != 0.0:
+            middle = add(scaled(1.0 / 3.0, add(add(a, b), c)), origin)
+            half += 0.5 * w * dot(sub(middle, ground), n)
+            turn = w / 6.0 * dot(add(add(da, db), dc), n)
+        # ½ T ν and its change; the force on a is their product with e_a, less p/6 b × c, and w A n / 3
+        pull = scaled(half, nu)
+        dpull = add(scaled(half * scale, change_of_normal), scaled(turn - half * scale * growth, nu))
+        sixth_p, down = -mesh.pressure[patch] / 6.0, scaled(w / 6.0 * growth, n)
+        e, de = sub(v, u), sub(dv, du)
+        on_a = add(cross_sum(dpull, e, pull, de), scaled(sixth_p, cross_sum(db, c, b, dc)))
+        on_b = add(cross_sum(v, dpull, dv, pull), scaled(sixth_p, cross_sum(dc, a, c, da)))
+        on_c = add(cross_sum(dpull, u, pull, du), scaled(sixth_p, cross_sum(da, b, a, db)))
+        accumulate(change, rows[f, 0], add(on_a, down))
+        accumulate(change, rows[f, 1], add(on_b, down))
+        accumulate(change, rows[f, 2], add(on_c, down))

@@ -88,7 +88,7 @@ def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, 
     """
     parts = len(blocks(len(mesh.faces), workers or threads()))
     area, volume = np.zeros((2, parts, len(mesh.tension)))
-    gradient = np.zeros((parts, *X.shape))
+    gradient = [np.zeros(X.shape) for _ in range(parts)]
     weightless, moment = mesh.weighing(), np.zeros_like(area)
 
     def work(part: int, first: int, last: int) -> None:
@@ -99,8 +99,8 @@ def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, 
             measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
 
     run_blocks(work, len(mesh.faces), workers)
-    for part in range(1, parts):
-        gradient[0] += gradient[part]
+    for other in gradient[1:]:
+        gradient[0] += other
     return area.sum(axis=0), volume.sum(axis=0), gradient[0]
 
 

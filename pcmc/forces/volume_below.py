@@ -19,12 +19,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.tolerances import ON
 from ..surface import Surface
+from ..surface.images import lattice_of
 from .elements import Points, energy_mesh
 
 
 def volumes_below(surface: Surface) -> Floats:
-    """(k,) the volume V_i between each patch and Π, length³.
+    """(k,) the volume V_i between each patch and Π, length³; NaN where a periodic surface leaves Π.
 
     >>> from pcmc import Patch
     >>> X = [[0, 0, 5], [1, 0, 5], [0, 1, 8]]
@@ -32,6 +34,8 @@ def volumes_below(surface: Surface) -> Floats:
     >>> volumes_below(lid).tolist()  # the mean height 6 over a triangle of area ½
     [3.0]
     """
+    if surface.periodic and (np.abs(lattice_of(surface) @ surface.plane.normal) > ON * surface.size).any():
+        return np.full(len(surface.patches), np.nan)
     mesh = energy_mesh(surface)
     at = Points.of(mesh, surface.vertices)
     each = (surface.plane.height(at.place) * (at.area @ mesh.normal)).sum(axis=1)

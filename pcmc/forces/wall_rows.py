@@ -15,6 +15,7 @@ from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, vertex_sums
+from ..surface.images import expect_no_images
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
@@ -275,6 +276,8 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         if not np.isin(top, sliding).any():
             foot = np.where(feet >= 0, feet, foot)
             every.append((index, edges, top, feet))
+    if every:
+        expect_no_images(surface, "a wall that slides on the plane, or comes down to its held bottom")
     rows = join_rows([wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every])
     top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
     below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])

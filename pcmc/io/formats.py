@@ -67,6 +67,7 @@ ROOMS = "volumes of rooms (it has the pressures reached)"
 LINES = "lines or circles that vertices slide along (they are fixed in it)"
 
 ORDER = "its curved elements (it has the flat triangles that join their nodes)"
+IMAGES = "which vertices are images of others (it has the cell alone, with a boundary and without rooms)"
 
 
 class FormatPart(NamedTuple):
@@ -87,24 +88,27 @@ PARTS = {
     "planes": FormatPart(PLANES, 6, lambda surface, _: surface.on_planes),
     "curves": FormatPart("", 7, lambda surface, _: surface.held_curves),
     "order": FormatPart(ORDER, 9, lambda surface, _: surface.order > 1),
+    "images": FormatPart(IMAGES, 10, lambda surface, _: surface.periodic),
     "unit": FormatPart("its unit {unit}", 1, lambda _, units: units),
 }
 TOLD = tuple(name for name, part in PARTS.items() if part.words)
 OURS = ("support", "patch")
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
-    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "unit")),
-    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "unit")),
-    ".obj": Format("obj", loses=("order",)),
-    ".ply": Format("ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices"), loses=("order",)),
+    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit")),
+    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit")),
+    ".obj": Format("obj", loses=("order", "images")),
+    ".ply": Format(
+        "ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices"), loses=("order", "images")
+    ),
     ".stl": Format("stl", separate=True, bare=True, loses=TOLD),
-    ".vtp": Format("vtk", scalars="both", reserved=OURS),
-    ".vtu": Format("vtk", scalars="both", reserved=OURS),
-    ".glb": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
-    ".gltf": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order",)),
-    ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False, loses=("order",)),
-    ".3dm": Format("rhino", separate=True, members=True, own=("cables",), loses=("order",)),
-    ".ifc": Format("ifc", certificate=True, separate=True, members=True, loses=("order",)),
+    ".vtp": Format("vtk", scalars="both", reserved=OURS, loses=("images",)),
+    ".vtu": Format("vtk", scalars="both", reserved=OURS, loses=("images",)),
+    ".glb": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order", "images")),
+    ".gltf": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order", "images")),
+    ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False, loses=("order", "images")),
+    ".3dm": Format("rhino", separate=True, members=True, own=("cables",), loses=("order", "images")),
+    ".ifc": Format("ifc", certificate=True, separate=True, members=True, loses=("order", "images")),
 }
 """The formats by suffix."""
 METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")

@@ -55,6 +55,7 @@ class MeshData:
     bare: tuple[str, ...] = ()  # the patches without tension and pressure: their 1 is the same in any unit
     curves: tuple[HeldCurve, ...] = ()
     order: int = 1  # of the elements, as in Surface
+    images: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))  # as there
 
 
 def checked_data(data: MeshData) -> MeshData:
@@ -200,7 +201,7 @@ def to_surface(
     lines, planes = (data.lines, data.planes) if fixed is None else ((), ())
     drawn = held | (support == FIXED) if data.curves else held  # where the file's curves are
     supports = drawn, sliding, plane, lines, planes
-    parts = data.cables, data.rooms, data.curves, data.order
+    parts = data.cables, data.rooms, data.curves, data.order, data.images
     surface = Surface(X, data.faces, data.patch_of_face, patches, *supports, *parts)
     return surface if drawn is held or np.array_equal(drawn, held) else surface.rebuilt(fixed=held)
 

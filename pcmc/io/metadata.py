@@ -38,7 +38,7 @@ from .mesh_data import (
 
 DAMAGED = (ValueError, KeyError, TypeError, IndexError, AttributeError)
 CHANGED = "the surface has changed since it was written"
-PARTS = ("cables", "rooms", "lines", "planes", "slides", "order")
+PARTS = ("cables", "rooms", "lines", "planes", "slides", "order", "images")
 
 
 def metadata_text(
@@ -77,6 +77,7 @@ def metadata_text(
         "lines": [[astuple(guide), where(own)] for guide, own in guides if own.any()],
         "planes": [[astuple(plane), where(own)] for plane, own in planes if own.any()],
         "order": surface.order if surface.order > 1 else 0,
+        "images": surface.images.tolist(),
         "slides": [where((given == kind) & (plain != kind)) for kind in (FREE, SLIDING)] if planes else (),
     }
     return json.dumps(values | {key: part for key, part in parts.items() if part and key not in without})
@@ -208,6 +209,7 @@ def with_parts(data: MeshData) -> MeshData:
                     support[np.isin(group, own)] = kind
         rooms = tuple(Room(*row) for row in parts.get("rooms", ()))
         order = int(parts.get("order", 1))
+        images = within(parts["images"], "images", len(X)) if parts.get("images") else data.images
         guides = tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines)
         on_planes = () if off in lost else tuple((Plane(*row), own) for row, own in planes)
     except DAMAGED:
@@ -221,6 +223,7 @@ def with_parts(data: MeshData) -> MeshData:
         lines=guides,
         planes=on_planes,
         order=order,
+        images=images,
         notes=(*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else [])),
     )
 

@@ -89,6 +89,7 @@ def write(
     lost += form.lost(surface, units)
     if members and not form.members:
         lost.append("members")
+    surface = surface.cell if "images" in form.loses else surface
     if units and form.unit:
         surface = scaled_surface(surface, length_factor(units.length, form.unit))
         units = Units(form.unit, units.force)

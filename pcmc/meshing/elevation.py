@@ -8,6 +8,7 @@ from ..base.arrays import Bools, Floats
 from ..base.errors import CurvedContactError, SurfaceError
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
+from ..surface.images import expect_no_images
 from ..surface.lagrange import known_order, lattice
 from .refinement import Projection, refine
 
@@ -39,6 +40,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
     (2, 6, [[0, 1, 2, 3, 4, 5]])
     """
     expect_surface(surface)
+    expect_no_images(surface, "curved elements")
     known_order(order)
     if surface.order > 1:
         message = f"order: the surface is of order {surface.order} already; give order={surface.order}"

@@ -13,7 +13,19 @@ from ..base.compiled import compiled, inlined
 from ..forces.motion_space import motion_space
 from ..forces.pinching import StandingPart
 from ..surface import Surface
-from ..surface.geometry import angles, area_vectors, cross, dot, face_areas, norm, point, segment_lengths, sub
+from ..surface.geometry import (
+    accumulate,
+    add,
+    angles,
+    area_vectors,
+    cross,
+    dot,
+    norm,
+    point,
+    scaled,
+    segment_lengths,
+    sub,
+)
 from ..surface.supports import apply_supports, onto_circles
 from ..surface.topology import SHEET
 
@@ -83,7 +95,7 @@ def minimum_angle(surface: Surface) -> float:
 
 def edge_lengths(surface: Surface) -> Floats:
     """(e,) length of each edge, in the order of ``surface.topology.edges``."""
-    return segment_lengths(surface.vertices, surface.topology.edges)
+    return segment_lengths(surface.vertices, surface.topology.sides)
 
 
 def towards_star_centres(
@@ -95,15 +107,27 @@ def towards_star_centres(
     vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
     all; fixed vertices stay and sliding ones keep to Π.
     """
-    corners, corner = X[surface.faces], surface.faces.T.ravel()
-    area = face_areas(corners)
-    moment = area[:, None] * ((corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0)
-    total = np.bincount(corner, np.tile(area, 3), len(X))[:, None]
-    weighted = np.stack([np.bincount(corner, np.tile(m, 3), len(X)) for m in moment.T], axis=1)
-    move = np.where(total > 0.0, weighted / np.where(total > 0.0, total, 1.0) - X, 0.0)
+    move = _to_star_centres(X, surface.faces)
     move[kind != SHEET] = 0.0
     move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
     return apply_supports(surface, step * move, X)
+
+
+@compiled
+def _to_star_centres(X: Floats, F: Ints) -> Floats:
+    """(n,3) from each vertex to the area-weighted mean of its triangles' centroids; zero where no area is."""
+    total, area = np.zeros(X.shape), np.zeros(len(X))
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        weight = 0.5 * norm(cross(sub(b, a), sub(c, a)))
+        moment = scaled(weight / 3.0, add(add(a, b), c))
+        for k in range(3):
+            accumulate(total, F[f, k], moment)
+            area[F[f, k]] += weight
+    for v in range(len(X)):
+        for d in range(3):
+            total[v, d] = total[v, d] / area[v] - X[v, d] if area[v] > 0.0 else 0.0
+    return total
 
 
 def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:

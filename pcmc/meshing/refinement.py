@@ -13,6 +13,7 @@ from ..base.errors import OptionError
 from ..base.tolerances import ON
 from ..forces.pinching import standing_part, under_low
 from ..surface import Surface, expect_surface
+from ..surface.images import expect_no_images
 from ..surface.lagrange import middles_of_sides
 
 CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner
@@ -23,10 +24,10 @@ Projection = Callable[[Floats], Floats]
 def refine(surface: Surface, levels: int = 1, project: Projection | None = None) -> Surface:
     """The same surface with every triangle cut into four, ``levels`` times.
 
-    Vertex i keeps its number; the midpoint of edge e of ``surface.topology.edges`` becomes vertex
-    n + e. Face f becomes faces 4 f … 4 f + 3 (three at its corners, then the middle one), so a
-    per-face field is carried over by ``numpy.repeat(field, 4)`` and a per-vertex field by
-    ``prolongation(surface) @ field``.
+    Vertex i keeps its number; the midpoint of edge e of ``surface.topology.edges`` (of a periodic surface:
+    of ``surface.cell.topology.edges``) becomes vertex n + e. Face f becomes faces 4 f … 4 f + 3 (three at its
+    corners, then the middle one), so a per-face field is carried over by ``numpy.repeat(field, 4)`` and a
+    per-vertex field by ``prolongation(surface) @ field``.
 
     The midpoint of an edge on one of ``surface.curves`` is fixed, half way along the curve. On other edges a
     midpoint is held where both ends are held *and* the edge is part of that support, as far as can be told:
@@ -65,12 +66,26 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     """
     expect_surface(surface)
     for _ in range(refinable("levels", levels, surface.m)):
+        if surface.periodic:
+            surface = _refined_cell(surface, project)
+            continue
         a, b, c = surface.faces.T
         bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
         F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
         every = np.ones(len(surface.topology.edges), dtype=bool)
         surface = with_vertices_on(surface, every, F, np.repeat(surface.patch_of_face, 4), project)
     return surface
+
+
+def _refined_cell(surface: Surface, project: Projection | None) -> Surface:
+    """One refinement of a periodic surface: where edges are images of each other, so are their midpoints."""
+    topo, edges = surface.topology, surface.cell.topology.edges
+    number, k = topo.edge_numbers(surface.original[edges]), np.arange(len(edges))
+    columns = np.concatenate([surface.support_columns, edge_columns(surface)[number]])
+    vertex = np.unique(number, return_index=True)[1][number]
+    midpoints = surface.n + np.stack([k, vertex], axis=1)[vertex != k]
+    fine = refine(surface.cell, 1, project)
+    return fine.with_mesh(columns, images=np.concatenate([surface.images, midpoints]))
 
 
 def refinable(name: str, levels: object, triangles: int) -> int:
@@ -91,6 +106,7 @@ def prolongation(surface: Surface) -> csr_array:
     >>> (prolongation(one) @ [0.0, 1.0, 2.0]).tolist()
     [0.0, 1.0, 2.0, 0.5, 1.0, 1.5]
     """
+    expect_no_images(surface, "prolongation")
     n, edges = surface.n, surface.topology.edges
     e = len(edges)
     columns = np.concatenate([np.arange(n), edges.ravel()])

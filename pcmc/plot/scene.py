@@ -125,6 +125,7 @@ def scene(
 
     ``values`` are None for patch colours, or RGB (n,3) or (m,3), NaN where there is none.
     """
+    surface = surface.cell
     shown = np.ones(surface.m, dtype=bool)
     if patches is not None:
         shown = surface.patch_faces([surface.patch_index(name) for name in patches])

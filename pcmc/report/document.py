@@ -21,6 +21,7 @@ from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png
 from ..surface import Surface, expect_surface
+from ..surface.images import expect_no_images
 from . import tables
 from .chapters import at_rest_chapter, cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
@@ -171,6 +172,7 @@ def roof_report(
     '1:20'
     """
     expect_surface(surface)
+    expect_no_images(surface, "a report")
     units = as_units(units)
     expect_length(units.length, "a report")
     register_fonts()

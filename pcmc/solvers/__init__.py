@@ -62,6 +62,7 @@ def solve_once(
     cannot = "slide vertices along lines" if surface.on_line else ""
     cannot = cannot or next((f"keep the volume of room {room.name!r}" for room in surface.rooms), "")
     cannot = cannot or ("move curved elements" if surface.order > 1 else "")
+    cannot = cannot or ("move a periodic surface" if surface.periodic else "")
     if cannot and method != "newton":
         message = f"method {method!r} cannot {cannot}; use method='newton'"
         raise OptionError(message, what="method", found=method, expected="newton")
@@ -127,7 +128,7 @@ def solve(
     the pressure is 2.50 times what the boundary's tension could carry on any smooth surface
     """
     first = solve_once(surface, method, callback, **options)
-    if method != "newton" or first.converged or first.surface.order > 1:
+    if method != "newton" or first.converged or first.surface.order > 1 or surface.periodic:
         return first
     from .search import search
 

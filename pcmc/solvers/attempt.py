@@ -16,6 +16,7 @@ from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
 from ..stability.modes import clear_of_zero
 from ..surface import Surface
+from ..surface.geometry import bounding_size
 from ..surface.lagrange import known_order
 from .result import Callback, Progress, Status, until_stopped
 from .state import SolverState
@@ -235,7 +236,7 @@ class NewtonRun:
         if not np.isfinite(state.energy):
             return Status.NON_FINITE
         collapsed = state.quality < COLLAPSED
-        extent = np.linalg.norm(np.ptp(state.at.X, axis=0)) / state.size
+        extent = bounding_size(state.at.X) / state.size
         # triangles of a surface that inflates may collapse on the way
         if extent > inflation or (collapsed and extent > np.sqrt(inflation)):
             return Status.DIVERGED

@@ -40,7 +40,7 @@ class Smoother:
         self._moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
         self._classes = replace(classes, active=np.ones(surface.m, dtype=bool), nodes=surface.nodes, **faces)
-        used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
+        used = np.bincount(surface.topology.faces.ravel(), minlength=surface.n) > 0
         self._surface, self._axes = surface, _axes(surface)
         self._free, self._number = _free_coordinates(surface, used, self._axes)
         self._spaces = [_one_unknown_each(free) for free in self._free]
@@ -63,7 +63,7 @@ class Smoother:
             place = np.ix_(free, self._number == number)
             out[place] = factor.solve(local[place])
         out = out @ self._axes
-        return apply_supports(self._surface, out) if self._surface.on_planes else out
+        return self._surface.spread(apply_supports(self._surface, out) if self._surface.on_planes else out)
 
 
 def _axes(surface: Surface) -> Floats:
@@ -100,7 +100,7 @@ def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list
 
 def _largest_around(surface: Surface) -> Floats:
     """(patches,) the largest tension in the connected parts of the surface that a patch belongs to."""
-    part = surface.topology.components[surface.faces[:, 0]]
+    part = surface.topology.components[surface.topology.faces[:, 0]]
     of_part, of_patch = np.zeros(part.max() + 1), np.zeros(len(surface.patches))
     np.maximum.at(of_part, part, surface.tensions[surface.patch_of_face])
     np.maximum.at(of_patch, surface.patch_of_face, of_part[part])
@@ -159,7 +159,7 @@ class HarmonicExtension:
         """The motion (n,3) with the sheets' vertices following the curves."""
         w = self.harmonic(motion)
         w[self._prescribed] = 0.0
-        apply_supports(self._surface, w)
+        w = self._surface.spread(apply_supports(self._surface, w))
         return motion + w - space.project(w)
 
     def harmonic(self, motion: Floats) -> Floats:

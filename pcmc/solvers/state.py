@@ -50,7 +50,8 @@ class SolverState:
     def __init__(
         self, surface: Surface, min_quality: float, held: bool = False, backend: str | None = None
     ) -> None:
-        self.min_quality = min_quality if surface.order == 1 else 0.0  # nodes stay where they are in elements
+        # nodes stay where they are in elements, and vertices of a periodic surface along it
+        self.min_quality = 0.0 if surface.order > 1 or surface.periodic else min_quality
         self.size, self.backend = surface.size, backend
         self.pressures = np.zeros(len(surface.rooms))  # (r,) δ, their changes since the start
         part = standing_part(surface)
@@ -117,7 +118,7 @@ class SolverState:
         if not len(self.pressures):
             return X
         surface, wanted = self.at.surface, self.at.volume_defects + self.at.wanted_volumes
-        area = vertex_area_vectors(X, self.at.classes.faces)[1]
+        area = vertex_area_vectors(X, self.at.classes.faces, self.at.classes.topology.faces)[1]
         for _ in range(VOLUME_STEPS):
             left = wanted - volumes_at(surface, X)
             if (np.abs(left) <= ROOM_VOLUME * np.abs(self.at.wanted_volumes)).all():
@@ -125,7 +126,7 @@ class SolverState:
             G = volume_gradients_at(surface, X)
             even = G / np.where(area > 0.0, area, 1.0)[:, None]
             small = np.einsum("rnd,snd->rs", G, even)
-            X = X + np.tensordot(np.linalg.lstsq(small, left)[0], even, axes=1)
+            X = X + surface.spread(np.tensordot(np.linalg.lstsq(small, left)[0], even, axes=1))
         return onto_circles(surface, X)
 
     @property
@@ -169,6 +170,8 @@ class SolverState:
         """
         if self.at.surface.order > 1:
             return self._blend_elements()
+        if self.at.surface.periodic:
+            return False
         start, residual = self.quality, self.at.residual
         due = start < self._poor_quality and 1e-7 <= residual < self._small_residual
         if not due or self._redistributions_left <= 0:

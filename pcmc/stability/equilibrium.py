@@ -126,12 +126,16 @@ class Equilibrium:
     def forces(self) -> Floats:
         """r = Bᵀ∇E (N,), force; along the motions ``carried`` theirs, not that of their part across."""
         r, (modes, motions) = self.space.to_coordinates(self.gradient), self.carried
+        if not len(motions):
+            return r
         return r + modes @ (net_forces(motions, self.X, self.gradient) - modes.T @ r)
 
     @cached_property
     def unbalanced(self) -> Floats:
-        """B r (n,3), the forces that are left, force."""
-        return self.space.to_vectors(self.forces)
+        """B r (n,3), the forces that are left, force; zero at images of vertices."""
+        left = self.space.to_vectors(self.forces)
+        left[self.surface.images[:, 0]] = 0.0
+        return left
 
     @cached_property
     def scale(self) -> float:
@@ -236,24 +240,26 @@ class Equilibrium:
         unknown: so a patch that pulls far less than another still counts.
         """
         pattern, patch = hessian_pattern(self.classes, self.space), self.classes.patch_of_face
-        tension, units = self.surface.tensions[np.unique(patch)], None
+        tension, units = self.surface.tensions[np.flatnonzero(np.bincount(patch))], None
         if len(tension) and tension.min() < STRONG * tension.max():
             strongest = np.zeros(len(self.X))
-            np.maximum.at(strongest, self.classes.faces, self.surface.tensions[patch, None])
+            np.maximum.at(strongest, self.classes.topology.faces, self.surface.tensions[patch, None])
             units = 2.0 ** -np.round(0.5 * np.log2(np.repeat(strongest, self.space.dimension)))
         return pattern, factoriser(pattern, self.backend, units)
 
     @cached_property
     def mass(self) -> Floats:
         """M (N,), a third of the area of the active triangles around each unknown's vertex, length²."""
-        return np.repeat(vertex_area_vectors(self.X, self.classes.faces)[1] / 3.0, self.space.dimension)
+        area = vertex_area_vectors(self.X, self.classes.faces, self.classes.topology.faces)[1]
+        return np.repeat(area / 3.0, self.space.dimension)
 
     @cached_property
     def tension_mass(self) -> Floats:
         """(N,) a third of tension times area, summed over the active triangles around a vertex."""
         F = self.classes.faces
         pull = self.surface.tensions[self.classes.patch_of_face] * face_areas(self.X[F]) / 3.0
-        return np.repeat(np.bincount(F.ravel(), np.repeat(pull, 3), len(self.X)), self.space.dimension)
+        sums = np.bincount(self.classes.topology.faces.ravel(), np.repeat(pull, 3), len(self.X))
+        return np.repeat(sums, self.space.dimension)
 
     @cached_property
     def rigid_motions(self) -> Floats:

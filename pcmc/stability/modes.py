@@ -26,6 +26,7 @@ from .equilibrium import Equilibrium, SecondVariation
 from .factorisation import SingularMatrix
 
 DENSE = 40  # unknowns up to which all eigenvalues are computed at once
+CELL_TOLERANCE = 1e-12  # of the eigenvalues of a periodic surface's inverse
 
 
 @dataclass(frozen=True)
@@ -164,8 +165,10 @@ def _nearest(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
 
     operator = LinearOperator((size, size), inverse, dtype=float)
     start = inverse(np.cos(np.arange(size) * 1.618))  # always the same, so that runs repeat
+    # in cells, whose translations are left out, rounding may let no vector converge to the last digit
+    tolerance = CELL_TOLERANCE if system.of.surface.periodic else 0.0
     try:
-        vectors = eigsh(operator, k=k, which="LM", v0=start)[1] / root[:, None]
+        vectors = eigsh(operator, k=k, which="LM", v0=start, tol=tolerance)[1] / root[:, None]
     except ArpackError as error:
         raise SingularMatrix(f"the eigenvalues did not converge ({error})") from None
     values = np.einsum("ik,ik->k", vectors, system.matrix @ vectors)

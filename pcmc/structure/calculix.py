@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..base.errors import FileError, PcmcError
@@ -24,7 +24,8 @@ MISSING = (
 )
 
 
-NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum")  # in what the program prints
+# in what the program prints where it finds no equilibrium; other errors are of the model or of the program
+NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum", "nonpositive jacobian")
 
 
 class CalculixError(PcmcError):
@@ -67,13 +68,8 @@ def run_as_far(
     with folder_for_input() as path:
         with writing(path):
             path.write_text(text_of(model, steps, every=True), encoding="utf-8", newline="\n")
-        try:
+        with suppress(NotConverged):
             run_file(path, timeout)
-        except NotConverged:
-            pass
-        except CalculixError as error:
-            if not path.with_suffix(".dat").exists() or "within" in str(error):
-                raise
         try:
             found = read_steps(path.with_suffix(".dat"), model, steps)
         except FileError as error:

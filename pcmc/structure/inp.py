@@ -73,8 +73,10 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
     for cable, area, _, numbers, along in model.cable_edges():
         pull = pull_along(surface, cable, cable.edges)[:, None, None]
         text += [_stresses(numbers, pull / area * along[:, :, None] * along[:, None, :], CABLE_POINTS)]
-    if model.lines:  # members take over from what held the form, while its pressure stays
-        text += ["*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n*AMPLITUDE, NAME=RELEASED\n0.,1.,1.,0.\n"]
+    if model.lines:  # members take over from what held the form, while its loads stay
+        text += ["*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n"]
+        rows = f"*AMPLITUDE, NAME=AT_%d_%d\n0.,{FIELD},1.,{FIELD}\n"
+        text += [format_rows(rows, *_released(model, steps[0]))]
     return "".join(chain(text, *(_step(model, step, k == 0, every) for k, step in enumerate(steps))))
 
 
@@ -219,12 +221,15 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterat
     if not rows:  # without a line the loads of the step before would stay
         rows = [f"EALL,{label},0.\n"]
     yield "".join([f"*DLOAD, OP=NEW{', AMPLITUDE=WHOLE' if released else ''}\n", *rows])
+    forces, others = _in_axes(model, step.forces), model.nodes
     if released:
-        yield "*CLOAD, OP=NEW, AMPLITUDE=RELEASED\n"
-        yield from _forces(model, -forces_on_members(model, step) * model.on_members[:, None])
-    if step.forces[model.nodes].any():
+        vertex, axis = _released(model, step)[:2]
+        yield format_rows("*CLOAD, AMPLITUDE=AT_%d_%d\n%d,%d,1.\n", vertex, axis, vertex, axis)
+        others = others & ~model.on_members
+    if forces[others].any():
         yield f"*CLOAD{', AMPLITUDE=WHOLE' if released else ', OP=NEW'}\n"
-        yield from _forces(model, step.forces)
+        vertex, axis = np.nonzero(forces * others[:, None])
+        yield format_rows(f"%d,%d,{FIELD}\n", vertex + 1, axis + 1, forces[vertex, axis])
     elif not form:
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
     often = 1 if every else 1000
@@ -237,11 +242,21 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterat
     yield "*END STEP\n"
 
 
-def _forces(model: StructuralModel, forces: Floats) -> Iterator[str]:
-    """Forces (n,3) on the nodes, in the axes of these."""
-    forces = np.einsum("nij,nj->ni", model.axes, forces)
-    vertex, axis = np.nonzero(forces * model.nodes[:, None])
-    yield format_rows(f"%d,%d,{FIELD}\n", vertex + 1, axis + 1, forces[vertex, axis])
+def _in_axes(model: StructuralModel, forces: Floats) -> Floats:
+    """Forces (n,3) on the vertices, in the axes of the nodes."""
+    return np.asarray(np.einsum("nij,nj->ni", model.axes, forces))
+
+
+def _released(model: StructuralModel, step: Step) -> tuple[Ints, Ints, Floats, Floats]:
+    """The nodes on members, their axes 1 to 3, and the force there when the step begins and ends: at first
+    what keeps the members free of forces, at the end the loads alone.
+
+    The program takes one course in time for each, so that both are one load.
+    """
+    end = _in_axes(model, step.forces)
+    start = end - _in_axes(model, forces_on_members(model, step))
+    vertex, axis = np.nonzero(((start != 0.0) | (end != 0.0)) & (model.nodes & model.on_members)[:, None])
+    return vertex + 1, axis + 1, start[vertex, axis], end[vertex, axis]
 
 
 def _set(name: str, members: Ints, kind: str = "NSET") -> str:

@@ -11,6 +11,7 @@ from ..base.errors import SurfaceError
 from . import checks
 from .guides import Plane
 from .held_curve import checked_curves
+from .images import checked_images, glued, originals
 from .lagrange import checked_order, element_nodes, sides_along
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes
@@ -39,7 +40,9 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     patch = read_only(checks.patch_array(given["patch_of_face"], len(F), names))
     fixed, lines = checks.mask(given["fixed"], n, "fixed"), checked_lines(given["on_line"], X)
     supports = Supports(fixed, checks.mask(given["on_plane"], n, "on_plane"), lines)
-    topo = topology(F, patch, n)
+    heavy = any(patch.weight for patch in patches)
+    images = checked_images(given["images"], X, F, fixed, supports.on_plane, plane, heavy)
+    topo = glued(F, patch, originals(images, n)) if len(images) else topology(F, patch, n)
     planes = checked_planes(given["on_planes"], X, F, patch, names, topo, fixed)
     resolved = supports.resolved(plane, planes)
     cables, rooms = checked_cables(given["cables"], topo), checked_rooms(given["rooms"], names)
@@ -48,6 +51,11 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     checks.mesh(X, F, patch, topo, patches, bound, plane.height(X))
     check_on([(plane, resolved["on_plane"]), *planes], X, size)
     order = checked_order(given["order"], F, patch)
+    curves = checked_curves(given["curves"], X, topo, fixed & ~supports.guided, size)
+    parts = {"cables": cables, "on_planes": planes, "on_line": lines, "curves": curves, "order": order > 1}
+    if len(images) and (others := [name for name, part in parts.items() if part]):
+        message = f"images: a periodic surface cannot have {', '.join(others)}; leave one of both out"
+        raise SurfaceError(message, what="images", found=others)
     for cable in cables if order > 1 else ():
         if order * len(sides_along(element_nodes(F, order), order, cable.edges)) < len(cable.edges):
             message = f"cable {cable.name!r}: its edges are no whole sides of elements of order {order};"
@@ -63,7 +71,8 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
         "on_planes": planes,
         "cables": cables,
         "rooms": rooms,
-        "curves": checked_curves(given["curves"], X, topo, fixed & ~supports.guided, size),
+        "curves": curves,
         "given_supports": supports.frozen(),
+        "images": images,
         "topology": topo,
     }

@@ -96,6 +96,15 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
     return result
 
 
+def pair_array(pairs: Any, what: str, n: int) -> Ints:
+    """(k,2) int64 pairs of vertices within 0..n-1."""
+    E = _integers(pairs, what)
+    if E.ndim != 2 or E.shape[1] != 2:
+        refuse_shape(what, E, "(k, 2), pairs of an image and its vertex")
+    _within(what, E, n, "vertex")
+    return E
+
+
 def edge_array(edges: Any, what: str) -> Ints:
     """(k,2) int32 pairs of vertices, the smaller first, in ascending order, none twice."""
     E = _integers(edges, what)
@@ -128,8 +137,9 @@ def mesh(
     if len(bad):
         fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
         refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
-    if not _perhaps_at_fault(F, patch, topo.edge_of_face, len(topo.edges)):
+    if not _perhaps_at_fault(topo.faces, patch, topo.edge_of_face, len(topo.edges)):
         return
+    F = topo.faces  # images and their vertices as one
     pair = np.sort(topo.edge_of_face, axis=1).astype(np.int64)  # two edges make a triangle
     for first, second in _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1]):
         message = f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one"

@@ -88,18 +88,38 @@ def accumulate(out: Floats, i: int, a: Vector) -> None:
 
 
 @compiled
-def vertex_area_vectors(X: Floats, F: Ints) -> tuple[Floats, Floats]:
-    """Σ A_T ν_T (n,3) and Σ A_T (n,) over the triangles around each vertex."""
+def vertex_area_vectors(X: Floats, F: Ints, rows: Ints | None = None) -> tuple[Floats, Floats]:
+    """Σ A_T ν_T (n,3) and Σ A_T (n,) over the triangles around each vertex.
+
+    The sums of a triangle's corners F (m,3) are in ``rows`` (m,3), those of the vertices that they are images
+    of; by default their own.
+    """
+    rows = F if rows is None else rows
     total, area = np.zeros(X.shape), np.zeros(len(X))
     for f in range(len(F)):
         a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
         area_vector = scaled(0.5, cross(sub(b, a), sub(c, a)))
         face_area = norm(area_vector)
         for k in range(3):
-            v = F[f, k]
+            v = rows[f, k]
             accumulate(total, v, area_vector)
             area[v] += face_area
     return total, area
+
+
+@compiled
+def squared_sides(X: Floats, F: Ints) -> Floats:
+    """(m,) the squared lengths of each triangle's sides, added up, length².
+
+    >>> squared_sides(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).tolist()
+    [4.0]
+    """
+    out = np.empty(len(F))
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        u, v, w = sub(c, b), sub(a, c), sub(b, a)
+        out[f] = dot(u, u) + dot(v, v) + dot(w, w)
+    return out
 
 
 @compiled

@@ -20,6 +20,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats, Ints, read_only
 from ..base.errors import PcmcError, SurfaceError
+from .images import expect_no_images
 from .topology import edge_places
 
 ORDERS = (1, 2, 4, 8)
@@ -71,12 +72,13 @@ def checked_order(given: object, F: Ints, patch: Ints) -> int:
 
 
 def expect_flat(surface: Any, what: str) -> None:
-    """Refuse a Surface of curved elements where ``what`` is about flat triangles.
+    """Refuse a Surface of curved elements, or a periodic one, where ``what`` is about flat triangles alone.
 
     >>> from pcmc import Patch, Surface
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=[0])
     >>> expect_flat(flat, "the panels")
     """
+    expect_no_images(surface, what)
     if surface.order > 1:
         message = f"{what}: only for flat triangles, and the elements are of order {surface.order}; type"
         message += " order = 1 under [solve], or pass surface.rebuilt(order=1), the triangles that join the"

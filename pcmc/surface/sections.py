@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Floats
+from .images import expect_no_images
 from .surface import Surface
 from .topology import EdgeCurve, joined
 
@@ -37,6 +38,7 @@ def section(surface: Surface, point: Floats, normal: Floats) -> list[Polyline]:
     >>> line.closed, np.abs(line.points[:, :2]).tolist()
     (True, [[0.5, 0.5], [0.5, 0.5], [0.5, 0.5], [0.5, 0.5]])
     """
+    expect_no_images(surface, "a section")
     topo, X = surface.topology, surface.vertices
     height = (X - point) @ normal
     above = height >= 0.0

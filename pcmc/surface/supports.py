@@ -103,6 +103,7 @@ class Supported:
     on_line: tuple[tuple[Guide, Bools], ...]
     on_planes: tuple[tuple[Plane, Bools], ...]
     given_supports: Supports
+    images: Ints
 
     @cached_property
     def meeting_lines(self) -> tuple[tuple[Guide, Bools], ...]:
@@ -146,7 +147,9 @@ class Supported:
     @cached_property
     def admissible(self) -> Admissible:
         """The directions in which the supports let each vertex move, where it is now."""
-        return Admissible.of(self.fixed, self.sliding, self.on_line, self.vertices)
+        held = self.fixed.copy()
+        held[self.images[:, 0]] = True  # an image moves with its vertex, which has the motions of both
+        return Admissible.of(held, self.sliding, self.on_line, self.vertices)
 
     def admissible_at(self, X: Floats) -> Admissible:
         """The same with the vertices at X (n,3): only along circles do the directions change."""

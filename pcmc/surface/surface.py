@@ -20,9 +20,9 @@ from .checked import checked_parts
 from .geometry import bounding_size
 from .guides import Guide, Plane
 from .held_curve import EdgesOnCurves, HeldCurve, followed
+from .images import Imaged, check_translations
 from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs, summary
-from .topology import Topology, topology
 from .values import part_index, wall_patches, with_values
 
 
@@ -48,7 +48,7 @@ def expect_surface(value: object) -> None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Surface(supports.Supported):
+class Surface(supports.Supported, Imaged):
     """A triangle mesh of several patches, with its supports.
 
     Parameters
@@ -73,6 +73,8 @@ class Surface(supports.Supported):
         Where fixed vertices are moved, see ``held_curves``.
     order : 1 for flat triangles; 2, 4 or 8 for curved elements of this order (``pcmc.surface.lagrange``),
         each of order² triangles in a row, as ``pcmc.meshing.elevation.elevate`` makes them.
+    images : (k,2) int: an image, and the vertex that it is a translated copy of, as ``pcmc.images_in`` gives
+        them. The surface goes on there: it is periodic.
 
     Attributes
     ----------
@@ -103,6 +105,7 @@ class Surface(supports.Supported):
     rooms: tuple[Room, ...] = ()
     curves: tuple[HeldCurve, ...] = ()
     order: int = 1
+    images: Ints = field(default=cast(Ints, ()))
     given_supports: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -110,7 +113,7 @@ class Surface(supports.Supported):
         self._warn_if_free(stacklevel=4)
 
     def _warn_if_free(self, stacklevel: int) -> None:
-        if not (self.held.any() or self.rooms):
+        if not (self.held.any() or self.rooms or self.periodic):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
             message += " have an equilibrium; pass fixed= or on_plane= to hold it"
             warnings.warn(message, FreeSurfaceWarning, stacklevel=stacklevel)
@@ -129,11 +132,6 @@ class Surface(supports.Supported):
     def size(self) -> float:
         """Diagonal of the bounding box, length: the scale of every relative tolerance."""
         return bounding_size(self.vertices)
-
-    @cached_property
-    def topology(self) -> Topology:
-        """Edges, curves and points, from the faces alone; shared by all moved copies."""
-        return topology(self.faces, self.patch_of_face, len(self.vertices))
 
     @cached_property
     def nodes(self) -> Ints:
@@ -251,14 +249,15 @@ class Surface(supports.Supported):
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
         supports.check_on(((self.plane, self.on_plane), *self.on_planes, *self.on_line), X, self.size)
+        check_translations(self, X)
         return self._with(vertices=read_only(X))
 
     def rebuilt(self, **changes: Any) -> Surface:
         """The surface with other parts, checked anew; all others as they were given to this one.
 
         Parts with an entry per vertex (``fixed``, ``on_plane``, ``on_line``, ``on_planes``, ``cables``,
-        ``curves``) must be among the changes where the vertices are others. Curves stay along the edges that
-        stay fixed. Of a surface that nothing holds the user was warned when it was made, and not again.
+        ``curves``, ``images``) must be among the changes where the vertices are others. Curves stay along the
+        edges that stay fixed. Of a surface that nothing holds the user was warned once, when it was made.
 
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=range(3))

@@ -15,6 +15,7 @@ from ..base.errors import SurfaceError
 from ..base.tolerances import ON, PARALLEL
 from .guides import Guide, Plane
 from .held_curve import HeldCurve
+from .images import expect_no_images
 from .lagrange import turned_over
 from .parts import Cable, Room
 from .supports import refuse_in_mirror
@@ -47,6 +48,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     ([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], True)
     """
     expect_surface(surface)
+    expect_no_images(surface, "cut")
     if not isinstance(plane, Plane):
         validate.refuse("plane", plane, "a Plane", error=SurfaceError)
     plane = replace(plane, mirror=True)
@@ -180,6 +182,7 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
     2
     """
     expect_surface(surface)
+    expect_no_images(surface, "mirrored")
     mirrors = _chosen(surface, planes)
     masks = np.array([mask for _, mask in mirrors])
     images, next_to = _group([plane for plane, _ in mirrors], surface)

@@ -50,6 +50,7 @@ class Topology:
     edges: Ints  # (e,2) each row ascending, rows in lexicographic order
     edge_of_face: Ints  # (m,3) entry (f,k) is the edge opposite corner k of face f
     valence: Ints  # (e,) the number of triangles at each edge
+    placed: Ints | None = None  # (m,3) the faces with images of vertices, where some are images of others
 
     def __post_init__(self) -> None:
         for array in (self.edges, self.edge_of_face, self.valence):
@@ -60,6 +61,18 @@ class Topology:
         """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
         ascends = self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]
         return np.where(ascends, np.int8(1), np.int8(-1))
+
+    @cached_array
+    def sides(self) -> Ints:
+        """(e,2) the ends of each edge as its first face has them: images of those of ``edges``, or these.
+
+        Only at these places are they as far apart as the edge is long.
+        """
+        if self.placed is None:
+            return self.edges
+        face, corner = np.divmod(np.unique(self.edge_of_face, return_index=True)[1], 3)
+        ends = self.placed[face[:, None], (corner[:, None] + [1, 2]) % 3]
+        return np.where(self.sense[face, corner, None] < 0, ends[:, ::-1], ends)
 
     @cached_array
     def one_way_edge(self) -> Bools:
@@ -161,7 +174,10 @@ class Topology:
     @cached_array
     def components(self) -> Ints:
         """(n,) int: label of the connected part that each vertex belongs to."""
-        return components(self.edges, self.vertex_count)
+        label = components(self.edges, self.vertex_count)
+        if self.placed is not None:
+            label[self.placed] = label[self.faces]
+        return label
 
     def _curves(self, mask: Bools, stop: Bools) -> tuple[EdgeCurve, ...]:
         sides = np.flatnonzero(mask[self.edge_of_face.ravel()])
@@ -173,8 +189,8 @@ class Topology:
         )
 
 
-def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
-    """The topology of faces (m,3) whose patches are ``patch_of_face`` (m,).
+def topology(faces: Ints, patch_of_face: Ints, vertex_count: int, placed: Ints | None = None) -> Topology:
+    """The topology of faces (m,3) whose patches are ``patch_of_face`` (m,); ``placed`` as in Topology.
 
     >>> import numpy as np
     >>> t = topology(np.array([[0, 1, 2], [0, 2, 3]]), np.array([0, 0]), 4)
@@ -183,7 +199,7 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     """
     corners = np.ascontiguousarray(faces, dtype=np.int32)
     edges, edge_of_face, valence = _number_edges(corners, vertex_count)
-    return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence)
+    return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence, placed)
 
 
 def edge_places(wanted: Ints, edges: Ints) -> Ints:

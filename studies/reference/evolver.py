@@ -16,6 +16,7 @@ import numpy as np
 
 import pcmc
 from pcmc.base.arrays import Floats
+from pcmc.surface.images import lattice_of
 from pcmc.surface.supports import apply_supports
 
 PROGRAM = "evolver"
@@ -66,6 +67,37 @@ def run_datafile(text: str, commands: str, timeout: float = 600.0) -> str:
         errors = re.findall(r"^.*(?:ERROR|syntax error).*$", done.stderr, re.M)
         raise EvolverError(f"{PROGRAM}: {'; '.join(errors)}")
     return done.stdout
+
+
+def torus_datafile(surface: pcmc.Surface) -> str:
+    """The text of a datafile for a surface that is periodic in three directions, in the torus of its cell.
+
+    An edge from a to b is given with how often it wraps around each side of the cell, -, * or + once all
+    vertices are moved into one cell. Each room is a body.
+    """
+    topo, T = surface.topology, lattice_of(surface)
+    used = np.unique(topo.faces)
+    X = surface.vertices - np.floor(surface.vertices @ np.linalg.inv(T) + 1e-9) @ T
+    (a, b), (start, end) = topo.edges.T, surface.vertices[topo.sides.T]
+    wraps = np.rint((end - start - (X[b] - X[a])) @ np.linalg.inv(T)).astype(int)
+    if np.abs(wraps).max() > 1:
+        raise EvolverError("an edge wraps around the cell more than once; take a finer mesh")
+    place = np.full(surface.n, -1)
+    place[used] = np.arange(1, len(used) + 1)
+    lines = ["TORUS", "periods", *(" ".join(map(repr, row)) for row in T.tolist()), "", "vertices"]
+    lines += [f"{place[v]} {x!r} {y!r} {z!r}" for v, (x, y, z) in zip(used, X[used].tolist(), strict=True)]
+    signs = np.array(["-", "*", "+"])[wraps + 1]
+    ends = zip(place[a].tolist(), place[b].tolist(), signs.tolist(), strict=True)
+    lines += ["", "edges", *(f"{k} {i} {j} {' '.join(w)}" for k, (i, j, w) in enumerate(ends, 1))]
+    sides = ((topo.edge_of_face + 1) * topo.sense)[:, [2, 0, 1]].tolist()
+    pulls = surface.tensions[surface.patch_of_face].tolist()
+    faces = enumerate(zip(sides, pulls, strict=True), 1)
+    lines += ["", "faces", *(f"{k} {i} {j} {l} tension {t!r}" for k, ((i, j, l), t) in faces)]
+    lines += ["", "bodies"] * bool(surface.rooms)
+    for k, room in enumerate(surface.rooms):
+        own = np.arange(1, surface.m + 1) * surface.room_signs[k][surface.patch_of_face].astype(int)
+        lines.append(f"{k + 1} {' '.join(map(str, own[own != 0].tolist()))} volume {room.volume!r}")
+    return "\n".join([*lines, "", "read"])
 
 
 def energy(surface: pcmc.Surface, commands: str = "", upright: bool = False) -> float:

@@ -8,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import generic, hexagon, pyramid, rotation, shaken, three_patches
 
-from pcmc import Patch, Plane, Surface, energy, gradient
+from pcmc import Patch, Plane, Surface, energy, gradient, hessian
 from pcmc.base import compiled
+from pcmc.forces.elements import energy_mesh
 from pcmc.forces.functional import energy_and_gradient, patch_areas
+from pcmc.forces.second_variation import hessian_product
 
 seeds = st.integers(0, 2**32 - 1)
 small = st.floats(-10.0, 10.0)
@@ -103,6 +105,21 @@ def test_threads_do_not_change_the_answer(small_blocks, workers):
         np.testing.assert_allclose(d, g, atol=1e-14)
         assert other == again[0][0]  # the same bytes every time
         assert d.tobytes() == again[0][1].tobytes()
+
+
+@pytest.mark.parametrize("workers", [2, 3, 8])
+def test_threads_do_not_change_the_second_variation(small_blocks, monkeypatch, workers):
+    surface = generic()
+    d = np.random.default_rng(0).standard_normal((surface.n, 3))
+
+    def second(threads):
+        monkeypatch.setenv("PCMC_THREADS", str(threads))
+        return hessian(surface).data, hessian_product(surface, energy_mesh(surface), surface.vertices, d)
+
+    one, several, again = second(1), second(workers), second(workers)
+    for by_one, by_several, once_more in zip(one, several, again, strict=True):
+        np.testing.assert_allclose(by_several, by_one, atol=1e-14 * np.abs(by_one).max())
+        assert by_several.tobytes() == once_more.tobytes()
 
 
 @pytest.mark.nightly

@@ -1,5 +1,7 @@
 """Tensions tied to each other, and named points of a plan."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -64,6 +66,16 @@ def test_a_named_point_is_a_free_vertex_of_the_mesh():
     assert away.min() < 1e-12
     assert surface.free[away.argmin()]
     assert surface.vertices[away.argmin(), 2] > 0.1
+
+
+def test_a_support_may_have_a_name():
+    plan = Plan(HALL, tension=4.0, edge_length=1.0, supports=[[2.3, 2.6, 1.5]], points={"mast": [2.3, 2.6]})
+    surface = plan.surface()
+    (mast,) = np.flatnonzero(np.linalg.norm(surface.vertices[:, :2] - [2.3, 2.6], axis=1) < 1e-12)
+    assert surface.pinned[mast]
+    assert surface.vertices[mast, 2] == 1.5
+    with refused(PlanError, what="supports", where=(2.3, 2.6)):  # which of the two?
+        replace(plan, supports=[[2.3, 2.6, 1.5], [2.3, 2.6, 1.0]]).surface()
 
 
 def test_wrong_points_are_refused():

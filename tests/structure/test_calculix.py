@@ -162,6 +162,10 @@ def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch,
     path.write_text(path.read_text().replace("*STATIC", "*STATICALLY").replace("FIXED,1,3", "FIXED,one"))
     with pytest.raises(CalculixError, match="ERROR"):
         calculix.run_file(path)
+    wrong = path.read_text()
+    monkeypatch.setattr(calculix, "text_of", lambda *_, **__: wrong)
+    with pytest.raises(CalculixError, match="ERROR"):  # no load that is too much
+        calculix.run_as_far(model_of(pyramid()), model_of(pyramid()).steps)
     with pytest.raises(CalculixError, match="within"):
         calculix.run(model_of(pyramid()), timeout=1e-4)
     monkeypatch.setattr(calculix, "PROGRAM", "no-such-program")

@@ -114,6 +114,18 @@ def test_the_deflection_of_a_stiff_beam_goes_like_one_over_its_stiffness():
     assert moved == pytest.approx([5 * 2.0 / 384.0 / TUBE.upright] * 2, rel=0.02)
 
 
+@needs_ccx
+def test_a_member_takes_over_what_is_loaded_at_its_vertices_too():
+    """The weight of the form stays while the member takes over: both are loads at the same vertices."""
+    film = pcmc.solve(square(8, tension=2.0).retensioned(weights={"film": 0.2})).surface
+    edge = Member(polyline([[0, 1], [1, 1]]), TUBE, Material(2.1e10))
+    analysis = analyse(model_of(film, members=[edge], anyway=True))
+    assert analysis.members["M"][0] == pytest.approx(2.0 / 8.0, rel=0.02)
+    assert analysis.table["moved"][0] < 1e-3
+    area = pcmc.certify(film).patches["area"][0]
+    assert analysis.table["force_z"][0] == pytest.approx(0.2 * area, rel=1e-3)
+
+
 def test_a_rim_carries_the_pull_of_its_sheet_as_a_ring():
     """A cap at its rim has the slope angle θ: N = -α cos θ R where columns carry it upright, order 2."""
     off = []

@@ -1,0 +1,233 @@
+"""Periodic surfaces: vertices that are the image of another one under a translation, x_image = x + t.
+
+The surface goes on there as its own copy. An image moves with its vertex and has the same normal. Both count
+as one vertex in the topology, the motion space and every matrix, and the forces on both are added up. The
+positions are those of the mesh as it is drawn, so areas and pictures need to know nothing of this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import Bools, Floats, Ints, cached_array, kept_with_owner, read_only
+from ..base.errors import SurfaceError
+from ..base.tolerances import ON
+from . import checks
+from .geometry import bounding_size
+from .guides import Plane
+from .topology import Topology, components, topology
+
+if TYPE_CHECKING:
+    from .surface import Surface
+
+NONE: Ints = read_only(np.empty((0, 2), dtype=np.int64))
+COARSE = "refine the mesh of the cell, so that each edge joins two vertices by one way only"
+
+
+class Imaged:
+    """A surface some of whose vertices are images of others."""
+
+    vertices: Floats
+    faces: Ints
+    patch_of_face: Ints
+    images: Ints
+    _with: Callable[..., Any]
+
+    @property
+    def periodic(self) -> bool:
+        """Whether some vertices are images of others."""
+        return len(self.images) > 0
+
+    @cached_array
+    def original(self) -> Ints:
+        """(n,) the vertex that each one is an image of, or itself."""
+        return originals(self.images, len(self.vertices))
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Edges, curves and points, from the faces alone, images and their vertices as one; shared by all
+        moved copies."""
+        return self.topology_of(self.faces, self.patch_of_face)
+
+    def topology_of(self, faces: Ints, patch_of_face: Ints) -> Topology:
+        """The topology of some of the faces (m,3), images and their vertices as one."""
+        n = len(self.vertices)
+        return (
+            glued(faces, patch_of_face, self.original) if self.periodic else topology(faces, patch_of_face, n)
+        )
+
+    @cached_property
+    def cell(self) -> Any:
+        """The cell alone, as it is drawn: without images and rooms, its seam is a boundary."""
+        if not self.periodic:
+            return self
+        own = topology(self.faces, self.patch_of_face, len(self.vertices))
+        return self._with(images=NONE, rooms=(), faces=self.faces, topology=own)
+
+    def folded(self, forces: Floats) -> Floats:
+        """Forces (n,…) with those on images added to their vertices', in place; zero at images."""
+        if self.periodic:
+            image, vertex = self.images.T
+            np.add.at(forces, vertex, forces[image])
+            forces[image] = 0.0
+        return forces
+
+    def spread(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Values (n,…) with those of vertices at their images, too."""
+        return values[self.original] if self.periodic else values
+
+
+def originals(images: Ints, n: int) -> Ints:
+    """(n,) the vertex that each of n is an image of by the pairs (k,2), or itself."""
+    original = np.arange(n, dtype=np.int32)
+    original[images[:, 0]] = images[:, 1]
+    return original
+
+
+def glued(faces: Ints, patch_of_face: Ints, original: Ints) -> Topology:
+    """The topology of faces (m,3) whose vertices are images of ``original`` (n,)."""
+    F = read_only(np.ascontiguousarray(original[faces], dtype=np.int32))
+    return topology(F, patch_of_face, len(original), placed=faces)
+
+
+def expect_no_images(surface: Any, what: str) -> None:
+    """Refuse a periodic Surface where ``what`` would take the seam of its cell for a boundary.
+
+    >>> from pcmc import Patch, Surface
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=[0])
+    >>> expect_no_images(flat, "the panels")
+    """
+    if surface.periodic:
+        message = f"{what}: not for a periodic surface ({len(surface.images)} of its vertices are images);"
+        message += " pass surface.rebuilt(images=(), fixed=...), its cell alone, held along its seam"
+        raise SurfaceError(message, what="images", found=len(surface.images), expected=0)
+
+
+def images_in(vertices: npt.ArrayLike, lattice: npt.ArrayLike) -> Ints:
+    """The pairs (k,2) of vertices (n,3) that a translation of a lattice brings together: image and vertex.
+
+    Of all vertices that are images of each other the first is the one that the others follow.
+
+    Parameters
+    ----------
+    vertices : (n,3) positions, length.
+    lattice : (d,3) the d = 1, 2 or 3 translations whose whole multiples are those of the surface.
+
+    Raises
+    ------
+    SurfaceError : the translations are not independent.
+
+    >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> images_in(corners, [[1, 0, 0]]).tolist()
+    [[1, 0], [3, 2]]
+    """
+    X = checks.positions(vertices)
+    T = np.asarray(lattice, dtype=float).reshape(-1, 3)
+    if not 1 <= len(T) <= 3 or np.linalg.matrix_rank(T, ON * np.abs(T).max(initial=1e-300)) < len(T):
+        text = f"lattice: expected 1, 2 or 3 independent translations, found {T.tolist()}"
+        raise SurfaceError(text, what="lattice", found=T.tolist())
+    size = max(bounding_size(X), float(np.linalg.norm(T, axis=1).max()))
+    steps = (X - X[0]) @ np.linalg.pinv(T)  # whole numbers apart between images: one angle on circles
+    around = np.linalg.norm(T, axis=1) / (2.0 * np.pi) * np.exp(2j * np.pi * steps)
+    from scipy.spatial import cKDTree  # here, as few surfaces ask
+
+    tree = cKDTree(np.hstack([around.real, around.imag, X - X[0] - steps @ T]))
+    group = components(tree.query_pairs(ON * size, output_type="ndarray"), len(X))
+    vertex = np.unique(group, return_index=True)[1][group]
+    image = np.flatnonzero(vertex != np.arange(len(X)))
+    return np.stack([image, vertex[image]], axis=1)
+
+
+@kept_with_owner
+def lattice_of(surface: Any) -> Floats:
+    """(d,3) independent translations whose whole multiples are those between images and their vertices.
+
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[x, y, 0] for y in (0, 1) for x in (0, 1, 2, 3)]
+    >>> strip = Surface(corners, [[0, 1, 4], [1, 5, 4], [1, 2, 5], [2, 6, 5], [2, 3, 6], [3, 7, 6]], [0] * 6,
+    ...                 [Patch("strip", 1.0)], fixed=range(8), images=[[3, 0], [7, 4]])
+    >>> lattice_of(strip).tolist()
+    [[3.0, 0.0, 0.0]]
+    """
+    image, vertex = surface.images.T
+    near, basis = ON * surface.size, np.empty((0, 3))
+    t = surface.vertices[image] - surface.vertices[vertex]
+    given = list(t[np.unique(np.round(t / (2.0 * near)), axis=0, return_index=True)[1]])
+    given.sort(key=np.linalg.norm, reverse=True)
+    while given:  # Euclid's algorithm: what is left of a translation may be shorter than those so far
+        v = given.pop()
+        v = v - np.round(v @ np.linalg.pinv(basis)) @ basis
+        if np.linalg.norm(v) <= near:
+            continue
+        if np.linalg.matrix_rank(np.vstack([basis, v]), near) == len(basis):
+            given += [*basis, v]
+            given.sort(key=np.linalg.norm, reverse=True)
+            basis = np.empty((0, 3))
+        else:
+            basis = np.vstack([basis, v])
+    return read_only(basis)
+
+
+def checked_images(
+    given: Any, X: Floats, F: Ints, fixed: Bools, on_plane: Bools, plane: Plane, heavy: bool
+) -> Ints:
+    """The pairs (k,2) of images and their vertices, by image; SurfaceError where they make no periodic mesh.
+
+    Both must be held alike, and with weights translations must lead along Π.
+    """
+    pairs = np.asarray(given)
+    if not pairs.size:
+        return NONE
+    pairs = checks.pair_array(pairs, "images", len(X))
+    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+    image, vertex = pairs.T
+    near = ON * bounding_size(X)
+    t = X[image] - X[vertex]
+    tests = (
+        (np.append(image[1:] == image[:-1], False), "is the image of two vertices", "remove one pair"),
+        (np.isin(vertex, image), "names an image as the vertex", "name the vertex that it is an image of"),
+        (np.linalg.norm(t, axis=1) <= near, "has both at one place", "merge them"),
+        (fixed[image] != fixed[vertex], "has only one of them fixed", "hold both or none"),
+        (on_plane[image] != on_plane[vertex], "has only one of them on the plane", "hold both or none"),
+        (
+            heavy & (np.abs(t @ np.array(plane.normal)) > near),
+            "leads away from the plane, and weights change with the height over it",
+            "take the weights out",
+        ),
+    )
+    for bad, fault, hint in tests:
+        if bad.any():
+            checks.refuse_rows("images", pairs, np.flatnonzero(bad), fault, hint=hint)
+    _refuse_coarse(X, F, originals(pairs, len(X)), near)
+    return read_only(pairs)
+
+
+def _refuse_coarse(X: Floats, F: Ints, original: Ints, near: float) -> None:
+    """Refuse triangles with a vertex and its image, and edges that join the same two vertices in two ways."""
+    G = original[F]
+    own = np.flatnonzero((G[:, [1, 2, 0]] == G).any(axis=1))
+    if len(own):
+        checks.refuse_rows("faces", F, own, "joins a vertex with its image", hint=COARSE)
+    topo = glued(F, np.zeros(len(F), dtype=np.int32), original)
+    one = X[topo.sides[:, 1]] - X[topo.sides[:, 0]]
+    along = (X[F[:, [2, 0, 1]]] - X[F[:, [1, 2, 0]]]) * topo.sense[..., None]
+    apart = np.linalg.norm(along - one[topo.edge_of_face], axis=2).max(axis=1) > near
+    if apart.any():
+        fault = "has an edge between two vertices that are joined otherwise elsewhere, by their images"
+        checks.refuse_rows("faces", F, np.flatnonzero(apart), fault, hint=COARSE)
+
+
+def check_translations(before: Surface, X: Floats) -> None:
+    """Refuse positions X (n,3) at which an image is not where its translation has it."""
+    if before.periodic:
+        image, vertex = before.images.T
+        t = before.vertices[image] - before.vertices[vertex]
+        away = np.linalg.norm(X[image] - X[vertex] - t, axis=1) > ON * before.size
+        if away.any():
+            hint = "move both alike, or change the cell with rebuilt(vertices=...)"
+            checks.refuse_rows("images", before.images, np.flatnonzero(away), "is no longer one", hint=hint)

@@ -1,0 +1,69 @@
+"""Periodic surfaces for tests: a tube, a bay of a vault, and a surface cut out of its cell otherwise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import pcmc
+from pcmc import Patch, Plane, Room, Surface
+
+
+def tube(length: float, around: int = 24, radius: float = 1.0, rooms: bool = True) -> Surface:
+    """A tube about the z axis of triangles nearly equilateral, periodic along it, in its balance α = p R."""
+    rows = max(3, round(length / (2.0 * np.pi * radius / around * 0.75**0.5)))
+    rows += rows % 2
+    angle = 2.0 * np.pi * (np.arange(around)[None] + 0.5 * (np.arange(rows + 1)[:, None] % 2)) / around
+    z = np.broadcast_to(length * np.arange(rows + 1)[:, None] / rows, angle.shape)
+    X = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=2).reshape(-1, 3)
+    number = np.arange(len(X)).reshape(rows + 1, around)
+    faces = []
+    for row in range(rows):
+        a, b = number[row], np.roll(number[row], -1)
+        c, d = number[row + 1], np.roll(number[row + 1], -1)
+        if row % 2 == 0:
+            faces += [np.stack([a, b, c], axis=1), np.stack([b, d, c], axis=1)]
+        else:
+            faces += [np.stack([a, d, c], axis=1), np.stack([a, b, d], axis=1)]
+    F = np.concatenate(faces)
+    area = 0.5 * around * radius**2 * np.sin(2.0 * np.pi / around)
+    own = [Room("inside", {"tube": 1}, area * length)] if rooms else []
+    patches = [Patch("tube", 1.0, pressure=1.0 / radius)]
+    images = pcmc.images_in(X, [[0, 0, length]])
+    return Surface(X, F, np.zeros(len(F), dtype=int), patches, rooms=own, images=images)
+
+
+def bay(n: int, mirrors: bool = False, **values: float) -> Surface:
+    """A bay of a vault without end along x, over 0 ≤ y ≤ 1; or the same between mirror planes."""
+    grid = (
+        np.stack(np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"), axis=-1).reshape(-1, 2) / n
+    )
+    X = np.column_stack([grid, 0.3 * grid[:, 1] * (1.0 - grid[:, 1])])
+    corner = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = (
+        part.ravel() for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
+    )
+    odd = (np.add.outer(np.arange(n), np.arange(n)) % 2).ravel().astype(bool)
+    first = np.where(odd[:, None], np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
+    second = np.where(odd[:, None], np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
+    F = np.concatenate([first, second])
+    fixed = (grid[:, 1] == 0.0) | (grid[:, 1] == 1.0)
+    given = {"tension": 1.0, "pressure": 1.0} | values
+    if mirrors:
+        planes = {Plane((x, 0, 0), (1, 0, 0), f"x = {x}", mirror=True): grid[:, 0] == x for x in (0.0, 1.0)}
+        return Surface(X, F, np.zeros(len(F), dtype=int), [Patch("vault", **given)], fixed, on_planes=planes)
+    images = pcmc.images_in(X, [[1, 0, 0]])
+    return Surface(X, F, np.zeros(len(F), dtype=int), [Patch("vault", **given)], fixed, images=images)
+
+
+def scattered(surface: Surface, lattice, seed: int = 0) -> Surface:
+    """The same surface with each triangle moved by a translation of the lattice (d,3), so that almost all its
+    vertices have images."""
+    rng = np.random.default_rng(seed)
+    corners = surface.vertices[surface.faces]
+    corners = corners + (rng.integers(-1, 2, (surface.m, len(lattice))) @ np.asarray(lattice))[:, None]
+    key = np.round(corners.reshape(-1, 3) * 1e9).astype(np.int64)
+    _, first, faces = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    X = corners.reshape(-1, 3)[first]
+    images = pcmc.images_in(X, lattice)
+    parts = surface.patch_of_face, surface.patches
+    return Surface(X, faces.reshape(-1, 3), *parts, rooms=surface.rooms, images=images)
