@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import shlex
 import sys
+import time
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -114,8 +115,9 @@ def main(pages: list[str]) -> None:
         page, folder = Path(name).resolve(), home / f"page-{number}"
         folder.mkdir()
         os.chdir(folder)
+        begun = time.perf_counter()
         try:
-            print(f"{page.name}: {run_page(page)} blocks", flush=True)
+            print(f"{page.name}: {run_page(page)} blocks in {time.perf_counter() - begun:.1f} s", flush=True)
         finally:
             os.chdir(home)
 
