@@ -232,7 +232,9 @@ def figure(folder: Folder) -> None:
         for row in mine.to_dict("records"):
             shapes.append(folder.read_mesh(file_name(f"{case}-{row['number']}"))["at rest"])
             titles.append(f"{case} {row['number']}: index {row['index']}")
-    panel(shapes, folder.figure("atlas"), columns=5, titles=titles, supports=False, one_scale=False)
+    panel(
+        shapes, folder.figure("atlas"), columns=5, titles=titles, supports=False, one_scale=False, width=1000
+    )
 
 
 STUDY = Study(
