@@ -170,9 +170,9 @@ def draw(table: pd.DataFrame, folder: Folder) -> None:
 
 
 def _round(triangles: float) -> str:
-    """A number of triangles in thousands or millions.
+    """A number of triangles in thousands, or in millions, M.
 
     >>> _round(64496), _round(4001924)
-    ('64 000', '4.0 million')
+    ('64 000', '4 M')
     """
-    return f"{triangles / 1e6:.1f} million" if triangles >= 1e6 else f"{triangles / 1e3:.0f} 000"
+    return f"{triangles / 1e6:.0f} M" if triangles >= 1e6 else f"{triangles / 1e3:.0f} 000"
