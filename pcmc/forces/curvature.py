@@ -47,11 +47,11 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     """
     expect_surface(surface)
     validate.choice("method", method, METHODS)
-    return _both(surface)[METHODS.index(method)]
+    return _mean_curvatures(surface)[METHODS.index(method)].copy()
 
 
 @kept_with_owner
-def _both(surface: Surface) -> tuple[Floats, Floats]:
+def _mean_curvatures(surface: Surface) -> tuple[Floats, Floats]:
     """H (n,) by each of ``METHODS``."""
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)

@@ -138,6 +138,7 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     given = {name: getattr(data, name) or data.parts.get(name) for name in names}
     given = {"supports": data.support is not None, **given}
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
+    given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)
     notes = (*data.notes, *([f"left out: {left_out}; the boundary is fixed"] if left_out else []))
     if edge_length is not None:

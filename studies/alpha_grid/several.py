@@ -1,4 +1,4 @@
-"""Cells of Fig. 16 with more than one equilibrium: how many, and of which index.
+"""How many equilibria the cells of Fig. 16 have, and their indices.
 
 For the wall of Example 2 (tension 4) every cell in which an equilibrium is found from the initial shape is
 searched along the branch in pressure. What is found there is solved once more with each triangle cut in four.

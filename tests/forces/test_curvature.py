@@ -35,6 +35,14 @@ def test_cotangent_curvature_is_meyers():
     assert H[inside] == pytest.approx([by_cotangents(surface, p) for p in inside], rel=1e-12)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_the_array_of_curvatures_is_the_callers_own(method):
+    surface = pyramid(1.0)
+    H = mean_curvature(surface, method)
+    H[:] = 7.0
+    assert mean_curvature(surface, method)[4] < 7.0
+
+
 def test_variational_curvature_is_exact_at_a_stationary_vertex():
     # The pyramid's apex is at rest for h / √(1 + h²) = 1 / (3 α); H̄ = 1 / (2 α).
     for alpha in (0.5, 1.0, 4.0):

@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 import pytest
+from periodic_cases import bay
 from refusals import refused
 
 import pcmc
@@ -80,6 +81,13 @@ def test_curved_elements_are_left_out_and_this_is_said(tmp_path):
         repaired = pcmc.repair(tmp_path / name)
         assert repaired.surface.order == 1
         assert "left out: supports, curved elements; the boundary is fixed" in repaired.notes
+
+
+def test_images_are_left_out_and_this_is_said(tmp_path):
+    pcmc.write(tmp_path / "bay.pcmc", bay(4))
+    repaired = pcmc.repair(tmp_path / "bay.pcmc")
+    assert not repaired.surface.periodic
+    assert "left out: supports, images; the boundary is fixed" in repaired.notes
 
 
 def test_repeated_and_flat_triangles_are_left_out(tmp_path):
