@@ -13,7 +13,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import face_areas, segment_lengths
 from .forces import held_boundary
 from .tables import names_of
 
@@ -139,6 +139,7 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
 
 REACH = 1.5  # median edge lengths: the cause is looked for this near to the worst triangle
 LOW = 0.2  # median edge lengths: a held wall this low has no room for triangles
+NARROW = 0.05  # of the smallest area beside it: a film this small between two junctions vanishes
 KEY = 'in a plan, bottom = "{}"'
 ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 ALIKE = 6  # decimals of a share: symmetric places differ by rounding
@@ -158,6 +159,8 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
         f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
         f" {place.round(4).tolist()}, quality {quality:.1e}"
     )
+    if change := _exchange(surface, int(surface.patch_of_face[face])):
+        worst += f"; {change}"
     if held_wall_down(surface, pinchable):
         return worst + (
             "; the junction there comes down on the held bottom of its wall, so the wall has no height"
@@ -170,6 +173,32 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
             f" of its wall ({KEY.format('held')})"
         )
     return worst
+
+
+def _exchange(surface: Surface, patch: int) -> str:
+    """Names the patches that meet once a film between two junctions has vanished; empty if it does not.
+
+    Of the two patches beside each junction, those on the same side of the film meet, as in a T1 of a foam.
+    """
+    X, F, topo = surface.vertices, surface.faces, surface.topology
+    curves = [curve for curve in topo.junctions if patch in curve.sheets]
+    beside = [[k for k in curve.sheets if k != patch] for curve in curves]
+    around = [k for pair in beside for k in pair]
+    if [len(pair) for pair in beside] != [2, 2] or len(set(around)) < 4:
+        return ""
+    area = np.bincount(surface.patch_of_face, face_areas(X[F]), len(surface.patches))
+    if area[patch] > NARROW * area[around].min():
+        return ""
+    apart = []  # across the film at each junction, from the one patch beside it to the other
+    for curve, pair in zip(curves, beside, strict=True):
+        f, k = np.nonzero(np.isin(topo.edge_of_face, topo.edge_numbers(curve.pairs)))
+        inwards = X[F[f, k]] - 0.5 * (X[F[f, k - 1]] + X[F[f, k - 2]])
+        one, other = (inwards[surface.patch_of_face[f] == own].sum(axis=0) for own in pair)
+        apart.append(other - one)
+    (a, b), (c, d) = beside[0], beside[1][:: 1 if apart[0] @ apart[1] > 0.0 else -1]
+    name = [repr(p.name) for p in surface.patches]
+    meet = f"{name[a]} and {name[c]} then meet, and {name[b]} and {name[d]}"
+    return f"patch {name[patch]} may vanish: {meet}; start from a mesh where they do"
 
 
 def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
