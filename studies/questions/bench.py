@@ -7,6 +7,8 @@
 - jax_fdm, as a net: cotangent force densities α (cot β + cot γ) / 2 of the edges and the pressure's forces at
   the nodes, both anew from each net (the fixed point of Pinkall and Polthier's minimal surfaces). It is
   asked only where all of the boundary is fixed; junctions between plane supports are no part of it.
+- Kratos' form finding: membranes without stiffness, their prestress kept from form to form, and pressures
+  that follow them. It ends by its own residual, of the forces in all directions.
 - pcmc's geometric solver.
 
 Residual and energy of each end are pcmc's. L-BFGS moves vertices along the surface, too, so it comes to
@@ -40,7 +42,7 @@ from pcmc.solvers.result import Progress
 from pcmc.surface.supports import apply_supports
 
 from ..folder import Folder
-from ..reference import evolver
+from ..reference import evolver, kratos
 from ..study import Study
 
 LIMIT, LONGEST = 60.0, 150.0  # seconds: of a run, and of one that cannot be stopped at that
@@ -160,12 +162,23 @@ def jax_fdm(surface: Surface) -> End:
         return End(float(found["seconds"]), ended(surface, found["X"]), str(found["said"]))
 
 
+def kratos_form(surface: Surface) -> End:
+    """Kratos' form finding in an interpreter of its own; reading and writing the mesh is not counted."""
+    rest = REST * certify(surface, modes=0).scale
+    try:
+        seconds, X, said = kratos.form(surface, rest, LIMIT, FAR, LONGEST)
+    except kratos.KratosError as error:
+        return End(np.nan, None, str(error))
+    return End(seconds, ended(surface, X), said)
+
+
 PROGRAMS: dict[str, Callable[[Surface], End]] = {
     "pcmc": newton,
     "Surface Evolver": surface_evolver,
     "NLopt L-BFGS": nlopt,
     "scipy L-BFGS": scipy_lbfgs,
     "jax_fdm": jax_fdm,
+    "Kratos": kratos_form,
 }
 
 
