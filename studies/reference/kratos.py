@@ -112,7 +112,11 @@ def _answer(timeout: float | None = None, **model: Any) -> dict[str, Any]:
         except subprocess.TimeoutExpired:
             raise KratosError(f"Kratos: not ready after {timeout:g} s") from None
         if done.returncode or not target.exists():
-            last = (done.stderr.strip() or "it stopped").splitlines()[-1]
-            hint = f"install KratosStructuralMechanicsApplication, or name an interpreter with it in {PYTHON}"
-            raise KratosError(f"Kratos: {last}; {hint}")
+            lines = (done.stderr.strip() or "it stopped").splitlines()
+            errors = [line for line in lines if "Error" in line]
+            last = (errors or lines)[-1].strip()
+            hint = (
+                f"; install KratosStructuralMechanicsApplication, or name an interpreter with it in {PYTHON}"
+            )
+            raise KratosError(f"Kratos: {last}{hint if 'No module' in last else ''}")
         return dict(np.load(target))

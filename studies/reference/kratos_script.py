@@ -119,8 +119,8 @@ def _form(KM: Any, SM: Any, given: Any, part: Any, pressed: Any, scheme: Any, bu
     """The form, the seconds it took, and what to say of it."""
     for condition, p in zip(pressed, given["pressures"].tolist(), strict=True):
         condition.SetValue(KM.NEGATIVE_FACE_PRESSURE, p)
-    least = float(given["rest"]) / np.count_nonzero(~given["fixed"]) ** 0.5
-    ends = KM.ResidualCriteria(0.0, least)  # Kratos divides a residual by the root of the number of unknowns
+    least = float(given["rest"]) / np.count_nonzero(~given["fixed"])
+    ends = KM.ResidualCriteria(0.0, least)  # Kratos divides the norm by the number of unknowns
     ends.SetEchoLevel(0)
     about = KM.Parameters(PROJECTION)
     some = part, scheme, ends, builder, part, False, "none", about, ITERATIONS, False, False, True
