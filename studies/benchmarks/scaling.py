@@ -2,7 +2,7 @@
 
 Example 1 with a wall tension of 1, from its initial shape to rest, then its certificate; and once more
 through one refinement: half the squares a side come to rest, are cut 1→4, and come to rest again. Every run
-of a size has a process of its own that has loaded the compiled code before; memory is what comes on top of that.
+of a size has a process of its own that has loaded the compiled code before; memory is what comes on top.
 """
 
 from __future__ import annotations
@@ -120,9 +120,9 @@ def _run(squares: int) -> dict[str, float]:
 
 def exponents(table: pd.DataFrame) -> dict[str, Order]:
     """The exponent of each fitted quantity: the slope of its logarithm over that of the triangles."""
-    values = table.to_dict("series")
-    size = {"refined_seconds": table.refined_triangles}
-    return {key: slope(size.get(key, table.triangles), values[key]) for key in FITTED}
+    values = {key: table[key].to_numpy(dtype=float) for key in table}
+    size = {"refined_seconds": values["refined_triangles"]}
+    return {key: slope(size.get(key, values["triangles"]), values[key]) for key in FITTED}
 
 
 def rows(table: pd.DataFrame, quick: bool) -> list[Row]:
