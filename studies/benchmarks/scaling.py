@@ -42,7 +42,7 @@ def measure(quick: bool) -> pd.DataFrame:
     fast = available()[0] == "pardiso"
     rows = []
     for squares in FEW if quick else SIDES if fast else SLOW_SIDES:
-        row = {}
+        row: dict[str, float] = {}
         for one_size in (_one_size, _refined):
             with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
                 row |= pool.submit(one_size, squares).result()
