@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .certificate.theorem import Theorem, verify
     from .cloth import CuttingPattern, cutting_pattern
     from .design import Design, Parameter, Target, meet, sensitivities
-    from .equilibria import Equilibria, FreeCell, cell_stress, find_equilibria, free_cell
+    from .equilibria import Equilibria, cell_stress, find_equilibria, free_cell
     from .forces.curvature import curvature_error, mean_curvature, target_curvature
     from .forces.functional import energy, gradient
     from .forces.rooms import room_volume_gradients, room_volumes
@@ -71,7 +71,6 @@ __all__ = [
     "Direction",
     "Equilibria",
     "FewerFamilies",
-    "FreeCell",
     "Gas",
     "Line",
     "Margin",
@@ -143,7 +142,7 @@ _NAMES = {
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
     "forces.rooms": ("room_volume_gradients", "room_volumes"),
-    "equilibria": ("Equilibria", "FreeCell", "cell_stress", "find_equilibria", "free_cell"),
+    "equilibria": ("Equilibria", "cell_stress", "find_equilibria", "free_cell"),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (
