@@ -68,7 +68,7 @@ class Case:
     @cached_property
     def members(self) -> tuple[MemberForces, ...]:
         """What the beams carry."""
-        return members_in(self.results)
+        return members_in(self.results.model, self.results.step, self.results)
 
     @property
     def taut(self) -> float:

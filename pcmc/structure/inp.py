@@ -59,8 +59,8 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
     results of each increment, and writes none for viewers.
     """
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
-    text = [f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"]
-    text += [f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")]
+    text = [f"*HEADING\npcmc structural model, {'' if model.certificate.certified else 'NOT CERTIFIED: '}"]
+    text += [f"{model.certificate.verdict.value}\n" + (f"** {model.note}\n" if model.note else "")]
     text += [f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1)]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
     text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]

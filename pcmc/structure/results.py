@@ -120,7 +120,7 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
     step, surface, stress = steps[k], model.standing, blocks["stresses"]
     share = blocks["displacements"].time - k
     if share < 1.0 - WHOLE:
-        before = steps[k - 1] if k else step.plus(step, nothing(step), -1.0)
+        before = steps[k - 1] if k else nothing(step)
         step = replace(before.plus(step, before, share), name=step.name)
     displacements, reactions = np.full((surface.n, 3), np.nan), np.zeros((surface.n, 3))
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values

@@ -108,7 +108,7 @@ def compared(model: StructuralModel, form: StepResults, snow: StepResults) -> Ro
     share /= share.sum()
     normal = np.array(surface.plane.normal)
     return {
-        "verdict": model.verdict.partition(":")[0],
+        "verdict": model.certificate.verdict.value.partition(":")[0],
         "displacement": form.largest_displacement / surface.size,
         "stress_rms": float(np.sqrt(share @ (stress**2).mean(axis=1))),
         "stress_largest": float(np.abs(stress).max()),
