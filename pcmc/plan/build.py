@@ -155,7 +155,7 @@ def _without_ears(surface: Surface) -> Ints:
 def _supports(draft: Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
-    fixed[draft.edges.vertices("fixed", "held")] = True
+    fixed[draft.edges.vertices("fixed", "held", "inside")] = True
     sliding[draft.edges.vertices("sliding")] = True
     for chain in draft.drawn.chains:
         if draft.lines[chain.line].kind is Kind.SUPPORT:
@@ -335,7 +335,9 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
     """
     curves = []
     supports = [PlanLine("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
-    fixed = dict(zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", "held"), strict=True))
+    fixed = dict(
+        zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", "held", "inside"), strict=True)
+    )
     for chain in draft.drawn.chains:
         line = draft.lines[chain.line]
         if line.kind is Kind.DIVIDER:

@@ -34,7 +34,7 @@ class Boundary:
 
     ends: Ints  # (e,2) vertices; each line runs from edge to edge and returns to its first vertex
     line: Ints  # (e,) the number of the line
-    state: Any  # (e,) one of EDGES, "mirror", or "held": a free one along a support
+    state: Any  # (e,) one of EDGES, "mirror", or along a support "held", a free one, or "inside", a mirror
     cable: Ints  # (e,) index into ``cables``, -1 for none
     # tension, weight and name, perhaps empty, of each cable line and edge cable
     cables: tuple[tuple[float, float, str], ...]
@@ -68,16 +68,24 @@ def boundary(plan: Plan, lines: Sequence[PlanLine], on_edge: Sequence[Curve], dr
             raise PlanError(problem, what=name)
         state[along], cable[along] = "cable", len(cables)
         cables.append((part.tension, part.weight, part.name))
+    supported = np.zeros(len(ends), dtype=bool)
     for support in on_edge:  # a held stretch needs no cable
         along = _along(support, drawn.points, ends, SNAP * plan.edge_length)
         state[along] = np.where(np.isin(state[along], ["free", "cable"]), "held", "fixed")
-        cable[along] = NONE
+        cable[along], supported[along] = NONE, True
     for number, distance in enumerate(_mirror_distances(plan, drawn.points), start=1):
         along = (distance == 0.0)[ends].all(axis=1)
         if not along.any():
             problem = f"mirror {number} is no straight edge of the outline; draw it from corner to corner"
             raise PlanError(problem, what=f"mirror {number}")
-        state[along], cable[along] = "mirror", NONE
+        own = cable[along & (cable >= with_cable.sum())] - with_cable.sum()
+        if len(own):
+            name = cable_label(plan.cables[own[0]], int(own[0]) + 1)
+            problem = (
+                f"{name} runs along mirror {number}, which is inside the whole roof; draw the whole roof,"
+            )
+            raise PlanError(f"{problem} with a divider that has the cable", what=name)
+        state[along], cable[along] = np.where(supported[along], "inside", "mirror"), NONE
     return Boundary(ends, line, state, cable, tuple(cables))
 
 
@@ -165,10 +173,12 @@ def cable_for(outline: Curve, tension: float) -> float:
 def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:
     """(k,) the heights of the drawn points, with those of the supports; NaN where unknown.
 
-    Between supports an edge changes its height in proportion to the length."""
+    Between supports an edge changes its height in proportion to the length. A mirror has no height of its
+    own: a support there is as one inside."""
     heights, change = drawn.heights.copy(), np.zeros(len(drawn.heights))
     size, rim = bounding_size(drawn.points), np.unique(edges.ends)
     loose = np.setdiff1d(rim, edges.vertices("fixed", "sliding"))
+    inside = np.setdiff1d(edges.vertices("mirror", "inside"), edges.vertices(*EDGES, "held"))
     required = iter(drawn.required.tolist())
     for support in plan.supports:
         if isinstance(support, Curve):
@@ -181,7 +191,8 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
             vertices, dimension = np.array([next(required)]), len(support)
             given = to_local(np.array([support]), plan.plane)[:, 2]
         if dimension == 2:
-            continue
+            given = given[np.isin(vertices, inside)]
+            vertices = vertices[np.isin(vertices, inside)]
         heights[vertices] = np.where(np.isnan(heights[vertices]), given, heights[vertices])
         steps = given - heights[vertices]
         wrong = np.flatnonzero((np.abs(steps) > EXACT * size) & ~np.isin(vertices, loose))
@@ -199,7 +210,7 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
         if known.any():
             period = float(lengths.sum())
             heights[vertices] += np.interp(at, at[known], change[vertices[known]], period=period)
-    heights[np.setdiff1d(edges.vertices("mirror"), edges.vertices(*EDGES, "held"))] = np.nan
+    heights[inside[~held[inside]]] = np.nan
     return heights
 
 

@@ -1,13 +1,15 @@
 """How time and memory grow with the number of triangles, up to ten millions.
 
-Example 1 with a wall tension of 1, from its initial shape to rest, then its certificate. Every size has a
-process of its own that has loaded the compiled code before; memory is what comes on top of that.
+Example 1 with a wall tension of 1, from its initial shape to rest, then its certificate; and once more
+through one refinement: half the squares a side come to rest, are cut 1→4, and come to rest again. Every run
+of a size has a process of its own that has loaded the compiled code before; memory is what comes on top.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -27,7 +29,12 @@ SLOW_SIDES = SIDES[:3]  # where MKL is not installed
 REPEATED = 100_000  # triangles up to which times are medians of three
 AT_REST = 1e-10  # relative residual
 GIGABYTES, EXPONENT, GROWTH = 24.0, 1.15, 1.3  # asked; the last of the time per triangle beside a million
-FITTED = ("solve_seconds", "solve_processor_seconds", "solve_gigabytes", "certify_seconds")
+COLUMNS = {
+    "surface and solution": "solve_seconds",
+    "through one refinement": "refined_seconds",
+    "certificate": "certify_seconds",
+}
+FITTED = ("solve_seconds", "refined_seconds", "solve_processor_seconds", "solve_gigabytes", "certify_seconds")
 
 
 def measure(quick: bool) -> pd.DataFrame:
@@ -35,8 +42,11 @@ def measure(quick: bool) -> pd.DataFrame:
     fast = available()[0] == "pardiso"
     rows = []
     for squares in FEW if quick else SIDES if fast else SLOW_SIDES:
-        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-            rows.append(pool.submit(_one_size, squares).result())
+        row: dict[str, float] = {}
+        for one_size in (_one_size, _refined):
+            with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+                row |= pool.submit(one_size, squares).result()
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -44,13 +54,40 @@ def _one_size(squares: int) -> dict[str, float]:
     """Medians of one size; the peak of memory is that of the first run."""
     _run(8)  # loads compiled code
     loaded = peak_bytes()
-    first = _run(squares)
-    runs = [first] + [_run(squares) for _ in range(2 if first["triangles"] <= REPEATED else 0)]
-    row = {key: float(np.median([run[key] for run in runs])) for key in first}
+    first, row = _medians(_run, squares)
     for what in ("solve", "certify"):
         row[f"{what}_peak_gigabytes"] = first[f"{what}_gigabytes"]
         row[f"{what}_gigabytes"] = first[f"{what}_gigabytes"] - loaded / 1e9
     return row
+
+
+def _refined(squares: int) -> dict[str, float]:
+    """Medians of one size through one refinement."""
+    _through_refinement(8)  # loads compiled code
+    return _medians(_through_refinement, squares)[1]
+
+
+def _medians(
+    run: Callable[[int], dict[str, float]], squares: int
+) -> tuple[dict[str, float], dict[str, float]]:
+    """The first run of a size, and the medians of three, or its own where it is large."""
+    first = run(squares)
+    runs = [first] + [run(squares) for _ in range(2 if next(iter(first.values())) <= REPEATED else 0)]
+    return first, {key: float(np.median([each[key] for each in runs])) for key in first}
+
+
+def _through_refinement(squares: int) -> dict[str, float]:
+    """A coarse surface built and solved on both levels: triangles of the fine one, seconds, peak."""
+    wall = time.perf_counter()
+    result = solve(two_squares(squares // 2, alpha_aux=1.0), levels=1, target="stationary", tolerance=AT_REST)
+    seconds = time.perf_counter() - wall
+    assert result.converged, result.message
+    return {
+        "refined_triangles": float(result.surface.m),
+        "refined_seconds": seconds,
+        "refined_residual": float(result.rows[-1]["residual"]),
+        "refined_peak_gigabytes": peak_bytes() / 1e9,
+    }
 
 
 def _run(squares: int) -> dict[str, float]:
@@ -83,8 +120,9 @@ def _run(squares: int) -> dict[str, float]:
 
 def exponents(table: pd.DataFrame) -> dict[str, Order]:
     """The exponent of each fitted quantity: the slope of its logarithm over that of the triangles."""
-    size = table.triangles.to_numpy(dtype=float)
-    return {key: slope(size, table[key].to_numpy(dtype=float)) for key in FITTED}
+    values = {key: table[key].to_numpy(dtype=float) for key in table}
+    size = {"refined_seconds": values["refined_triangles"]}
+    return {key: slope(size.get(key, values["triangles"]), values[key]) for key in FITTED}
 
 
 def rows(table: pd.DataFrame, quick: bool) -> list[Row]:
@@ -100,14 +138,24 @@ def rows(table: pd.DataFrame, quick: bool) -> list[Row]:
     most = EXPONENT if bound else None
     million = table.iloc[(table.triangles - 1e6).abs().argmin()]
     growth = largest.solve_seconds / largest.triangles / (million.solve_seconds / million.triangles)
+    million = table.iloc[(table.refined_triangles - 1e6).abs().argmin()]
+    refined = largest.refined_seconds / largest.refined_triangles
+    refined /= million.refined_seconds / million.refined_triangles
     start = f"{size}, {largest.steps:.0f} steps to a relative residual of {largest.residual:.1e}"
     return [
         Row("surface and solution", largest.solve_seconds, "s", start),
+        Row("time per triangle", growth, "times", f"{size} over {million.triangles:,.0f}"),
         Row(
-            "time per triangle",
-            growth,
+            "the same through one refinement",
+            largest.refined_seconds,
+            "s",
+            f"{largest.refined_triangles:,.0f} triangles, relative residual {largest.refined_residual:.1e}",
+        ),
+        Row(
+            "time per triangle through one refinement",
+            refined,
             "times",
-            f"{size} over {million.triangles:,.0f}",
+            f"{largest.refined_triangles:,.0f} over {million.refined_triangles:,.0f}",
             most=GROWTH if bound else None,
         ),
         Row("of this the surface", largest.build_seconds, "s", size),
@@ -128,6 +176,7 @@ def rows(table: pd.DataFrame, quick: bool) -> list[Row]:
             most=GIGABYTES if bound else None,
         ),
         Row("exponent of time", *_at(fitted["solve_seconds"]), most=most),
+        Row("exponent of time through one refinement", *_at(fitted["refined_seconds"])),
         Row("exponent of processor time", *_at(fitted["solve_processor_seconds"])),
         Row("exponent of memory", *_at(fitted["solve_gigabytes"]), most=most),
         Row("exponent of the certificate's time", *_at(fitted["certify_seconds"])),
@@ -147,7 +196,7 @@ def draw(table: pd.DataFrame, folder: Folder) -> None:
 
     picture = new(1300, 560, pad=8.0)
     panels = (
-        ("seconds", {"surface and solution": "solve_seconds", "certificate": "certify_seconds"}),
+        ("seconds", COLUMNS),
         ("gigabytes", {"memory of the solution": "solve_gigabytes"}),
     )
     size = table.triangles.to_numpy(dtype=float)
@@ -157,9 +206,9 @@ def draw(table: pd.DataFrame, folder: Folder) -> None:
         for k, (name, column) in enumerate(columns.items()):
             values = table[column].to_numpy(dtype=float)
             slope, height = np.polyfit(np.log(size), np.log(values), 1)
-            color = CURVES[k if unit == "seconds" else 2]
+            color = CURVES[k if unit == "seconds" else 3]
             axes.plot(size, np.exp(height) * size**slope, color=color, linewidth=0.8)
-            axes.plot(size, values, "os"[k], color=color, markersize=3.2, label=f"{name}: slope {slope:.2f}")
+            axes.plot(size, values, "o^s"[k], color=color, markersize=3.2, label=f"{name}: slope {slope:.2f}")
         axes.xaxis.set_ticks(size, [f"{_round(m)}" for m in size])
         axes.xaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

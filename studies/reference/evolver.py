@@ -174,7 +174,7 @@ def seconds(
 def numbers(out: str, key: str, columns: int) -> Floats:
     """(k,columns) numbers of the lines that start with the key."""
     text = " ".join(re.findall(rf"^(?:Enter command: )?{key}((?: \S+){{{columns}}})$", out, re.M))
-    numbers = np.array(text.split(), dtype=float).reshape(-1, columns)
+    numbers = np.array(re.sub("[()]", "", text).split(), dtype=float).reshape(-1, columns)  # it has (NaN)
     if not len(numbers):
         raise EvolverError(f"{PROGRAM} did not answer: {' '.join(out.split())[-200:]}")
     return numbers

@@ -1,12 +1,15 @@
 """Run by an interpreter that has Kratos: ``python kratos_script.py MODEL.npz ANSWER.npz``.
 
 Membranes of three nodes, prestressed alike in all directions of their planes; pressures that follow them,
-and forces at the nodes. Each step starts from the one before.
+and forces at the nodes. Each step of a structural model starts from the one before. A model with ``rest``,
+forces to come below, is one whose form is sought: Kratos' ``FormfindingStrategy`` counts displacements from
+the last form and keeps the prestress.
 """
 
 from __future__ import annotations
 
 import sys
+import time
 from importlib import import_module
 from typing import Any
 
@@ -18,6 +21,10 @@ MODULES = (
     ".LinearSolversApplication",
     ".python_linear_solver_factory",
 )
+MOST, ITERATIONS = 100_000, 20  # of a form's search; before each look at the clock
+PROJECTION = """{"model_part_name": "Structure", "echo_level": 0, "projection_type": "planar",
+    "global_direction": [0.6, 0.64, 0.48], "variable_name": "LOCAL_PRESTRESS_AXIS_1",
+    "visualize_in_vtk": false, "method_specific_settings": {}, "check_local_space_dimension": false}"""
 PARTS = 4  # increments of a step after the first
 TOLERANCE = 1e-8  # of the largest prestress force: the residual
 
@@ -25,6 +32,19 @@ TOLERANCE = 1e-8  # of the largest prestress force: the residual
 def main(source: str, target: str) -> None:
     KM, SM, _, factory = (import_module(f"KratosMultiphysics{name}") for name in MODULES)
     given = np.load(source)
+    part, pressed, pushed = _part(KM, SM, given)
+    solver = factory.ConstructSolver(KM.Parameters('{"solver_type": "LinearSolversApplication.sparse_lu"}'))
+    parts = KM.ResidualBasedIncrementalUpdateStaticScheme(), KM.ResidualBasedBlockBuilderAndSolver(solver)
+    if "rest" in given:
+        answer = _form(KM, SM, given, part, pressed, *parts)
+    else:
+        answer = _steps(KM, SM, given, part, pressed, pushed, *parts)
+    arrays: dict[str, Any] = {name: np.array(values) for name, values in answer.items()}
+    np.savez(target, **arrays)
+
+
+def _part(KM: Any, SM: Any, given: Any) -> tuple[Any, list[Any], list[Any]]:
+    """The model, a condition with the pressure of each triangle, and one with the force on each node."""
     X, F, used = given["X"], given["F"], np.unique(given["F"])
     part = KM.Model().CreateModelPart("Structure")
     part.SetBufferSize(2)
@@ -55,10 +75,14 @@ def main(source: str, target: str) -> None:
         KM.VariableUtils().AddDof(moved, held, part)
         for node in used[given["fixed"][used, k]].tolist():
             part.GetNode(node + 1).Fix(moved)
+    return part, pressed, pushed
 
-    solver = factory.ConstructSolver(KM.Parameters('{"solver_type": "LinearSolversApplication.sparse_lu"}'))
-    scheme = KM.ResidualBasedIncrementalUpdateStaticScheme()
-    builder = KM.ResidualBasedBlockBuilderAndSolver(solver)
+
+def _steps(
+    KM: Any, SM: Any, given: Any, part: Any, pressed: Any, pushed: Any, scheme: Any, builder: Any
+) -> dict[str, list[Any]]:
+    """Displacements, reactions and stresses at the end of each step."""
+    X, F, used = given["X"], given["F"], np.unique(given["F"])
     least = TOLERANCE * float(given["prestress"].max() * given["thickness"] * np.ptp(X)) / len(F) ** 0.5
     ends = KM.ResidualCriteria(TOLERANCE, least)
     newton = KM.ResidualBasedNewtonRaphsonStrategy(part, scheme, ends, builder, 50, True, False, True)
@@ -88,8 +112,38 @@ def main(source: str, target: str) -> None:
         principal = [list(e.CalculateOnIntegrationPoints(stress, part.ProcessInfo)[0]) for e in part.Elements]
         for name, values in (at | {"principal": np.sort(principal, axis=1), "good": good}).items():
             answers[name].append(values)
-    arrays: dict[str, Any] = {name: np.array(values) for name, values in answers.items()}
-    np.savez(target, **arrays)
+    return answers
+
+
+def _form(KM: Any, SM: Any, given: Any, part: Any, pressed: Any, scheme: Any, builder: Any) -> dict[str, Any]:
+    """The form, the seconds it took, and what to say of it."""
+    for condition, p in zip(pressed, given["pressures"].tolist(), strict=True):
+        condition.SetValue(KM.NEGATIVE_FACE_PRESSURE, p)
+    least = float(given["rest"]) / np.count_nonzero(~given["fixed"])
+    ends = KM.ResidualCriteria(0.0, least)  # Kratos divides the norm by the number of unknowns
+    ends.SetEchoLevel(0)
+    about = KM.Parameters(PROJECTION)
+    some = part, scheme, ends, builder, part, False, "none", about, ITERATIONS, False, False, True
+    strategy = SM.FormfindingStrategy(*some)
+    strategy.SetEchoLevel(0)
+    strategy.Initialize()
+    begin, count, said = time.perf_counter(), 0, f"not at rest after {MOST} iterations"
+    X = given["X"]
+    while count < MOST:
+        part.CloneTimeStep(part.ProcessInfo[KM.TIME] + 1.0)
+        strategy.InitializeSolutionStep()
+        strategy.Predict()
+        good = strategy.SolveSolutionStep()
+        strategy.FinalizeSolutionStep()
+        count += part.ProcessInfo[KM.NL_ITERATION_NUMBER]
+        X = np.array([[node.X, node.Y, node.Z] for node in part.Nodes])
+        if good or not np.isfinite(X).all() or np.abs(X).max() > given["far"]:
+            said = f"at rest after {count} iterations" if good else "nothing, though its surface has run away"
+            break
+        if time.perf_counter() - begin > given["limit"]:
+            said = f"stopped at {float(given['limit']):g} s, iteration {count}"
+            break
+    return {"X": X, "seconds": time.perf_counter() - begin, "said": said}
 
 
 def _properties(KM: Any, SM: Any, part: Any, given: Any, stress: float) -> Any:

@@ -26,6 +26,7 @@ from studies.reference import evolver
 TIMES = (
     *("build_seconds", "solve_seconds", "solve_processor_seconds", "solve_gigabytes", "solve_peak_gigabytes"),
     *("certify_seconds", "certify_peak_gigabytes", "steps", "residual", "index"),
+    *("refined_residual", "refined_peak_gigabytes"),
 )
 HOME = Path(__file__).resolve().parents[2]
 
@@ -166,11 +167,14 @@ def test_the_growth_of_cost_is_a_slope():
     triangles = np.array([1e4, 1e6, 1e7])
     table = pd.DataFrame({"triangles": triangles} | dict.fromkeys(TIMES, 0.5))
     table = table.assign(solve_seconds=1e-6 * triangles**1.1, solve_gigabytes=1e-9 * triangles**1.2)
+    table = table.assign(refined_triangles=triangles, refined_seconds=1e-6 * triangles**1.2)
     rows = {row.what: row for row in scaling.rows(table, quick=False)}
     assert rows["exponent of time"].value == pytest.approx(1.1)
     assert rows["exponent of memory"].value == pytest.approx(1.2)
     assert rows["surface and solution"].value == pytest.approx(1e-6 * 1e7**1.1)
     assert rows["time per triangle"].value == pytest.approx(10**0.1)
+    assert rows["exponent of time through one refinement"].value == pytest.approx(1.2)
+    assert rows["time per triangle through one refinement"].value == pytest.approx(10**0.2)
     if solver.available()[0] == "pardiso":
         assert (rows["exponent of time"].met, rows["exponent of memory"].met) == ("yes", "no")
 
