@@ -71,7 +71,7 @@ def drawn_members(model: StructuralModel) -> tuple[DrawnMember, ...]:
     >>> [(one.name, one.kind, one.wall, one.forces) for one in drawn_members(model)]
     [('wall 1', 'beam', 'wall 1', None)]
     """
-    X, drawn, known = model.standing.vertices, list[DrawnMember](), model.certified
+    X, drawn, known = model.standing.vertices, list[DrawnMember](), model.certificate.certified
     found = {beam.line.name: beam.within[:, 0] for beam in members_at_rest(model)} if known else {}
     for cable in model.standing.cables if known else ():
         found[cable.name] = pull_along(model.standing, cable, cable.edges)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, unknown
 from ..certificate.forces import Forces
 from ..forces.pinching import standing_part
@@ -19,6 +19,7 @@ from ..surface import Surface
 from ..surface.curves import Curve
 from ..surface.geometry import segment_lengths
 from ..surface.pieces import point_text, to_space
+from ..surface.topology import EdgeCurve
 from .material import Material, Profile
 
 KINDS = ("beam", "cable")
@@ -118,32 +119,12 @@ class Bar:
 
 
 @dataclass(frozen=True, eq=False)
-class MemberLine:
-    """The edges of the surface that a member runs along."""
+class MemberLine(EdgeCurve):
+    """The edges of the surface that a member runs along, in order."""
 
     name: str  # of the member; with a number where it has several lines
     member: Member
-    vertices: Ints  # (k,) in order; the first is not repeated where it is closed
-    closed: bool
     wall: str = ""  # in whose place it is
-
-    @property
-    def pairs(self) -> Ints:
-        """(b,2) the ends of its edges, in order."""
-        order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
-        return np.stack([order[:-1], order[1:]], axis=1)
-
-    @property
-    def carried(self) -> Ints:
-        """The vertices that it carries in the place of a support: all but its ends."""
-        return self.vertices if self.closed else self.vertices[1:-1]
-
-    def ends(self, X: Floats) -> list[tuple[int, Floats]]:
-        """The vertex at each end, and the direction (3,) there on X (n,3); none if it is closed."""
-        if self.closed:
-            return []
-        first, last = self.vertices[:2], self.vertices[:-3:-1]
-        return [(int(a), (X[b] - X[a]) / np.linalg.norm(X[b] - X[a])) for a, b in (first, last)]
 
 
 def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, ...]:
@@ -159,17 +140,15 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
     """
     lines, taken = list[MemberLine](), np.zeros(len(surface.topology.edges), dtype=bool)
     cut = _mirrored(surface)
-    for member in members:
-        if member.two_points or member.on in [cable.name for cable in surface.cables]:
-            continue
+    own = [cable.name for cable in surface.cables]
+    for member in (one for one in members if not (one.two_points or one.on in own)):
         for line in _lines_of(surface, member):
-            if cut[line.vertices].any():
-                text = f"member {line.name!r} meets a mirror plane; take the whole roof, whole = true"
-                raise OptionError(text, what="members", where=line.name)
             edges = surface.topology.edge_numbers(line.pairs)
-            if taken[edges].any():
-                text = f"member {line.name!r} runs where another one does; leave one of them out"
-                raise OptionError(text, what="members", where=line.name)
+            problem = "runs where another one does; leave one of them out" if taken[edges].any() else ""
+            if cut[line.vertices].any():
+                problem = "meets a mirror plane; take the whole roof, whole = true"
+            if problem:
+                raise OptionError(f"member {line.name!r} {problem}", what="members", where=line.name)
             taken[edges] = True
             lines.append(line)
     # a wall that ends at one with a member: nothing would hold its edge there
@@ -208,7 +187,7 @@ def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberL
     alone, mirrored = Forces.of(surface).single, _mirrored(surface)
     for line in lines:
         if line.member.kind == "beam":
-            alone[[v for v, _ in line.ends(X) if surface.fixed[v]]] = True
+            alone[[v for v, _ in line.ends if surface.fixed[v]]] = True
     rim = np.zeros(surface.n, dtype=bool)
     rim[topo.edges[topo.boundary_edge]] = True
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
@@ -231,7 +210,13 @@ def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberL
         if problem:
             raise OptionError(f"member {name!r}: {problem}", what="members", where=name)
         bars.append(Bar(name, member, int(here[0]), np.array([X[here[0]], foot])))
-    _refuse_mechanisms(bars)
+    for vertex in dict.fromkeys(bar.vertex for bar in bars):
+        own = [bar for bar in bars if bar.vertex == vertex]
+        if np.linalg.matrix_rank([bar.direction for bar in own], tol=FLAT) < len(own):
+            names, at = ", ".join(bar.name for bar in own), point_text(own[0].points[0])
+            text = f"members {names} meet at {at}: statics finds the forces of three bars, not in one plane,"
+            text += " or of two, not in one line; leave one out"
+            raise OptionError(text, what="members", where=own[0].name)
     return tuple(bars)
 
 
@@ -240,20 +225,6 @@ def _mirrored(surface: Surface) -> Bools:
     return np.any(
         [mask & plane.mirror for plane, mask in surface.on_planes] or [np.zeros(surface.n, bool)], axis=0
     )
-
-
-def _refuse_mechanisms(bars: Sequence[Bar]) -> None:
-    """Refuse bars at one point whose forces do not follow from their sum."""
-    for vertex in dict.fromkeys(bar.vertex for bar in bars):
-        own = [bar for bar in bars if bar.vertex == vertex]
-        if np.linalg.matrix_rank([bar.direction for bar in own], tol=FLAT) < len(own):
-            names, at = ", ".join(bar.name for bar in own), point_text(own[0].points[0])
-            text = (
-                f"members {names} meet at {at}: statics finds the forces of three bars, not in one plane, or"
-            )
-            raise OptionError(
-                f"{text} of two, not in one line; leave one out", what="members", where=own[0].name
-            )
 
 
 def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:
@@ -280,7 +251,7 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:
     curves = [(wall, curve) for wall, edges in found for curve in topo.curves_among(edges)]
     for number, (wall, curve) in enumerate(curves, 1):
         name = member.label if len(curves) == 1 else f"{member.label}-{number}"
-        yield MemberLine(name, member, curve.vertices, curve.closed, wall)
+        yield MemberLine(curve.vertices, curve.closed, curve.sheets, name, member, wall)
 
 
 def _top(surface: Surface, wall: int) -> Bools:

@@ -135,16 +135,6 @@ class StructuralModel:
         return [load for load in single if isinstance(load, SelfWeight)]
 
     @property
-    def verdict(self) -> str:
-        """The sentence of the certificate's verdict."""
-        return str(self.certificate.verdict.value)
-
-    @property
-    def certified(self) -> bool:
-        """Whether the surface is certified."""
-        return bool(self.certificate.certified)
-
-    @property
     def note(self) -> str:
         """The units of the file's numbers in a line, or what was assumed as they are not known."""
         if self.units:
@@ -287,9 +277,8 @@ class StructuralModel:
     def freed(self) -> Ints:
         """(n,) what a member carries in the place of a support: 1 where it is propped, 2 where it is not."""
         found = np.zeros(self.surface.n, dtype=np.int64)
-        for line in self.lines:
-            if not line.wall:
-                found[line.carried] = 1 if line.member.propped else 2
+        for line in (line for line in self.lines if not line.wall):  # all of it but its ends
+            found[line.vertices if line.closed else line.vertices[1:-1]] = 1 if line.member.propped else 2
         return found
 
     @cached_array
