@@ -155,3 +155,9 @@ def placed(surface: Surface, R: np.ndarray, shift: np.ndarray) -> Surface:
     """The surface turned by ``R`` (3,3) and moved by ``shift`` (3,), its Π with it."""
     plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
     return surface.rebuilt(vertices=surface.vertices @ R.T + shift, plane=plane)
+
+
+def length(points, closed=False):
+    """Of a line through points, or of a closed one."""
+    ends = np.append(points, points[:1], axis=0) if closed else points
+    return float(np.linalg.norm(np.diff(ends, axis=0), axis=1).sum())

@@ -1,0 +1,111 @@
+"""Gas that gives way with its volume, and cushions: two sheets that enclose it."""
+
+import numpy as np
+import pytest
+from refusals import refused
+from scipy.optimize import brentq
+from structures import model_of
+from under_load import ALPHA, THICK, cap, parts, stiffness, strip
+
+import pcmc
+from pcmc import Material, Patch, Snow, Surface, Wind
+from pcmc.base.errors import OptionError
+from pcmc.base.units import Units
+from pcmc.plan import Plan
+from pcmc.structure import Gas, analyse, calculix
+from pcmc.structure.loads import in_the_open
+
+needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+
+
+@needs_ccx
+def test_enclosed_gas_gives_way_as_the_volume_does():
+    """(p_a + p) V = const with ΔV = A w of the sphere: p falls by q κ / (1 + κ), κ = (p_a + p) A / (k V)."""
+    young, suction, outside = 1e6, 0.2, 100.0
+    material, loads = Material(young), [Wind({"cap": suction}, name="suction")]
+    model = model_of(cap(), material=material, thickness=THICK, loads=loads, gas=Gas(ambient=outside))
+    found = analyse(model)
+    case, form = found["suction"], found.cases[0]
+    assert (outside + case.pressure) * case.volume == pytest.approx((outside + 1.0) * form.volume, rel=1e-6)
+    kappa = (outside + 1.0) * sphere_area() / (stiffness(young) * form.volume)
+    assert 1.0 - case.pressure == pytest.approx(suction * kappa / (1.0 + kappa), rel=0.02)
+    held = model_of(
+        cap(), material=material, thickness=THICK, loads=[Wind({"cap": suction + case.pressure - 1.0})]
+    )
+    same = analyse(held)["wind"].results.deflections
+    np.testing.assert_allclose(case.results.deflections, same, atol=1e-5 * same.max())
+
+
+def sphere_area():
+    """Of the cap of height h = 2α - √(4α² - 1) on the unit circle: 4π α h."""
+    return 4.0 * np.pi * ALPHA * (2.0 * ALPHA - np.sqrt(4.0 * ALPHA**2 - 1.0))
+
+
+def bay_of_a_cushion(n):
+    """The barrel of ``strip`` and its mirror image below, held at the same edges."""
+    bay = strip(n)
+    below = np.where(bay.fixed, np.arange(bay.n), bay.n + np.cumsum(~bay.fixed) - 1)
+    X = np.concatenate([bay.vertices, (bay.vertices * [1.0, 1.0, -1.0])[~bay.fixed]])
+    planes = {plane: np.union1d(np.flatnonzero(on), below[np.flatnonzero(on)]) for plane, on in bay.on_planes}
+    faces = np.concatenate([bay.faces, below[bay.faces][:, ::-1]])
+    sheets = [Patch("top", 1.0), Patch("bottom", 1.0)]
+    return Surface(X, faces, np.repeat([0, 1], bay.m), sheets, fixed=bay.fixed.nonzero()[0], on_planes=planes)
+
+
+def cushion_under(q, D, outside):
+    """The pressure of the gas, and the heights of both sheets of that cushion, under q on its upper sheet.
+
+    A sheet is an arc of radius R and half angle θ over its chord, R sin θ = 1/√2, λ times its first length
+    π/2; its tension (α + D (λ² - 1) / 2) λ is R times the pressure across it. R² (2θ - sin 2θ) / 2 is
+    the area under it, and (p_a + p) V stays what it was."""
+    chord = np.sin(np.pi / 4)
+
+    def sheet(pressure):
+        def excess(angle):
+            stretch = 2.0 * angle * chord / np.sin(angle) / (np.pi / 2)
+            return (1.0 + D * (stretch**2 - 1.0) / 2.0) * stretch - pressure * chord / np.sin(angle)
+
+        angle = brentq(excess, 0.05, 1.5)
+        radius = chord / np.sin(angle)
+        return radius**2 * (2.0 * angle - np.sin(2.0 * angle)) / 2.0, radius * (1.0 - np.cos(angle))
+
+    first = (outside + 1.0) * 2.0 * sheet(1.0)[0]
+    p = brentq(lambda p: (outside + p) * (sheet(p - q)[0] + sheet(p)[0]) - first, q + 1e-3, 3.0)
+    return p, sheet(p - q)[1], sheet(p)[1]
+
+
+@needs_ccx
+def test_a_cushion_with_gas_is_two_arcs():
+    """Wind presses the upper sheet of a long cushion: pressure and both heights, to the second order."""
+    young, q, outside, off = 2e4, 0.4, 20.0, []
+    expected = cushion_under(q, young * THICK / (1.0 - 0.3**2), outside)
+    for n in (10, 20):
+        about = {"material": Material(young), "thickness": THICK, "gas": Gas(ambient=outside)}
+        case = analyse(model_of(bay_of_a_cushion(n), loads=[Wind({"top": -q})], anyway=True, **about))["wind"]
+        z = (case.results.model.surface.vertices + case.results.displacements)[:, 2]
+        off.append([case.pressure - expected[0], z.max() - expected[1], -z.min() - expected[2]])
+    assert expected[0] > 1.15
+    np.testing.assert_allclose(off[-1], 0.0, atol=6e-4)
+    assert np.log2(off[0][1] / off[1][1]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_snow_lies_on_the_upper_sheet_of_a_cushion():
+    """And wind without named patches acts there: the lower sheet is under it."""
+    cushion = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], edge_length=0.5, tension=1.5, cushion=2.0).surface()
+    large = cushion.moved(1000.0 * cushion.vertices)
+    assert in_the_open(cushion).tolist() == in_the_open(large).tolist() == [True, False]
+    step = model_of(cushion, loads=[Snow(0.5)], anyway=True).steps[1]
+    assert step.forces.sum(axis=0) == pytest.approx([0.0, 0.0, -6.0])
+    section = pcmc.project.Structure(young=1.0, thickness=1.0, zones=[{"case": "gust", "wind": 0.2}])
+    assert section.loads_on(cushion)[0].pressures == {"patch 1": 0.2}
+    assert in_the_open(parts()).all()
+
+
+def test_a_gas_has_the_pressure_of_the_air_outside_in_any_units():
+    model = model_of(parts(), gas=Gas(volume=1.0), units=Units("mm", "N"), anyway=True)
+    assert model.gas.outside(model.units) == pytest.approx(0.101325)
+    uneven = parts().retensioned(pressures={"east": 2.0})
+    with refused(OptionError, what="Gas.patches"):
+        model_of(uneven, gas=Gas(ambient=100.0), anyway=True)
+    with refused(OptionError, what="Gas.volume"):  # it is flat
+        model_of(parts(), gas=Gas(ambient=100.0), anyway=True)

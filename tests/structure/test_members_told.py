@@ -1,0 +1,186 @@
+"""What is told of members: chapter, picture, sentences, what is too weak, what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hall_with_members import STEEL, TUBE, hall, hall_under_load, hall_with
+from refusals import refused
+from starts import spherical_cap
+from structures import FABRIC, model_of, square
+
+from pcmc import Material, StructuralModel
+from pcmc.base.errors import OptionError
+from pcmc.base.units import Units
+from pcmc.plan import Plan, circle, polyline
+from pcmc.plot import member_forces
+from pcmc.report.chapters import under_load_chapter
+from pcmc.report.tables import Picture, Table
+from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure.member_forces import (
+    members_at_rest,
+    sentences,
+    weak_members,
+)
+from pcmc.structure.section import members_of
+
+needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+
+
+@needs_ccx
+def test_the_chapter_of_a_report_has_sections_and_forces_of_members():
+    blocks = list(under_load_chapter(hall_under_load(), Units("m", "kN")))
+    tables = {block.title: block for block in blocks if isinstance(block, Table)}
+    [arch] = tables["Members"].rows
+    assert arch == ["wall 1", "wall 1", "tube 0.1 × 0.005", "0.001492", "1.688e-06", "1.688e-06", "2.1e+08"]
+    assert [row[:2] for row in tables["Forces of members"].rows] == [
+        [case, "wall 1"] for case in ("form pressure", "self-weight", "snow")
+    ]
+    assert "M, kN·m" in tables["Forces of members"].head
+    assert any(isinstance(block, str) and block.startswith("wall 1: at rest N = ") for block in blocks)
+    assert sum(isinstance(block, Picture) for block in blocks) == 3
+
+
+@needs_ccx
+def test_the_picture_of_forces_has_a_column_per_member_and_refuses_a_wrong_name():
+    """A straight edge bends in the plane of its sheet: what is across is dashed."""
+    edges = [Member(polyline([[0, y], [1, y]]), TUBE, STEEL, name=f"edge {y}") for y in (0, 1)]
+    both = analyse(model_of(square(8, tension=2.0), members=edges, anyway=True))
+    one, two = member_forces(both, members=("edge 0",), width=400), member_forces(both, width=800)
+    assert one.shape[1] == two.shape[1] // 2
+    assert one.shape[0] == two.shape[0]
+    inked = [(picture.min(axis=2) < 100).sum() for picture in (one, two)]
+    assert inked[1] > 1.5 * inked[0]
+    with refused(OptionError, what="members", found="edge 2"):
+        member_forces(both, members=("edge 2",))
+    with refused(OptionError, what="cases", found="wind"):
+        member_forces(both, cases=("wind",))
+    with refused(OptionError, what="analysis"):
+        member_forces(analyse(model_of(square(4, tension=2.0), anyway=True)))
+
+
+def test_a_member_that_cannot_be_is_refused_in_a_line():
+    def lines(surface, member):
+        return model_of(surface, members=[member], anyway=True).lines
+
+    cap = spherical_cap(0.2, alpha=0.6)
+    with refused(OptionError, what="members", found="wall 2"):
+        hall_with(Member("wall 2", TUBE, STEEL))
+    with refused(OptionError, what="members", found="west"):
+        hall_with(Member("west", TUBE, STEEL))
+    with refused(OptionError, what="members", where="wall 1"):  # its junction rests, but for a third of it
+        hall_with(of=hall(wall=1.4))
+    with refused(OptionError, what="members", where="member"):
+        lines(cap, Member(polyline([[5, 5], [6, 6]]), TUBE, STEEL))
+    with refused(OptionError, what="Member.propped"):
+        Member("wall 1", TUBE, STEEL, propped=True)
+    with refused(OptionError, what="Member.material"):
+        Member("wall 1", TUBE, Material(1e5, weft=1e5, shear=1e4))
+    with refused(OptionError, what="Member.profile"):
+        Member("wall 1", 0.3, STEEL)
+    with refused(OptionError, what="Profile.area"):
+        Profile(0.0, 1.0)
+    with refused(OptionError, what="Profile.thickness"):
+        Profile.tube(0.1, 0.06)
+    with refused(OptionError, what="members", where="wall 1"):
+        StructuralModel(hall(), FABRIC, 1e-3, members=[Member("wall 1", TUBE, STEEL)] * 2)
+    with refused(OptionError, what="members"):
+        StructuralModel(hall(), FABRIC, 1e-3, members=["wall 1"])
+    crossing = [[[4, 0], [4, 4]], [[0, 2], [8, 2]]]
+    bays = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], crossing, edge_length=0.8, tension=2.0).surface()
+    with refused(OptionError, what="members", where="wall 1"):
+        lines(bays, Member("wall 1", TUBE, STEEL))
+    assert (
+        len(model_of(bays, members=[Member(w, TUBE, STEEL) for w in ("wall 1", "wall 2")], anyway=True).lines)
+        == 2
+    )
+
+
+def test_members_of_a_project_are_refused_in_a_line():
+    """Without a section, on a divider without a wall, on a free hole, of a name that is not there."""
+    area = [[0, 0], [4, 0], [4, 2], [0, 2]]
+
+    def members(table, **divider):
+        line = {"curve": [[2, 0], [2, 2]], "member": "arch", **divider}
+        return members_of({"arch": table}, Plan(area, [line], tension=2.0))
+
+    good = {"young": 2.1e8, "diameter": 0.1, "thickness": 0.005}
+    assert [m.on for m in members(good)] == ["wall 1"]
+    with refused(OptionError, what="structure.members", where="arch"):
+        members({"young": 2.1e8})
+    with refused(OptionError, what="structure.members", where="arch"):
+        members({"diameter": 0.1})
+    with refused(OptionError, what="area"):
+        members({"young": 2.1e8, "area": 0.0, "upright": 1.0})
+    with refused(OptionError, where="depth"):
+        members({"young": 2.1e8, "depth": 1.0})
+    with refused(OptionError, what="member", found="truss"):
+        members(good, member="truss")
+    with refused(OptionError, what="member"):
+        members(good, wall=False)
+    hole = {"curve": circle([2, 1], 0.4), "edge": "free", "member": "arch"}
+    with refused(OptionError, what="member"):
+        members_of({"arch": good}, Plan(area, holes=[hole], tension=2.0))
+
+
+@needs_ccx
+def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
+    """A wire in the place of an arch moves beyond span/300; an edge so soft that the film spans in its place.
+    Each is named; with the stiffness that the line gives, neither is."""
+
+    def weak(analysis):
+        return [line for line in analysis.answers() if "too weak" in line]
+
+    def factor(line):
+        return float(line.split("it would need ")[1].split(" times")[0])
+
+    arch = Member("wall 1", Profile.tube(0.005, 0.0005), STEEL)
+    [told] = weak(analyse(hall_with(arch), remedy=False))
+    [rest] = members_at_rest(hall_with(arch))
+    assert told.startswith("wall 1 is too weak: under form pressure it moves 0.0")
+    assert factor(told) == pytest.approx(300.0 * rest.deflection / rest.span, rel=0.01)
+    assert weak(analyse(hall_with(replace(arch, profile=arch.profile.scaled(factor(told)))))) == []
+
+    edge = Member(polyline([[0, 1], [1, 1]]), Profile.tube(0.06, 0.005), Material(2.1e6), name="edge")
+    [told] = weak(analyse(model_of(square(8, tension=2.0), members=[edge], anyway=True)))
+    assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
+    stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
+    assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
+
+
+def test_what_sheets_carry_of_the_pull_of_a_weak_member_is_a_percentage():
+    """A beam under load with a quarter of its pull at rest: the sheets carry the other three."""
+    model = hall_with(Member("wall 1", Profile.tube(0.005, 0.0005), STEEL))
+    rest = members_at_rest(model)
+    case = tuple(replace(beam, pulls=0.25 * beam.pulls) for beam in rest)
+    [line] = [line for line in weak_members(model, [("snow", case)], Units()) if "too weak" in line]
+    assert "at rest the sheets carry 75 % of what it should" in line
+
+
+def test_a_sentence_has_the_force_that_is_largest_in_size_and_what_it_leaves():
+    """In tension below 1 along an arch, with its share of bending; in compression along a rim."""
+    arch = hall_with(of=hall(scale=0.05))
+    rim = model_of(
+        spherical_cap(0.4, alpha=0.6, exact=True),
+        members=[Member(circle([0, 0], 1.0), TUBE, STEEL, propped=True)],
+        anyway=True,
+    )
+    for model, sign in ((arch, 1.0), (rim, -1.0)):
+        [text], [beam] = sentences(model, Units("m", "kN")), members_at_rest(model)
+        N = max(beam.within[:, 0], key=abs)
+        assert N * sign > 0.0
+        assert f": at rest N = {N:.3g} kN, M up to {beam.largest['M']:.3g} kN·m" in text
+        assert "thrust" not in text
+    share = members_at_rest(arch)[0].balance[1]
+    assert f"would leave {100.0 * share:.0f} % of the sheets' pull" in sentences(arch, Units())[0]
+
+
+@pytest.mark.parametrize(("ends", "shown"), [((-3.0, 1.0), "-3"), ((-1.0, 3.0), "3")])
+def test_a_sentence_shows_a_thrust_that_is_larger_than_the_pull(monkeypatch, ends, shown):
+    [beam] = members_at_rest(hall_with())
+    within = beam.within.copy()
+    within[:, 0] = np.linspace(*ends, len(within))
+    turned = [replace(beam, within=within)]
+    monkeypatch.setattr("pcmc.structure.member_forces.members_at_rest", lambda model: turned)
+    [text] = sentences(hall_with(), Units("m", "kN"))
+    assert text.startswith(f"wall 1: at rest N = {shown} kN, ")
