@@ -15,6 +15,7 @@ from ..meshing.quality import edge_lengths, triangle_quality
 from ..meshing.strips import strip_of
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
+from ..surface.pieces import point_text
 from .forces import held_boundary
 from .tables import names_of
 
@@ -30,11 +31,9 @@ class Neck:
     ratio: float  # girth over the length of the shorter of the two curves
 
     def __str__(self) -> str:
-        place = self.place.round(3) + 0.0
-        return (
-            f"a neck pinches off near {place.tolist()}: {self.girth:.2g} around,"
-            f" {self.ratio:.2g} of the shorter curve that holds it"
-        )
+        place = point_text(self.place, self.girth / self.ratio)
+        around = f"{self.girth:.2g} around, {self.ratio:.2g} of the shorter curve that holds it"
+        return f"a neck pinches off near {place}: {around}"
 
 
 def pinched_neck(surface: Surface) -> Neck | None:
@@ -158,7 +157,7 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     place = surface.vertices[surface.faces[face]].mean(axis=0)
     worst = (
         f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
-        f" {place.round(4).tolist()}, quality {quality:.1e}"
+        f" {point_text(place, surface.size)}, quality {quality:.1e}"
     )
     if films := vanished_films(surface):
         strip = strip_of(surface, surface.patch_index(films[0]))
@@ -275,12 +274,12 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     face = int(np.flatnonzero((surface.faces == most).any(axis=1))[0])
     part = f"patch {surface.patches[surface.patch_of_face[face]].name!r}"
     part = f"the junction {names_of(surface, curves[0].sheets)}" if curves else part
-    text += f"; the mode moves {part} most, near {_text(surface.vertices[most])}"
+    text += f"; the mode moves {part} most, near {point_text(surface.vertices[most], surface.size)}"
     ends = slipping_ends(surface, mode)
     if not ends:
         return text
     junctions = " and of ".join(dict.fromkeys(end.junction for end in ends))
-    places = " and ".join(_text(end.place) for end in ends[:4])
+    places = " and ".join(point_text(end.place, surface.size) for end in ends[:4])
     walls = " and of ".join(dict.fromkeys(repr(name) for end in ends for name in end.walls))
     advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
     which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
@@ -288,7 +287,3 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
         f"{text}; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
         f" {ends[0].share:.2f} as far, so only the mesh holds it there; {advice}"
     )
-
-
-def _text(place: Floats) -> str:
-    return str((place.round(3) + 0.0).tolist())

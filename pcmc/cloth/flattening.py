@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, vstack
+from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, block_rows
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 
 SEAM_WEIGHT = 1e3  # of a seam's misfit beside the strain: squared, so that seams are equal to about 1e-9
@@ -109,18 +109,11 @@ def _jacobians(y: Floats, F: Ints, gradient: Floats) -> Floats:
     return np.einsum("mci,mjc->mij", y[F], gradient)
 
 
-def _sparse(blocks: Floats, corners: Ints, count: int) -> csr_array:
-    """The matrix with blocks (r,k,c,2): c rows for each r, columns for both coordinates of corners (r,k)."""
-    shape = blocks.shape[0] * blocks.shape[2], 2 * count
-    start = corners.shape[1] * np.arange(len(corners) + 1)
-    return bsr_array((blocks.reshape(-1, *blocks.shape[2:]), corners.ravel(), start), shape=shape).tocsr()
-
-
 def _conformal(F: Ints, gradient: Floats, root: Floats, pins: Ints, places: Floats, count: int) -> Floats:
     """(u,2) the map with the least Σ A ((xₛ - yₜ)² + (xₜ + yₛ)²) that takes the pins to their places."""
     (g, h), w = gradient.transpose(1, 0, 2), root[:, None]
     rows = np.stack([np.stack([w * g, -w * h], axis=2), np.stack([w * h, w * g], axis=2)], axis=2)
-    A = _sparse(rows, F, count)
+    A = block_rows(rows, F, count)
     y, free = np.zeros(2 * count), np.ones(2 * count, dtype=bool)
     y[pins], free[pins] = places, False
     y[free] = _least_squares(A[:, free], -(A @ y))
@@ -144,6 +137,6 @@ def _misfit(
     squares = 0.5 * (cut * cut).sum(axis=2)
     slopes = weight[:, None] * cut * stretch[seams[..., 0]] * np.array([1.0, -1.0])[:, None, None]
     ends = np.stack([-slopes[0], slopes[0], -slopes[1], slopes[1]], axis=1)[:, :, None]
-    sewn = _sparse(ends, np.concatenate([*seams], axis=1), len(y))
+    sewn = block_rows(ends, np.concatenate([*seams], axis=1), len(y))
     residual = np.append(strain, weight * (squares[0] - squares[1]))
-    return residual, vstack([_sparse(rows, F, len(y)), sewn]).tocsr()
+    return residual, vstack([block_rows(rows, F, len(y)), sewn]).tocsr()

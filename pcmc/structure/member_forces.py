@@ -17,7 +17,7 @@ from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
 from .frames import BarFrame
 from .loads import Step
-from .members import MemberLine
+from .members import PlacedMember
 from .model import StructuralModel
 from .pulls import at_vertices, balancing_force, corner_forces, turns
 from .results import StepResults
@@ -33,7 +33,7 @@ HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of 
 class MemberForces:
     """What a beam carries along its line, and how far it moves."""
 
-    line: MemberLine
+    line: PlacedMember
     points: Floats  # (k,3) of the form
     within: Floats  # (k,6) N, V, V across, T, M, M across; see ``FrameForces.within``
     displacements: Floats  # (k,3)

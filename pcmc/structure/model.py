@@ -35,7 +35,7 @@ from .loads import (
     load_steps,
 )
 from .material import Material
-from .members import Bar, Member, MemberLine, bars_on, lines_on
+from .members import Member, PlacedMember, bars_on, lines_on
 from .pulls import at_vertices, balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
@@ -211,17 +211,17 @@ class StructuralModel:
         return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
 
     @cached_property
-    def lines(self) -> tuple[MemberLine, ...]:
+    def lines(self) -> tuple[PlacedMember, ...]:
         """The lines of the members, but for those of the surface's own cables."""
         return lines_on(self.surface, self.members)
 
     @cached_property
-    def beams(self) -> tuple[MemberLine, ...]:
+    def beams(self) -> tuple[PlacedMember, ...]:
         """Those that are beams."""
         return tuple(line for line in self.lines if line.member.kind == "beam")
 
     @cached_property
-    def bars(self) -> tuple[Bar, ...]:
+    def bars(self) -> tuple[PlacedMember, ...]:
         """The columns and stays: they carry what the points of supports do, and are no elements."""
         return bars_on(self.surface, self.members, self.lines)
 

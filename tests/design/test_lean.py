@@ -35,7 +35,7 @@ def test_a_wall_turned_by_an_angle_leans_by_it():
     turned = surface.moved(X)
     assert measure(turned, LEAN).value == pytest.approx(20.0)
     assert certify(turned).leaning["lean"].tolist() == pytest.approx([20.0])
-    assert "'wall 1' by 20.0° near [" in certify(turned).text()
+    assert "'wall 1' by 20.0° near (" in certify(turned).text()
 
 
 def test_the_derivative_by_positions_is_exact():
