@@ -122,7 +122,8 @@ def test_the_span_of_a_half_is_that_of_the_whole_roof(given):
     roofs = {
         "whole": "outline = [[0, 0], [12, 0], [12, 8], [0, 8]]",
         "half": "outline = [[0, 0], [6, 0], [6, 8], [0, 8]]\nmirrors = [[[6, 0], [6, 8]]]",
-        "quarter": "outline = [[0, 0], [6, 0], [6, 4], [0, 4]]\nmirrors = [[[6, 0], [6, 4]], [[0, 4], [6, 4]]]",
+        "quarter": "outline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
+        "mirrors = [[[6, 0], [6, 4]], [[0, 4], [6, 4]]]",
     }
     for text in roofs.values():
         outcome = run_project(
