@@ -254,7 +254,7 @@ def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: Any) -> tu
     mesh = meshes.current_mesh()
     turned = np.einsum("ij,ij->i", old, _area_vectors(mesh.vertex_matrix(), mesh.face_matrix())) < 0.0
     changes["triangles turned"] += min(np.count_nonzero(turned), np.count_nonzero(~turned))
-    over = 2 * np.count_nonzero(turned) > len(turned)
+    over = bool(2 * np.count_nonzero(turned) > len(turned))
     faces = mesh.face_matrix()
     size = len(faces)
     if holes >= 3:
