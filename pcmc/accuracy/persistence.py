@@ -20,6 +20,7 @@ from ..solvers.result import Result, Status
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from ..surface.pieces import point_text
 
 FAR = 0.25  # of the surface's extent: a finer surface this far away is another shape
 FLAT = 0.1  # of its size: the least extent that counts
@@ -66,7 +67,7 @@ def lost(start: Surface, result: Result) -> Finding:
         what, vertices = "its forces do not come to rest", left.argmax(keepdims=True)
     place, load = start.vertices[vertices].mean(axis=0), overload(surface)
     reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
-    reason += f" near {_text(place)}" + ("" if load is None else f"; {load}")
+    reason += f" near {point_text(place, start.size)}" + ("" if load is None else f"; {load}")
     return _at(MeshVerdict.HELD_BY_MESH, start, reason, place)
 
 
@@ -79,7 +80,9 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             becomes = "stable" if certificate.index == 0 else f"a saddle of index {certificate.index}"
             was = "stable" if first.index == 0 else f"of index {first.index}"
             reason = f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest"
-            return _at(MeshVerdict.CHANGES, surface, f"{reason} near {_text(place)}", place)
+            return _at(
+                MeshVerdict.CHANGES, surface, f"{reason} near {point_text(place, surface.size)}", place
+            )
     size = max(float(np.ptp(surfaces[0].plane.height(surfaces[0].vertices))), FLAT * surfaces[0].size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
@@ -87,13 +90,15 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             return contact
         far, place = float(move.max()), surface.vertices[int(move.argmax())]
         if far > FAR * size:
-            reason = f"on {fine.m} triangles it is another shape, {far:.3g} away near {_text(place)}"
-            return _at(MeshVerdict.CHANGES, surface, reason, place)
+            reason = f"on {fine.m} triangles it is another shape, {far:.3g} away near"
+            text = f"{reason} {point_text(place, surface.size)}"
+            return _at(MeshVerdict.CHANGES, surface, text, place)
     if _order(surfaces, moves) < 0.0:
         before, last = (_mean(move) for move in moves[-2:])
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
         moved = f"by {before:.2g}, then {last:.2g} in the mean"
-        reason = f"each finer surface is farther from the last one ({moved}), most near {_text(place)}"
+        reason = f"each finer surface is farther from the last one ({moved}), most near"
+        reason += f" {point_text(place, surfaces[-1].size)}"
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
     return _stability(surfaces, certificates)
 
@@ -144,7 +149,8 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     if lowest[-1] + FURTHER * step >= 0.0:
         return Finding(MeshVerdict.PERSISTS, reason)
     place = _where_softest(finest, certificates[-1])
-    reason += f": it would be a saddle within {FURTHER} more refinements, by a motion near {_text(place)}"
+    reason += f": it would be a saddle within {FURTHER} more refinements, by a motion near"
+    reason += f" {point_text(place, finest.size)}"
     return _at(MeshVerdict.HELD_BY_MESH, finest, reason, place)
 
 
@@ -193,7 +199,10 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> F
             nearest, end = distance, X[min(ends, key=lambda v: np.linalg.norm(X[v] - place))]
             names = names_of(surface, curve.sheets)
             wall = next(surface.patches[k].name for k in curve.sheets if sliding[k])
-            ending = f"; the junction {names} there ends at {_text(end)}, where only the mesh holds it"
+            ending = (
+                f"; the junction {names} there ends at {point_text(end, surface.size)}, where only the mesh"
+            )
+            ending += " holds it"
             advice = (
                 f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'
                 " vertices to fixed="
@@ -204,7 +213,3 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> F
 def _tuple(place: Floats) -> tuple[float, float, float]:
     x, y, z = (float(c) for c in place)
     return x, y, z
-
-
-def _text(place: Floats) -> str:
-    return "(" + ", ".join(f"{c:.3g}" for c in np.round(place, 6) + 0.0) + ")"

@@ -6,10 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from enum import Enum
 from functools import cached_property, wraps
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.integer[Any]]
@@ -57,6 +60,20 @@ def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
         return read_only(method(owner))
 
     return cached_property(computed)
+
+
+def block_rows(blocks: Floats, corners: Ints, count: int) -> csr_array:
+    """The matrix of blocks (r,k,c,d): c rows for each r, d columns for each of ``count`` vertices; the blocks
+    of row r stand in the columns of the corners (r,k).
+
+    >>> block_rows(np.array([[[[5.0]], [[7.0]]]]), np.array([[2, 0]]), 3).toarray().tolist()
+    [[7.0, 0.0, 5.0]]
+    """
+    from scipy.sparse import bsr_array  # here, as much of pcmc never asks
+
+    r, k, c, d = blocks.shape
+    entries = blocks.reshape(-1, c, d), corners.ravel(), k * np.arange(r + 1)
+    return bsr_array(entries, shape=(c * r, d * count)).tocsr()
 
 
 def format_rows(template: str, *columns: npt.NDArray[Any]) -> str:

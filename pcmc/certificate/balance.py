@@ -12,6 +12,7 @@ from ..forces.cables import cable_pulls
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
+from ..surface.pieces import point_text
 from ..surface.supports import common_point, uncancelled_pressures
 from ..surface.values import balanced_wall
 from .forces import load
@@ -266,7 +267,7 @@ def pressures_left_over(surface: Surface) -> str:
         return ""
     at = (surface.topology.edge_of_face == edges[0]).any(axis=1)
     names = " | ".join(surface.patches[k].name for k in np.unique(surface.patch_of_face[at]))
-    place = surface.vertices[surface.topology.edges[edges[0]]].mean(axis=0).round(4).tolist()
+    place = point_text(surface.vertices[surface.topology.edges[edges[0]]].mean(axis=0), surface.size)
     return (
         f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not"
         f" cancel: {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of"

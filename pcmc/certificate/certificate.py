@@ -230,7 +230,7 @@ class Certificate:
             ("curvature error", f"{self.curvature_error:.2e}"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
-            ("walls lean", ", ".join(tables.lean_texts(self.leaning))),
+            ("walls lean", ", ".join(tables.lean_texts(self.leaning, self.acting.surface.size))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
             ("load, reactions", ", ".join(f"{x:.6g}{force}" for x in sums) + " along the plane's normal"),
             ("balance", balance_sentence(self.balance, self.symmetric_in)),

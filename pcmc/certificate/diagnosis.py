@@ -12,8 +12,10 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
 from ..meshing.quality import edge_lengths, triangle_quality
+from ..meshing.strips import strip_of
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
+from ..surface.pieces import point_text
 from .forces import held_boundary
 from .tables import names_of
 
@@ -29,11 +31,9 @@ class Neck:
     ratio: float  # girth over the length of the shorter of the two curves
 
     def __str__(self) -> str:
-        place = self.place.round(3) + 0.0
-        return (
-            f"a neck pinches off near {place.tolist()}: {self.girth:.2g} around,"
-            f" {self.ratio:.2g} of the shorter curve that holds it"
-        )
+        place = point_text(self.place, self.girth / self.ratio)
+        around = f"{self.girth:.2g} around, {self.ratio:.2g} of the shorter curve that holds it"
+        return f"a neck pinches off near {place}: {around}"
 
 
 def pinched_neck(surface: Surface) -> Neck | None:
@@ -157,10 +157,13 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     place = surface.vertices[surface.faces[face]].mean(axis=0)
     worst = (
         f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
-        f" {place.round(4).tolist()}, quality {quality:.1e}"
+        f" {point_text(place, surface.size)}, quality {quality:.1e}"
     )
-    if change := _exchange(surface, int(surface.patch_of_face[face])):
-        worst += f"; {change}"
+    if films := vanished_films(surface):
+        strip = strip_of(surface, surface.patch_index(films[0]))
+        others = f" and {len(films) - 1} more" if len(films) > 1 else ""
+        meeting = strip.meeting(surface, "then") if strip else ""
+        return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; try pcmc.swap_neighbours(surface)"
     if held_wall_down(surface, pinchable):
         return worst + (
             "; the junction there comes down on the held bottom of its wall, so the wall has no height"
@@ -175,30 +178,17 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     return worst
 
 
-def _exchange(surface: Surface, patch: int) -> str:
-    """Names the patches that meet once a film between two junctions has vanished; empty if it does not.
-
-    Of the two patches beside each junction, those on the same side of the film meet, as in a T1 of a foam.
-    """
-    X, F, topo = surface.vertices, surface.faces, surface.topology
-    curves = [curve for curve in topo.junctions if patch in curve.sheets]
-    beside = [[k for k in curve.sheets if k != patch] for curve in curves]
-    around = [k for pair in beside for k in pair]
-    if [len(pair) for pair in beside] != [2, 2] or len(set(around)) < 4:
-        return ""
-    area = np.bincount(surface.patch_of_face, face_areas(X[F]), len(surface.patches))
-    if area[patch] > NARROW * area[around].min():
-        return ""
-    apart = []  # across the film at each junction, from the one patch beside it to the other
-    for curve, pair in zip(curves, beside, strict=True):
-        f, k = np.nonzero(np.isin(topo.edge_of_face, topo.edge_numbers(curve.pairs)))
-        inwards = X[F[f, k]] - 0.5 * (X[F[f, k - 1]] + X[F[f, k - 2]])
-        one, other = (inwards[surface.patch_of_face[f] == own].sum(axis=0) for own in pair)
-        apart.append(other - one)
-    (a, b), (c, d) = beside[0], beside[1][:: 1 if apart[0] @ apart[1] > 0.0 else -1]
-    name = [repr(p.name) for p in surface.patches]
-    meet = f"{name[a]} and {name[c]} then meet, and {name[b]} and {name[d]}"
-    return f"patch {name[patch]} may vanish: {meet}; start from a mesh where they do"
+def vanished_films(surface: Surface) -> list[str]:
+    """The films between two junctions that have vanished, by name: narrow, and small beside the others."""
+    area = np.bincount(
+        surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
+    )
+    names = []
+    for patch in np.flatnonzero(area < NARROW * area.max()):
+        strip = strip_of(surface, int(patch))
+        if strip and area[patch] < NARROW * area[list(strip.sheets)].min() and strip.width < strip.height:
+            names.append(surface.patches[patch].name)
+    return names
 
 
 def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
@@ -284,12 +274,12 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     face = int(np.flatnonzero((surface.faces == most).any(axis=1))[0])
     part = f"patch {surface.patches[surface.patch_of_face[face]].name!r}"
     part = f"the junction {names_of(surface, curves[0].sheets)}" if curves else part
-    text += f"; the mode moves {part} most, near {_text(surface.vertices[most])}"
+    text += f"; the mode moves {part} most, near {point_text(surface.vertices[most], surface.size)}"
     ends = slipping_ends(surface, mode)
     if not ends:
         return text
     junctions = " and of ".join(dict.fromkeys(end.junction for end in ends))
-    places = " and ".join(_text(end.place) for end in ends[:4])
+    places = " and ".join(point_text(end.place, surface.size) for end in ends[:4])
     walls = " and of ".join(dict.fromkeys(repr(name) for end in ends for name in end.walls))
     advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
     which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
@@ -297,7 +287,3 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
         f"{text}; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
         f" {ends[0].share:.2f} as far, so only the mesh holds it there; {advice}"
     )
-
-
-def _text(place: Floats) -> str:
-    return str((place.round(3) + 0.0).tolist())

@@ -16,6 +16,7 @@ from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.pieces import point_text
 from ..surface.topology import EdgeCurve
 from .forces import CableEnd, cable_parts, sheet_pulls
 
@@ -203,10 +204,13 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["wall", "lean", *"xyz"])
 
 
-def lean_texts(table: pd.DataFrame, least: float = 0.05) -> list[str]:
-    """The walls that lean by at least ``least`` degrees, in words, the one that leans most first."""
+def lean_texts(table: pd.DataFrame, size: float, least: float = 0.05) -> list[str]:
+    """The walls that lean by at least ``least`` degrees, in words, the one that leans most first; ``size`` is
+    that of the surface."""
     if not len(table):
         return []
     leaning = table[table["lean"] >= least].sort_values("lean", ascending=False)
     rows = leaning[["wall", "lean", *"xyz"]].itertuples(index=False, name=None)
-    return [f"{wall!r} by {lean:.1f}° near [{x:.4g}, {y:.4g}, {z:.4g}]" for wall, lean, x, y, z in rows]
+    return [
+        f"{wall!r} by {lean:.1f}° near {point_text(np.array(place), size)}" for wall, lean, *place in rows
+    ]

@@ -15,6 +15,7 @@ from ..forces.cables import compressed_cables
 from ..forces.triangles import compressed, effective_tensions
 from ..stability.modes import Spectrum
 from ..surface import Surface
+from ..surface.pieces import point_text
 from .balance import coarseness, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
 from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
@@ -213,7 +214,7 @@ def _compressed(f: Findings) -> str:
     if not len(faces):
         ends = surface.cable_edges.ends[edges[0]]
         name = next(c.name for c in surface.cables if (c.edges == np.sort(ends)).all(axis=1).any())
-        place = surface.vertices[ends].mean(axis=0).round(4).tolist()
+        place = point_text(surface.vertices[ends].mean(axis=0), surface.size)
         return (
             f"cable {name!r} is under compression at {place} ({len(edges)} edges of cables are): its weight"
             " leaves τ + g z ≤ 0; raise its tension, or put Π lower"
@@ -221,7 +222,7 @@ def _compressed(f: Findings) -> str:
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
     worst = faces[pull.argmin()]
     name = surface.patches[surface.patch_of_face[worst]].name
-    place = surface.vertices[surface.faces[worst]].mean(axis=0).round(4).tolist()
+    place = point_text(surface.vertices[surface.faces[worst]].mean(axis=0), surface.size)
     return (
         f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
         f" {pull.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"

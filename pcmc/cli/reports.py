@@ -49,7 +49,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
             print(detail)
         if (whole := outcome.whole) is not None and outcome.solved.certificate.index is not None:
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
-        leaning = lean_texts(certificate.leaning, FAR)
+        leaning = lean_texts(certificate.leaning, outcome.surface.size, FAR)
         if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
     if outcome.under_load is not None:

@@ -126,7 +126,7 @@ class CutMesh:
         X = np.concatenate([self.X, (at @ self.X[corners])[None]])
         return replace(self, X=X, F=F, source=source), len(self.X)
 
-    def with_seam(self, start: int, end: int, number: int, name: str, faces: Bools | None = None) -> CutMesh:
+    def with_seam(self, start: int, end: int, number: int, name: str, faces: Bools) -> CutMesh:
         """The mesh cut along a geodesic between two vertices of one piece; OptionError if there is none.
 
         Where several pieces have both vertices it is one of those with ``faces`` (m,), if there is any."""
@@ -138,7 +138,7 @@ class CutMesh:
             places = " to ".join(point_text(self.X[vertex]) for vertex in (start, end))
             text = f"{name}: from {places} it crosses another seam, a ridge or a cable; end it there"
             raise OptionError(text, what="seams", where=number)
-        if faces is not None and (wanted := np.isin(both, self.pieces.piece[faces])).any():
+        if (wanted := np.isin(both, self.pieces.piece[faces])).any():
             both = both[wanted]
         library, found = load_library("potpourri3d", "cloth"), list[tuple[float, Floats, int]]()
         for piece in both.tolist():
@@ -157,12 +157,10 @@ class CutMesh:
         edges = self.topology.edges[sides]
         middle, length = self.X[edges].mean(axis=1), segment_lengths(self.X, edges)
         near = cKDTree(path).query(middle)[0] <= 0.5 * length + ON * self.size
-        edges, start, along = edges[near], self.X[edges[near, 0]], np.diff(self.X[edges[near]], axis=1)[:, 0]
         place, share = np.empty((len(path), 2), dtype=np.int64), np.empty(len(path))
         for k, point in enumerate(path):
-            t = np.clip(((point - start) * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
-            best = int(np.linalg.norm(start + t[:, None] * along - point, axis=1).argmin())
-            place[k], share[k] = edges[best], t[best]
+            weights, away = nearest_places(self.X[edges[near][:, [0, 1, 1]]], point)
+            place[k], share[k] = edges[near][away.argmin()], 1.0 - weights[away.argmin(), 0]
         return place, share
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, vstack
+from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Floats, Ints
-from ..surface.geometry import edge_vectors, face_areas
+from ..base.arrays import Floats, Ints, block_rows
+from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 
 SEAM_WEIGHT = 1e3  # of a seam's misfit beside the strain: squared, so that seams are equal to about 1e-9
 ROUNDS, SMALL_STEP = 50, 1e-10  # of the descent; a last step, in the size
@@ -17,24 +17,11 @@ FOLDED = 1e6  # the strain of a triangle laid on its back
 SHORTEST = 1e-4  # part of a step that is still tried
 
 
-class Flat(NamedTuple):
-    """Strips laid flat."""
-
-    points: Floats  # (u,2) as they are before compensation
-    strain: Floats  # (m,2) of the cloth in each triangle on the roof: least and largest principal strain
-
-
-class SewnEdges(NamedTuple):
-    """Edges that are sewn: row k of one side lies on row k of the other."""
-
-    one: Ints  # (s,2) vertices of strips
-    other: Ints  # (s,2)
-
-
 def flattened(
-    X: Floats, F: Ints, strip: Ints, seams: SewnEdges, stretch: Floats, start: Floats | None = None
-) -> Flat:
-    """Strips F (m,3) with vertices X (u,3) laid flat.
+    X: Floats, F: Ints, strip: Ints, seams: Ints, stretch: Floats, start: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Strips F (m,3) with vertices X (u,3) laid flat: points (u,2), as they are before compensation; and the
+    least and largest principal strain of the cloth in each triangle on the roof (m,2).
 
     With J the map from a triangle of the roof to the flat one, E = ½ (JᵀJ - I) and the cut lengths l of the
     sides of a seam, which is L long on the roof, the sum Σ A |E|² + W² Σ L² ((l₁² - l₂²) / 2L²)² is least:
@@ -44,33 +31,31 @@ def flattened(
     Parameters
     ----------
     strip : (u,) the strip of each vertex.
-    seams : pairs of edges that are sewn together.
+    seams : (2,s,2) edges; those of one half are sewn to those of the other.
     stretch : (u,2) cut length over flat length along x, the warp, and along y, for each vertex.
     start : (u,2) points to begin with; one point of each strip and a direction stay as they are.
 
     >>> X = np.array([[0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0.0]])
-    >>> none = SewnEdges(np.empty((0, 2), dtype=int), np.empty((0, 2), dtype=int))
-    >>> flat = flattened(X, np.array([[0, 1, 2], [0, 2, 3]]), np.zeros(4, dtype=int), none, np.ones((4, 2)))
-    >>> flat.points.round(9).tolist(), bool(abs(flat.strain).max() < 1e-9)
+    >>> F, none = np.array([[0, 1, 2], [0, 2, 3]]), np.empty((2, 0, 2), dtype=int)
+    >>> flat, strain = flattened(X, F, np.zeros(4, dtype=int), none, np.ones((4, 2)))
+    >>> flat.round(9).tolist(), bool(abs(strain).max() < 1e-9)
     ([[0.0, 0.0], [1.8, -2.4], [5.0, 0.0], [3.2, 2.4]], True)
     """
     pins, places = _pins(X, strip)
-    free = np.ones(2 * len(X), dtype=bool)
-    free[pins] = False
     gradient, root = _gradients(X[F]), np.sqrt(face_areas(X[F]))
     y = _conformal(F, gradient, root, pins, places, len(X)) if start is None else start
+    free = np.ones(2 * len(X), dtype=bool)
+    free[pins] = False
     free[pins[2::4]] = True  # the second point may move along x
-    lengths = np.linalg.norm(X[seams.one[:, 1]] - X[seams.one[:, 0]], axis=1)
-
-    def misfit(y: Floats) -> tuple[Floats, csr_array]:
-        return _misfit(y, F, gradient, root, seams, lengths, stretch)
-
+    lengths = segment_lengths(X, seams[0])
+    misfit = partial(
+        _misfit, F=F, gradient=gradient, root=root, seams=seams, lengths=lengths, stretch=stretch
+    )
     residual, jacobian = misfit(y)
     size = float(np.ptp(X, axis=0).max())
     for _ in range(ROUNDS):
-        J = jacobian[:, free]
         step = np.zeros(len(free))
-        step[free] = _least_squares(J, -residual)
+        step[free] = _least_squares(jacobian[:, free], -residual)
         part, before = 1.0, float(residual @ residual)
         while True:
             moved = y + part * step.reshape(-1, 2)
@@ -81,10 +66,10 @@ def flattened(
         y = moved
         if np.abs(part * step).max() <= SMALL_STEP * size:
             break
-    _, sigma, _ = np.linalg.svd(_jacobians(y, F, gradient))
-    turned = np.linalg.det(_jacobians(y, F, gradient)) <= 0.0
-    sigma[turned, 1] = 1.0 / (1.0 + FOLDED)  # laid on its back
-    return Flat(y, 1.0 / sigma - 1.0)
+    J = _jacobians(y, F, gradient)
+    sigma = np.linalg.svd(J)[1]
+    sigma[np.linalg.det(J) <= 0.0, 1] = 1.0 / (1.0 + FOLDED)  # laid on its back
+    return y, 1.0 / sigma - 1.0
 
 
 def _least_squares(J: csr_array, right: Floats) -> Floats:
@@ -124,50 +109,34 @@ def _jacobians(y: Floats, F: Ints, gradient: Floats) -> Floats:
     return np.einsum("mci,mjc->mij", y[F], gradient)
 
 
-def _sparse(blocks: Floats, columns: Ints, count: int) -> csr_array:
-    """Rows (r,k) of a sparse matrix with ``count`` columns, their entries in ``columns`` (r,k)."""
-    rows = np.repeat(np.arange(len(blocks)), blocks.shape[1])
-    return coo_array((blocks.ravel(), (rows, columns.ravel())), shape=(len(blocks), count)).tocsr()
-
-
-def _columns(corners: Ints) -> Ints:
-    """(m,2 k) the places in a vector 2 u of the coordinates of corners (m,k)."""
-    return (2 * corners[:, :, None] + np.arange(2)).reshape(len(corners), -1)
-
-
 def _conformal(F: Ints, gradient: Floats, root: Floats, pins: Ints, places: Floats, count: int) -> Floats:
     """(u,2) the map with the least Σ A ((xₛ - yₜ)² + (xₜ + yₛ)²) that takes the pins to their places."""
-    rows = np.zeros((len(F), 2, 3, 2))
-    rows[:, 0, :, 0], rows[:, 0, :, 1] = gradient[:, 0], -gradient[:, 1]
-    rows[:, 1, :, 0], rows[:, 1, :, 1] = gradient[:, 1], gradient[:, 0]
-    rows *= root[:, None, None, None]
-    A = _sparse(rows.reshape(-1, 6), np.repeat(_columns(F), 2, axis=0), 2 * count)
+    (g, h), w = gradient.transpose(1, 0, 2), root[:, None]
+    rows = np.stack([np.stack([w * g, -w * h], axis=2), np.stack([w * h, w * g], axis=2)], axis=2)
+    A = block_rows(rows, F, count)
     y, free = np.zeros(2 * count), np.ones(2 * count, dtype=bool)
     y[pins], free[pins] = places, False
-    J = A[:, free]
-    y[free] = _least_squares(J, -(A @ y))
+    y[free] = _least_squares(A[:, free], -(A @ y))
     return y.reshape(-1, 2)
 
 
 def _misfit(
-    y: Floats, F: Ints, gradient: Floats, root: Floats, seams: SewnEdges, lengths: Floats, stretch: Floats
+    y: Floats, F: Ints, gradient: Floats, root: Floats, seams: Ints, lengths: Floats, stretch: Floats
 ) -> tuple[Floats, csr_array]:
     """The residual whose squares are summed, and its Jacobian: 3 rows by triangle, one by edge of a seam."""
     J = _jacobians(y, F, gradient)
     E = 0.5 * (np.einsum("mki,mkj->mij", J, J) - np.eye(2))
     strain = np.stack([E[:, 0, 0], E[:, 1, 1], np.sqrt(2.0) * E[:, 0, 1]], axis=1) * root[:, None]
     # dE_ij = ½ (dJ_ki J_kj + J_ki dJ_kj), dJ_ki = dy_ck gradient_ic
-    half = 0.5 * np.einsum("mic,mkj->mijck", gradient, J)
-    rate = half + half.transpose(0, 2, 1, 3, 4)
-    rows = np.stack([rate[:, 0, 0], rate[:, 1, 1], np.sqrt(2.0) * rate[:, 0, 1]], axis=1)
-    rows = (rows * root[:, None, None, None]).reshape(-1, 6)
-    A = _sparse(rows, np.repeat(_columns(F), 3, axis=0), y.size)
-    if not len(lengths):
-        return strain.ravel(), A
-    cut = [stretch[side[:, 0]] * (y[side[:, 1]] - y[side[:, 0]]) for side in seams]
-    squares = [0.5 * (c * c).sum(axis=1) for c in cut]
+    half = 0.5 * np.einsum("mic,mkj->mcijk", gradient, J)
+    rate = half + half.transpose(0, 1, 3, 2, 4)
+    rows = np.stack([rate[:, :, 0, 0], rate[:, :, 1, 1], np.sqrt(2.0) * rate[:, :, 0, 1]], axis=2)
+    rows *= root[:, None, None, None]
+    cut = stretch[seams[..., 0]] * (y[seams[..., 1]] - y[seams[..., 0]])  # (2,s,2)
     weight = SEAM_WEIGHT / lengths
-    slopes = [weight[:, None] * c * stretch[side[:, 0]] for c, side in zip(cut, seams, strict=True)]
-    rows = np.concatenate([-slopes[0], slopes[0], slopes[1], -slopes[1]], axis=1)
-    B = _sparse(rows, _columns(np.concatenate(list(seams), axis=1)), y.size)
-    return np.concatenate([strain.ravel(), weight * (squares[0] - squares[1])]), vstack([A, B]).tocsr()
+    squares = 0.5 * (cut * cut).sum(axis=2)
+    slopes = weight[:, None] * cut * stretch[seams[..., 0]] * np.array([1.0, -1.0])[:, None, None]
+    ends = np.stack([-slopes[0], slopes[0], -slopes[1], slopes[1]], axis=1)[:, :, None]
+    sewn = block_rows(ends, np.concatenate([*seams], axis=1), len(y))
+    residual = np.append(strain, weight * (squares[0] - squares[1]))
+    return residual, vstack([block_rows(rows, F, len(y)), sewn]).tocsr()

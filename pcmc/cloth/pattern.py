@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.libraries import load_library
 from ..certificate import Certificate
@@ -18,10 +18,10 @@ from ..surface.geometry import face_areas
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .cut_mesh import CutMesh, cut_mesh
-from .flattening import FOLDED, Flat
+from .flattening import FOLDED
 from .layout import ClothSheet, sheet_axes, with_levels, with_lines
 from .settings import CuttingOptions
-from .sewing import Cloth, loops, seams_of
+from .sewing import Cloth, seams_of
 from .strips import CuttingPattern, Strip
 
 ACROSS = 4  # edges across the narrowest strip, about
@@ -97,26 +97,22 @@ def cutting_pattern_of(
             text = f"patch {name!r} is closed, without a rim: no seam starts anywhere;"
             raise SurfaceError(f"{text} draw seams that open it", what="surface", where=name)
         cloth = Cloth.of(surface, mesh, sheets, sheet_of_source, options)
-        flat = cloth.laid_flat()
-        moved = _moved_levels(cloth, flat, sheets, options, widest)
+        points = cloth.laid_flat()
+        moved = _moved_levels(cloth, points, sheets, options, widest)
         if moved is None:
             break
         sheets = moved
-    pairs = zip(cloth.tensions.tolist(), cloth.patches, strict=True)
-    stretches = [options.stretch(tension, surface.patches[patch].name) for tension, patch in pairs]
-    return _pattern(surface, certificate, options, cloth, cloth.sewn(flat, stretches), stretches)
+    strips = _strips(cloth, points, options)
+    return CuttingPattern(surface, certificate, options, strips, seams_of(cloth))
 
 
 def _narrowest(surface: Surface, options: CuttingOptions) -> float:
     """About the width of the narrowest strips, length."""
-    area = np.bincount(
-        surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
-    )
-    area *= surface.roof
+    areas = face_areas(surface.vertices[surface.faces])
+    area = surface.roof * np.bincount(surface.patch_of_face, areas, len(surface.patches))
     widths = [] if options.net_width is None else [options.net_width]
-    for patch, own in zip(surface.patches, area.tolist(), strict=True):
-        if own > 0.0 and (count := options.of_patch("strips", patch.name)):
-            widths.append(own**0.5 / count)
+    counts = [options.of_patch("strips", patch.name) or np.inf for patch in surface.patches]
+    widths += [float(width) for width in area**0.5 / counts if width > 0.0]
     if drawn := sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in options.lines):
         widths.append(float(area.sum()) / drawn)
     return min(widths, default=np.inf)
@@ -148,92 +144,69 @@ def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> tuple[l
 
 
 def _moved_levels(
-    cloth: Cloth, flat: Flat, sheets: Sequence[ClothSheet], options: CuttingOptions, widest: list[float]
+    cloth: Cloth, points: Floats, sheets: Sequence[ClothSheet], options: CuttingOptions, widest: list[float]
 ) -> list[ClothSheet] | None:
     """Sheets with levels between which strips are equally wide, more of them where they were too wide.
 
     None where all fit: then the levels may stay as they are. OptionError for a strip that will not fit.
     ``widest`` are the widths of the widest strips of the rounds before; that of this one is added.
     """
-    number = len(widest)
-    net, strips = options.net_width, cloth.strip_of_vertex
-    widths = np.array([np.ptp(flat.points[strips == k, 1]) for k in range(len(cloth.sheet))])
-    if net is not None:
-        most = np.where(cloth.sheet < 0, net * (1.0 + ROUNDING), FILL * net)
-        wide = np.flatnonzero(widths > most)
+    number, net = len(widest), options.net_width
+    widths = np.array([np.ptp(points[cloth.strip_of_vertex == k, 1]) for k in range(len(cloth.sheet))])
+    if net is None:
+        widest.append(0.0)
+        if number == 2:
+            return None
+    else:
+        wide = np.flatnonzero(widths > np.where(cloth.sheet < 0, net * (1.0 + ROUNDING), FILL * net))
         widest.append(float(widths[wide].max(initial=0.0)))
         stuck = number > STUCK and widest[-1] > max(TOO_WIDE * net, SMALLER * widest[-1 - STUCK])
         if (cloth.sheet[wide] < 0).any() or (len(wide) and number == ROUNDS - 1) or stuck:
             k = int(wide[np.lexsort((-widths[wide], cloth.sheet[wide]))[0]])
-            name = cloth.surface.patches[cloth.patches[k]].name
             around = point_text(cloth.mesh.X[cloth.mesh.F[cloth.strip_of_face == k]].mean(axis=(0, 1)))
-            text = f"width: a strip of {name!r} around {around} is {widths[k]:.4g} wide,"
+            text = f"width: a strip of {cloth.names[k]!r} around {around} is {widths[k]:.4g} wide,"
             text += f" and {net:.4g} is there between allowances; draw seams in it"
             raise OptionError(text, what="width", found=options.width)
-    else:
-        widest.append(0.0)
-        if number == 2:
-            return None
     rim = cloth.seam_of_edge[cloth.sides.edge] < 0  # its middle tells a strip's levels: seams bulge over them
     place, strip = cloth.mesh.X[cloth.mesh.topology.edges[cloth.sides.edge[rim]]], cloth.sides.strip[rim]
     count_of = np.maximum(np.bincount(strip, minlength=len(widths)), 1)
-    moved = []
-    for sheet in sheets:
-        mine = np.flatnonzero(cloth.sheet == sheet.number)
-        total = np.bincount(strip, place.mean(axis=1) @ sheet.across, len(widths))
-        middle = (total / count_of)[mine]
-        row = np.clip(np.searchsorted(sheet.levels, middle) - 1, 0, len(sheet.levels) - 2)
-        found = np.zeros(len(sheet.levels) - 1)
+    moved = list(sheets)
+    for k, sheet in enumerate(sheets):
+        mine, count = np.flatnonzero(cloth.sheet == k), len(sheet.levels) - 1
+        middle = (np.bincount(strip, place.mean(axis=1) @ sheet.across, len(widths)) / count_of)[mine]
+        row = np.clip(np.searchsorted(sheet.levels, middle) - 1, 0, count - 1)
+        found = np.zeros(count)
         np.maximum.at(found, row, widths[mine])
         found = np.where(found > 0.0, found, np.diff(sheet.levels))
-        count = len(found)
         if net is not None:
             if (found <= FILL * net).all():
                 continue
             count = max(count, int(np.ceil(found.sum() / (FILL * net)))) + int(number > 2)
         total = np.append(0.0, np.cumsum(found))
         steps = np.linspace(0.0, total[-1], count + 1)
-        moved.append(replace(sheet, levels=np.interp(steps, total, sheet.levels)))
-    changed = {sheet.number: sheet for sheet in moved}
-    return [changed.get(sheet.number, sheet) for sheet in sheets] if moved else None
+        moved[k] = replace(sheet, levels=np.interp(steps, total, sheet.levels))
+    return None if moved == list(sheets) else moved
 
 
-def _pattern(
-    surface: Surface,
-    certificate: Certificate,
-    options: CuttingOptions,
-    cloth: Cloth,
-    flat: Flat,
-    stretches: Sequence[tuple[float, float]],
-) -> CuttingPattern:
-    """The strips and seams of a cloth laid flat; OptionError for a strip that no cloth follows."""
-    mesh, sides = cloth.mesh, cloth.sides
-    local = np.empty(len(cloth.X), dtype=np.int64)
+def _strips(cloth: Cloth, points: Floats, options: CuttingOptions) -> list[Strip]:
+    """The strips of a cloth laid flat, sewn; OptionError for one that no cloth follows."""
+    stretches = list(map(options.stretch, cloth.tensions.tolist(), cloth.names))
+    flat, strain = cloth.sewn(points, stretches)
     strips = []
-    for k in range(len(cloth.sheet)):
-        mine = np.flatnonzero(cloth.strip_of_face == k)
-        used = np.flatnonzero(cloth.strip_of_vertex == k)
-        local[used] = np.arange(len(used))
-        strip = Strip(
-            number=k + 1,
-            patch=surface.patches[cloth.patches[k]].name,
-            faces=local[mesh.pieces.faces[mine]],
-            source=mesh.source[mine],
-            roof=cloth.X[used],
-            flat=flat.points[used],
-            stretch=stretches[k],
-            strain=flat.strain[mine],
-            outlines=loops(local, sides, sides.strip == k),
-        )
+    for k, name in enumerate(cloth.names):
+        mine, used = cloth.strip_of_face == k, cloth.strip_of_vertex == k
+        faces, source = cloth.local[cloth.mesh.pieces.faces[mine]], cloth.mesh.source[mine]
+        laid = cloth.X[used], flat[used], stretches[k], strain[mine]
+        strip = Strip(k + 1, name, faces, source, *laid, cloth.outlines(k))
         strips.append(strip)
         outline, *holes = (strip.cut[loop] for loop in strip.outlines)
-        strain, problem = float(np.abs(strip.strain).max()), ""
-        if strain > 0.5 * FOLDED or not load_library("shapely", "cloth").Polygon(outline, holes).is_valid:
+        most, problem = float(np.abs(strip.strain).max()), ""
+        if most > 0.5 * FOLDED or not load_library("shapely", "cloth").Polygon(outline, holes).is_valid:
             problem = "lies over itself"
-        elif strain > MOST_STRAIN:
-            problem = f"stretches by {100.0 * strain:.0f} %"
+        elif most > MOST_STRAIN:
+            problem = f"stretches by {100.0 * most:.0f} %"
         if problem:
-            text = f"strip {strip.number} of patch {strip.patch!r} {problem} where it is laid flat: no cloth"
+            text = f"strip {strip.number} of patch {name!r} {problem} where it is laid flat: no cloth"
             text += " follows it; make strips narrower, or draw a seam that opens it"
             raise OptionError(text, what="width")
-    return CuttingPattern(surface, certificate, options, strips, seams_of(cloth, local))
+    return strips

@@ -13,7 +13,15 @@ from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..surface import Surface
 
-LARGEST_COMPENSATION = 20.0  # percent
+NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
+    "width": {"above": 0.0},
+    "direction": {},
+    "compensation": {"least": -20.0, "most": 20.0},
+    "stiffness": {"above": 0.0},
+    "poisson": {"least": 0.0, "below": 1.0},
+    **{key: {"least": 0.0} for key in ("allowance", "hem", "notches")},
+}
+PAIRS = ("compensation", "stiffness")  # keys of two numbers, [warp, weft]
 BY_PATCH = ("strips", "direction", "stiffness", "poisson")  # keys that may be tables
 
 
@@ -56,8 +64,6 @@ class CuttingOptions:
     notches: float | None = None
 
     def __post_init__(self) -> None:
-        if self.width is not None:
-            validate.positive("width", self.width)
         if self.width is not None and self.strips is not None:
             raise OptionError("strips: the width gives their number; leave out one of both", what="strips")
         if self.width is None and self.strips is None and not len(self.seams):
@@ -65,27 +71,28 @@ class CuttingOptions:
                 "a cutting pattern needs the width of the cloth, a number of strips, or seams; give --width"
             )
             raise OptionError(f"{text} or the key width of [pattern]", what="width")
-        for count in _each(self.strips):
-            validate.integer("strips", count, least=1)
-        for angle in _each(self.direction):
-            validate.number("direction", angle)
-        for name in ("allowance", "hem", "notches"):
-            if getattr(self, name) is not None:
-                validate.number(name, getattr(self, name), least=0.0)
-        for ratio in _each(self.poisson):
-            validate.number("poisson", ratio, least=0.0, below=1.0)
-        self.lines  # noqa: B018 — refuses lines that are none
         if self.compensation is not None and self.stiffness is not None:
             text = "stiffness: the compensation is given; leave out one of both"
             raise OptionError(text, what="stiffness")
-        for percent in _pair("compensation", self.compensation):
-            validate.number("compensation", percent, least=-LARGEST_COMPENSATION, most=LARGEST_COMPENSATION)
-        for given in _each(self.stiffness):
-            for stiffness in _pair("stiffness", given):
-                validate.positive("stiffness", stiffness)
+        for count in self._values("strips"):
+            validate.integer("strips", count, least=1)
+        for name, limits in NUMBERS.items():
+            for value in self._values(name):
+                if name in PAIRS and (isinstance(value, str) or np.ndim(value) != 1 or len(value) != 2):
+                    validate.refuse(name, value, "two numbers, [warp, weft]")
+                for number in value if name in PAIRS else [value]:
+                    validate.number(name, number, **limits)
+        self.lines  # noqa: B018 — refuses lines that are none
         if self.width is not None and self.net_width is not None and self.net_width <= 0.0:
             text = f"width: {self.width:g} leaves no cloth between two allowances of {self.allowance:g}"
             raise OptionError(text, what="width", found=self.width)
+
+    def _values(self, key: str) -> Collection[Any]:
+        """The values of a key, several of a table by patch; none where it is left out."""
+        given = getattr(self, key)
+        if isinstance(given, Mapping) and key in BY_PATCH:
+            return given.values()
+        return [] if given is None else [given]
 
     @property
     def net_width(self) -> float | None:
@@ -106,12 +113,8 @@ class CuttingOptions:
                 points = np.asarray(line, dtype=float)
             except (TypeError, ValueError):
                 points = np.empty(0)
-            if (
-                points.ndim != 2
-                or len(points) < 2
-                or points.shape[1] not in (2, 3)
-                or not np.isfinite(points).all()
-            ):
+            good = points.ndim == 2 and len(points) > 1 and points.shape[1] in (2, 3)
+            if not (good and np.isfinite(points).all()):
                 hint = "such as [[0, 0], [4, 2]]"
                 validate.refuse("seams", line, "two or more points [x, y] or [x, y, z]", str(number), hint)
             lines.append(points)
@@ -148,17 +151,3 @@ class CuttingOptions:
             return 1.0 / (1.0 + strains[0]), 1.0 / (1.0 + strains[1])
         warp, weft = self.compensation or (0.0, 0.0)
         return 1.0 - warp / 100.0, 1.0 - weft / 100.0
-
-
-def _each(given: Any) -> Collection[Any]:
-    """The values of a key that may be a table by patch."""
-    return () if given is None else given.values() if isinstance(given, Mapping) else [given]
-
-
-def _pair(name: str, given: object) -> Sequence[Any]:
-    """The two numbers of a key; none where it is None."""
-    if given is None:
-        return ()
-    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
-        validate.refuse(name, given, "two numbers, [warp, weft]")
-    return list(given)

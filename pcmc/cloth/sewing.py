@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, cached_array
+from ..base.arrays import Floats, Ints, cached_array
 from ..forces.triangles import effective_tensions
 from ..surface import Surface
 from ..surface.geometry import face_areas
 from .cut_mesh import CutMesh
-from .flattening import Flat, SewnEdges, flattened
+from .flattening import flattened
 from .layout import ClothSheet, sheet_axes
 from .settings import CuttingOptions
 from .strips import Seam, Side
@@ -84,11 +84,20 @@ class Cloth:
         return self.mesh.X[self.mesh.pieces.vertex]
 
     @cached_array
-    def patches(self) -> Ints:
-        """(k,) the patch of each strip."""
+    def local(self) -> Ints:
+        """(u,) the number of each vertex of a piece in its strip."""
+        order = np.argsort(self.strip_of_vertex, kind="stable")
+        count = np.bincount(self.strip_of_vertex)
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+        return place
+
+    @cached_property
+    def names(self) -> list[str]:
+        """(k) of the patch of each strip."""
         patch = np.empty(len(self.sheet), dtype=np.int64)
         patch[self.strip_of_face] = self.surface.patch_of_face[self.mesh.source]
-        return patch
+        return [self.surface.patches[p].name for p in patch]
 
     @cached_array
     def tensions(self) -> Floats:
@@ -118,80 +127,71 @@ class Cloth:
         seam[self.mesh.topology.edge_numbers(self.mesh.cuts)] = self.mesh.seam
         return seam
 
-    def laid_flat(self) -> Flat:
-        """Each strip alone, with its warp along x."""
-        none = SewnEdges(np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64))
-        F, ones = self.mesh.pieces.faces, np.ones((len(self.X), 2))
-        flat = flattened(self.X, F, self.strip_of_vertex, none, ones)
-        points, angles = flat.points.copy(), np.radians(np.arange(0.0, 180.0, 0.5))
+    def outlines(self, strip: int) -> list[Ints]:
+        """The outlines of a strip: its vertices in the order of its triangles, the longest first."""
+        mine, found = self.sides.strip == strip, []
+        ends, forward = self.local[self.sides.ends[mine]], self.sides.forward[mine, None]
+        after = dict(np.where(forward, ends, ends[:, ::-1]).tolist())
+        while after:
+            loop = [next(iter(after))]
+            while (following := after.pop(loop[-1])) != loop[0]:
+                loop.append(following)
+            found.append(np.array(loop))
+        return sorted(found, key=len, reverse=True)
+
+    def laid_flat(self) -> Floats:
+        """(u,2) each strip alone, with its warp along x."""
+        F, alone = self.mesh.pieces.faces, np.empty((2, 0, 2), dtype=np.int64)
+        flat = flattened(self.X, F, self.strip_of_vertex, alone, np.ones((len(self.X), 2)))[0]
+        points, angles = flat.copy(), np.radians(np.arange(0.0, 180.0, 0.5))
         for k, along in enumerate(self.along):
             mine, faces = self.strip_of_vertex == k, F[self.strip_of_face == k]
             if along is None:  # the direction across which it is narrowest
                 c, s = np.cos(angles), np.sin(angles)
-                narrow = np.ptp(points[mine] @ np.stack([-s, c]), axis=0).argmin()
+                narrow = np.ptp(flat[mine] @ np.stack([-s, c]), axis=0).argmin()
                 c, s = c[narrow], s[narrow]
             else:
-                P, Q = self.X[faces], flat.points[faces]
+                P, Q = self.X[faces], flat[faces]
                 edges, flat_edges = P[:, 1:] - P[:, :1], Q[:, 1:] - Q[:, :1]
                 # along = share · edges, and a part normal to the triangle
                 share = np.linalg.solve(edges @ edges.transpose(0, 2, 1), (edges @ along)[:, :, None])
                 warp = (face_areas(P)[:, None] * (share * flat_edges).sum(axis=1)).sum(axis=0)
                 c, s = warp / (np.linalg.norm(warp) or 1.0)
-            points[mine] = points[mine] @ np.array([[c, -s], [s, c]])
-        return flat._replace(points=points)
+            points[mine] = flat[mine] @ np.array([[c, -s], [s, c]])
+        return points
 
-    def sewn(self, flat: Flat, stretch: Sequence[tuple[float, float]]) -> Flat:
-        """The strips with sides of seams that are equally long once they are cut."""
+    def sewn(self, points: Floats, stretch: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
+        """The strips with sides of seams that are equally long once they are cut; see ``flattened``."""
         sides = self.sides
         first = np.searchsorted(sides.edge, sides.edge)  # the side that all others at an edge are sewn to
         others = np.flatnonzero(first != np.arange(len(first)))
-        seams = SewnEdges(sides.ends[first[others]], sides.ends[others])
+        seams = sides.ends[np.stack([first[others], others])]
         by_vertex = np.array(stretch)[self.strip_of_vertex]
-        F = self.mesh.pieces.faces
-        return flattened(self.X, F, self.strip_of_vertex, seams, by_vertex, flat.points)
+        return flattened(self.X, self.mesh.pieces.faces, self.strip_of_vertex, seams, by_vertex, points)
 
 
-def loops(local: Ints, sides: StripSides, mine: Bools) -> list[Ints]:
-    """The outlines of a strip: vertices in the order of its triangles, the longest first."""
-    ends = local[np.where(sides.forward[mine, None], sides.ends[mine], sides.ends[mine, ::-1])]
-    after = dict(ends.tolist())
-    found = []
-    while after:
-        loop = [next(iter(after))]
-        while (following := after.pop(loop[-1])) != loop[0]:
-            loop.append(following)
-        found.append(np.array(loop))
-    return sorted(found, key=len, reverse=True)
-
-
-def seams_of(cloth: Cloth, local: Ints) -> list[Seam]:
+def seams_of(cloth: Cloth) -> list[Seam]:
     """Cut edges joined to seams: those with the same strips beside them, drawn as one line."""
-    mesh, sides = cloth.mesh, cloth.sides
-    topo = mesh.topology
-    keys: dict[tuple[Any, ...], list[int]] = {}
+    topo, sides = cloth.mesh.topology, cloth.sides
     start = np.flatnonzero(np.append(True, np.diff(sides.edge) > 0))
-    for first, after in zip(start, np.append(start[1:], len(sides.edge)), strict=True):
-        edge = int(sides.edge[first])
-        beside = tuple(sorted(sides.strip[first:after].tolist()))
-        keys.setdefault((beside, int(cloth.seam_of_edge[edge])), []).append(edge)
+    keys: dict[tuple[Any, ...], list[int]] = {}
+    for edge, strips in zip(sides.edge[start].tolist(), np.split(sides.strip, start[1:]), strict=True):
+        keys.setdefault((tuple(sorted(strips.tolist())), int(cloth.seam_of_edge[edge])), []).append(edge)
     seams: list[Seam] = []
     for (beside, number), edges in keys.items():
         mask = np.zeros(len(topo.edges), dtype=bool)
         mask[edges] = True
         kind = "rim" if len(beside) == 1 else "seam" if number >= 0 else "junction"
         for curve in topo.curves_among(mask):
-            numbers = topo.edge_numbers(curve.pairs)
-            onward = curve.pairs[:, 0] < curve.pairs[:, 1]
-            found: dict[tuple[int, bool], Ints] = {}
-            at = np.searchsorted(sides.edge, numbers)
-            for step in range(len(beside)):
-                ends = local[np.where(onward[:, None], sides.ends[at + step], sides.ends[at + step, ::-1])]
-                left = sides.forward[at + step] == onward
-                for k, (strip, forward) in enumerate(zip(sides.strip[at + step], left, strict=True)):
-                    rows = found.setdefault((int(strip), bool(forward)), np.empty_like(ends))
-                    rows[k] = ends[k]
-            points = mesh.X[np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices]
-            both = [Side(strip + 1, rows, forward) for (strip, forward), rows in sorted(found.items())]
-            seams.append(Seam(0, kind, points, both))
+            at = np.searchsorted(sides.edge, topo.edge_numbers(curve.pairs))[:, None] + np.arange(len(beside))
+            onward = (curve.pairs[:, 0] < curve.pairs[:, 1])[:, None]
+            strip, left = sides.strip[at], sides.forward[at] == onward
+            ends = cloth.local[np.where(onward[..., None], sides.ends[at], sides.ends[at, ::-1])]
+            order = (2 * strip + left).argsort(axis=1)  # the same sides in each column
+            strip, left = (np.take_along_axis(values, order, axis=1)[0].tolist() for values in (strip, left))
+            ends = np.take_along_axis(ends, order[..., None], axis=1).transpose(1, 0, 2)
+            both = [Side(k + 1, rows, forward) for k, rows, forward in zip(strip, ends, left, strict=True)]
+            vertices = np.append(curve.pairs[:, 0], curve.pairs[-1, 1])
+            seams.append(Seam(0, kind, cloth.mesh.X[vertices], both))
     seams.sort(key=lambda s: (KINDS.index(s.kind), [side.strip for side in s.sides]))
     return [replace(seam, number=k) for k, seam in enumerate(seams, 1)]

@@ -169,18 +169,6 @@ class CuttingPattern:
         """(k,) the cut lengths of the edges of a seam's side."""
         return segment_lengths(self.strips[side.strip - 1].cut, side.edges)
 
-    @cached_array
-    def strain_of_face(self) -> Floats:
-        """(m,) the principal strain of the cloth that is largest in size, the mean over each face of the
-        surface, percent; NaN for walls: for pictures."""
-        total, area = np.zeros(self.surface.m), np.zeros(self.surface.m)
-        for strip in self.strips:
-            which = np.abs(strip.strain).argmax(axis=1)
-            value = 100.0 * np.take_along_axis(strip.strain, which[:, None], axis=1)[:, 0]
-            total += np.bincount(strip.source, strip.areas * value, self.surface.m)
-            area += np.bincount(strip.source, strip.areas, self.surface.m)
-        return np.divide(total, area, out=np.full(len(area), np.nan), where=area > 0.0)
-
     def __str__(self) -> str:
         return self.text()
 

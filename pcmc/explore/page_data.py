@@ -26,7 +26,7 @@ from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import changeable_values
-from ..structure import DrawnMember
+from ..structure import PlacedMember
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.symmetry import Whole, unfolded
@@ -176,7 +176,7 @@ def fields(state: SessionState, origin: Floats) -> Arrays:
     return arrays
 
 
-def member_figures(members: Sequence[DrawnMember]) -> list[dict[str, Any]]:
+def member_figures(members: Sequence[PlacedMember]) -> list[dict[str, Any]]:
     """The least and the largest normal force of each member at rest, as rows of the key figures."""
     row = {"owner": "member", "dimension": "force"}
     return [
@@ -186,7 +186,7 @@ def member_figures(members: Sequence[DrawnMember]) -> list[dict[str, Any]]:
     ]
 
 
-def member_ends(members: Sequence[DrawnMember], origin: Floats) -> Arrays:
+def member_ends(members: Sequence[PlacedMember], origin: Floats) -> Arrays:
     """The straight pieces of members: their ends (k,3), two by two, relative to the origin."""
     pieces = [np.repeat(one.path - origin, 2, axis=0)[1:-1] for one in members]
     return {"member_ends": np.concatenate(pieces)} if pieces else {}

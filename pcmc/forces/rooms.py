@@ -26,6 +26,7 @@ from ..surface.geometry import area_vectors
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
+from ..surface.pieces import point_text
 from ..surface.supports import apply_supports
 from ..surface.topology import components
 from .functional import patch_volumes, weighted
@@ -214,7 +215,7 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     open_edges = np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying))
     if len(open_edges):
         ends = edges[open_edges[0]]
-        place = surface.vertices[ends].mean(axis=0).round(4).tolist()
+        place = point_text(surface.vertices[ends].mean(axis=0), surface.size)
         raise SurfaceError(
             f"room {room.name!r} does not close: its patches end along {len(open_edges)} edges that are"
             f" neither held on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]} near"
@@ -242,13 +243,14 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
         np.add.at(net, a, -n)
         tips = np.flatnonzero(net)  # where it comes down to Π: closed straight from tip to tip
         if not grounded[tips].all():
-            place = surface.vertices[tips[~grounded[tips]][0]].round(4).tolist()
+            place = surface.vertices[tips[~grounded[tips]][0]]
             raise SurfaceError(
-                f"room {room.name!r} does not close: its fixed boundary ends at {place}, off Π; fix it down"
-                " to Π, or choose Π (plane=) through it",
+                f"room {room.name!r} does not close: its fixed boundary ends at"
+                f" {point_text(place, surface.size)}, off Π; fix it down to Π, or choose Π (plane=)"
+                " through it",
                 what="rooms",
                 where=room.name,
-                found=place,
+                found=place.tolist(),
             )
         if len(tips):
             yield float((net[tips] * _cones(middle, X[tips].mean(axis=0), X[tips])).sum())

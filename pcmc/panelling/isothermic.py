@@ -20,7 +20,7 @@ from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_arr
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, block_rows
 from ..base.errors import OptionError
 from ..surface.geometry import angles, face_areas
 from ..surface.topology import EdgeCurve, components, one_sided_copies
@@ -88,9 +88,7 @@ class _OpenSheet:
 
     def _rows(self, places: Ints, values: Floats) -> csr_array:
         """The matrix with the values (r,k) in columns ``places`` (r,k) of open vertices."""
-        row = np.repeat(np.arange(len(places)), places.shape[1])
-        entries = (np.broadcast_to(values, places.shape).ravel(), (row, places.ravel()))
-        return csr_array(coo_array(entries, shape=(len(places), self.count)))
+        return block_rows(np.broadcast_to(values, places.shape)[:, :, None, None], places, self.count)
 
     def _cuts(self) -> Bools:
         """Which of the inner edges are cut: paths from umbilics to the boundary, and between its loops."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, csr_array, eye_array, kron
+from scipy.sparse import csc_array, csr_array, eye_array, vstack
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, block_rows
 from ..surface.geometry import cross_2d, unit_vectors
 
 STEPS = 25  # of Gauss-Newton
@@ -134,26 +134,16 @@ def _gauss_newton(P: Floats, start: Ints, corner: Ints, moves: Bools, hold: floa
     n, first_place, size = len(P), P, np.linalg.norm(P[corner[1:]] - P[corner[:-1]], axis=1).mean()
     free = np.flatnonzero(np.repeat(moves, 3))
     for _ in range(STEPS):
-        rows, columns, values, residuals, first = [], [], [], [], 0
-        for _, nodes in by_corners(start, corner):
-            count, k = nodes.shape
-            if k == 3:
-                continue
+        rows, residuals = [], []
+        for _, nodes in (group for group in by_corners(start, corner) if group[1].shape[1] > 3):
             normal, height, flat = _planes(P[nodes])
-            A = np.concatenate([np.ones((count, k, 1)), flat], axis=2)
-            rest = np.eye(k) - A @ np.linalg.pinv(A)
+            A = np.concatenate([np.ones((*nodes.shape, 1)), flat], axis=2)
+            rest = np.eye(nodes.shape[1]) - A @ np.linalg.pinv(A)
             residuals.append(np.einsum("pij,pj->pi", rest, height).ravel())
-            value = rest[..., None] * normal[:, None, None]  # (p,k,k,3)
-            row = first + np.arange(count * k).reshape(count, k)
-            rows.append(np.broadcast_to(row[:, :, None, None], value.shape).ravel())
-            column = 3 * nodes[:, None, :, None] + np.arange(3)
-            columns.append(np.broadcast_to(column, value.shape).ravel())
-            values.append(value.ravel())
-            first += count * k
-        if not values:
+            rows.append(block_rows(rest.transpose(0, 2, 1)[..., None] * normal[:, None, None], nodes, n))
+        if not rows:
             return P
-        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        J = csr_array(coo_array(entries, shape=(first, 3 * n)))[:, free]
+        J = csr_array(vstack(rows))[:, free]
         slope = J.T @ np.concatenate(residuals) + hold * (P - first_place).ravel()[free]
         step = np.zeros(3 * n)
         step[free] = -splu(csc_array(J.T @ J + (hold + DAMPING) * eye_array(len(free)))).solve(slope)
@@ -169,19 +159,10 @@ def torsion_free_axes(P: Floats, edges: Ints, normals: Floats) -> Floats:
     Where they are parallel, the beam between two nodes is plane: it has no torsion. The least squares of
     (a_j - a_i) × e over the edges, with e their unit vectors, near the unit ``normals`` (n,3).
     """
-    n, count = len(P), len(edges)
     e = unit_vectors(P[edges[:, 1]] - P[edges[:, 0]])
-    ones, row = np.ones(count), np.arange(count)
-    pair = (np.append(-ones, ones), (np.append(row, row), np.append(edges[:, 0], edges[:, 1])))
-    difference = kron(csr_array(coo_array(pair, shape=(count, n))), eye_array(3))
-    zero = 0.0 * e[:, 0]
-    cross = np.stack([zero, e[:, 2], -e[:, 1], -e[:, 2], zero, e[:, 0], e[:, 1], -e[:, 0], zero], axis=1)
-    rows, columns = 3 * row[:, None] + np.repeat(np.arange(3), 3), 3 * row[:, None] + np.tile(np.arange(3), 3)
-    turned = csr_array(
-        coo_array((cross.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * count, 3 * count))
-    )
-    M = csr_array(turned @ difference)
-    system = csc_array(M.T @ M + NEAR_NORMAL * eye_array(3 * n))
+    across = np.cross(np.eye(3), e[:, None]).transpose(0, 2, 1)  # times a is a × e
+    M = block_rows(np.stack([-across, across], axis=1), edges, len(P))
+    system = csc_array(M.T @ M + NEAR_NORMAL * eye_array(3 * len(P)))
     return np.asarray(splu(system).solve(NEAR_NORMAL * normals.ravel())).reshape(-1, 3)
 
 

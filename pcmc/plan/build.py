@@ -191,7 +191,7 @@ def _warn_of_free_edges(draft: Draft, held: Bools) -> None:
             pressed = any(patch.pressure for patch in plan.patches)
             keys = f'edge = "cable", cable = {usual_cable(plan):g}'
             keys += ", and pressure = 0.0 of its patches" if pressed else ""
-        place = draft.drawn.points[free[0]].round(4).tolist()
+        place = point_text(draft.drawn.points[free[0]])
         text = (
             f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has nothing to"
             " pull against there, and there is probably no equilibrium; fix the edge, along a curve in space"
@@ -254,16 +254,18 @@ def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> 
                 raise PlanError(problem, what="at", where=spec.name, found=point.tolist())
             part = mesh.region[triangle]
             if owner[part] not in (-1, number):
-                around = centroid[part].round(3).tolist()
+                around = point_text(centroid[part])
                 problem = f"patches {specs[owner[part]].name!r} and {spec.name!r} are in the same part of the"
                 problem += f" plan (around {around}); draw a divider between them"
                 raise PlanError(problem, what="at", where=spec.name)
             owner[part] = number
     bare = np.flatnonzero(owner < 0)
     if len(bare):
-        place = centroid[bare[0]].round(3).tolist()
-        problem = f"the part of the plan around {place} has no patch ({len(bare)} such parts)"
-        raise PlanError(f"{problem}; add one with at= inside it", what="patches", where=place)
+        place = centroid[bare[0]]
+        problem = f"the part of the plan around {point_text(place)} has no patch ({len(bare)} such parts)"
+        raise PlanError(
+            f"{problem}; add one with at= inside it", what="patches", where=place.round(3).tolist()
+        )
     return owner
 
 

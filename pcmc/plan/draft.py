@@ -219,9 +219,13 @@ def walls_of(draft: Draft, roof: Roof) -> tuple[WallMesh, list[Patch], list[Side
             walled.append((number, chain.vertices))
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
-        place = draft.drawn.points[mixed[0]].round(6).tolist()
+        place = draft.drawn.points[mixed[0]]
         problem = "a wall with a sloped bottom meets one whose bottom is on the plane"
-        raise PlanError(f"at {place} {problem}; give both the same bottom", what="bottom", where=place)
+        raise PlanError(
+            f"at {point_text(place)} {problem}; give both the same bottom",
+            what="bottom",
+            where=place.tolist(),
+        )
     laws, room = np.vstack([roof.laws, np.zeros(3)]), np.append(roof.room, NONE)  # of no triangle, -1
     kinds: dict[Sides, list[tuple[Ints, Ints]]] = {}
     for (number, vertices), faces in zip(walled, _beside(draft, [v for _, v in walled]), strict=True):

@@ -17,7 +17,7 @@ from ..cloth.settings import CuttingOptions
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
-from ..structure.section import MemberSection, PatchMaterial, Structure, Zone
+from ..structure.section import MATERIAL, MemberSection, Structure, Zone
 from ..surface import Plane
 from ..surface.curve_data import CURVES
 from .settings import PATCH_KEYS, AccuracyWanted, MeshFile, Output, Remeshing
@@ -193,6 +193,10 @@ def main_sections() -> tuple[Section, ...]:
     mesh += _rise_keys("found by one tension of all patches under pressure")
     mesh_patch = [replace(key, default=None) for key in specs if key.name in PATCH_KEYS]
     mesh_patch.append(Key("wall", "true or false", None, "whether it is a wall between rooms"))
+    structure = {key.name: key for key in _of_class(Structure)}
+    own: dict[str, Any] = {"default": None, "help": "as in [structure], for this patch."}
+    material = [replace(structure[name], **own) for name in MATERIAL]
+    material.append(Key("thickness", "a number", **own))
     rooms, cables = _of_class(RoomData), _of_class(CableLine)
     help_of = {
         "divider": "A line between patches, with a wall below it. A curve alone is a divider, too.",
@@ -217,8 +221,8 @@ def main_sections() -> tuple[Section, ...]:
         Section("mesh", "The roof, by the triangles in a file.", tuple(mesh)),
         Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", tuple(mesh_patch)),
         Section("remesh", help_of["remesh"], _of_class(Remeshing)),
-        Section("structure", help_of["structure"], _of_class(Structure)),
-        Section("structure.patches.NAME", help_of["material"], _of_class(PatchMaterial)),
+        Section("structure", help_of["structure"], tuple(structure.values())),
+        Section("structure.patches.NAME", help_of["material"], tuple(material)),
         Section("structure.members.NAME", help_of["member"], _of_class(MemberSection)),
         Section("structure.zones", help_of["zone"], _of_class(Zone)),
         Section("pattern", help_of["pattern"], _of_class(CuttingOptions)),

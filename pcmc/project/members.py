@@ -6,12 +6,12 @@ import warnings
 from typing import TYPE_CHECKING
 
 from ..base.errors import LostWarning, OptionError
-from ..structure.drawn import DrawnMember, drawn_members
+from ..structure.drawn import drawn_members
 from ..structure.section import members_of
 
 if TYPE_CHECKING:
     from ..certificate import Certificate
-    from ..structure import StructuralModel
+    from ..structure import PlacedMember, StructuralModel
     from ..surface import Surface
     from .outcome import Outcome
 
@@ -34,7 +34,7 @@ def model_with_members(
 
 def members_drawn(
     outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
-) -> tuple[DrawnMember, ...]:
+) -> tuple[PlacedMember, ...]:
     """The members of that model, as files and drawings have them."""
     model = model_with_members(outcome, surface, certificate)
     return () if model is None else drawn_members(model)

@@ -23,7 +23,7 @@ from ..cloth.sheets import pattern_files
 from ..drawings.net_drawings import net_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import Analysis, DrawnMember, StructuralModel, write_structure
+from ..structure import Analysis, PlacedMember, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
 from .file import Project
@@ -117,7 +117,7 @@ def certified_files(
     files: Iterable[PathLike],
     units: Units,
     colour: str = "",
-    members: Sequence[DrawnMember] = (),
+    members: Sequence[PlacedMember] = (),
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
     relative curvature error, size of the reactions at supports (force), and members."""

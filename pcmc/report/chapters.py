@@ -58,28 +58,24 @@ def under_load_chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield ABOUT
     table = analysis.table
     columns: Columns = {f"{key}, %": [f"{100.0 * v:.0f}" for v in table[key]] for key in ("share", "taut")}
-    columns |= columns_in(table, ["down", "up", "moved"], units.length)
-    columns |= columns_in(table, ["least_force", "largest_force"], units.tension)
-    columns |= columns_in(table, ["slack_area"], units.area)
-    if "pressure" in table:
-        columns |= columns_in(table, ["pressure"], units.pressure)
-    yield text_table("Cases and combinations", {"case": table["case"]}, columns)
+    kinds = {"down up moved": units.length, "least_force largest_force": units.tension}
+    kinds |= {"slack_area": units.area} | ({"pressure": units.pressure} if "pressure" in table else {})
+    columns |= columns_in(table, kinds)
+    yield text_table("Cases and combinations", table[["case"]], columns)
     yield from map(sentence, analysis.answers(units))
     for what in ("deflection", "least force"):
         yield Picture("", png(under_load(analysis, what=what, units=units, width=PIXELS)))
-    table = analysis.patches
-    columns = columns_in(table, ["least_force", "mean_force", "largest_force"], units.tension)
-    columns |= columns_in(table, ["slack_area"], units.area)
-    yield text_table("Membrane forces by patch", {"case": table["case"], "patch": table["patch"]}, columns)
-    table = analysis.supports
+    table, kinds = analysis.patches, {"least_force mean_force largest_force": units.tension}
+    columns = columns_in(table, kinds | {"slack_area": units.area})
+    yield text_table("Membrane forces by patch", table[["case", "patch"]], columns)
+    table = analysis.supports.rename(columns={"support": "", "name": "of"})
     columns = {f"length, {units.length}": column(table["length"].where(table["length"] > 0.0))}
     columns |= vectors_of(table, "force", "F", force)
-    words: Columns = {"case": table["case"], "": table["support"], "of": table["name"], "kind": table["kind"]}
-    yield text_table("Forces of the supports on the roof", words, columns)
+    yield text_table("Forces of the supports on the roof", table[["case", "", "of", "kind"]], columns)
     table = analysis.cables
     if len(table):
-        columns = columns_in(table, ["least", "largest"], force)
-        yield text_table("Forces of cables", {"case": table["case"], "cable": table["cable"]}, columns)
+        columns = columns_in(table, {"least largest": force})
+        yield text_table("Forces of cables", table[["case", "cable"]], columns)
     pictures = [member_forces(analysis, units=units, width=PIXELS)] if len(analysis.members) else []
     yield from _members(analysis.model, analysis.members, units, *map(png, pictures))
     yield from _columns(analysis.model, analysis.columns, units)
@@ -101,11 +97,10 @@ def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Itera
         return
     profiles = {bar.name: bar.member.profile for bar in model.bars}
     sections = {name: p.label if p.shape else f"A = {p.area:.4g}" for name, p in profiles.items()}
-    words: Columns = {"case": table["case"], "member": table["member"], "kind": table["kind"]}
+    words: Columns = dict(table[["case", "member", "kind"]])
     words[f"section, {units.length}"] = [sections[name] for name in table["member"]]
-    columns: Columns = columns_in(table, ["length"], units.length)
-    columns |= columns_in(table, ["N", "euler"], units.force or "force")
-    columns |= columns_in(table, ["stress"], units.pressure)
+    kinds = {"length": units.length, "N euler": units.force or "force", "stress": units.pressure}
+    columns = columns_in(table, kinds)
     for key, title in (("utilisation", "of its strength, %"), ("euler_over", "Euler over thrust")):
         values = table[key] * (100.0 if key == "utilisation" else 1.0)
         columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
@@ -130,12 +125,11 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
         columns[f"I {where}, {length}⁴"] = [f"{profile.moments[k]:.4g}" for profile in profiles]
     columns[f"E, {units.pressure}"] = [f"{line.member.material.young:.4g}" for line in beams]
     yield text_table("Members", words, columns)
-    columns = columns_in(table, ["least_N", "largest_N", "V"], force)
-    columns |= columns_in(table, ["M"], f"{force}·{length}")
-    columns |= columns_in(table, ["moved"], length)
+    kinds = {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length}
+    columns = columns_in(table, kinds)
     columns["span over it"] = [f"{over:.3g}" if over < 1e4 else f"{over:.0f}" for over in table["span_over"]]
     columns["buckling"] = [f"{factor:.3g}" if factor < 1e4 else "" for factor in table["buckling"]]
-    yield text_table("Forces of members", {"case": table["case"], "member": table["member"]}, columns)
+    yield text_table("Forces of members", table[["case", "member"]], columns)
     yield SIGNS
     yield from (Picture("", picture) for picture in pictures)
     yield from (f"{line}." for line in sentences(model, units))
@@ -153,9 +147,8 @@ def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     yield f"{len(table)} strips of {area} {units.area} of cloth, {long} {units.length} of seams between them."
     yield ABOUT_CLOTH
     yield Picture("Strain of the cloth", png(strains(pattern, width=PIXELS)))
-    columns: Columns = columns_in(table, ["length", "width"], units.length)
-    columns |= columns_in(table, ["area", "cut_area"], units.area)
-    names = {"strain_min": "strain from", "strain_max": "to", "strain_rms": "mean"}
-    names |= {"warp": "warp shorter", "weft": "weft shorter"}
-    columns |= columns_in(table.rename(columns=names), names.values(), "%")
-    yield text_table("Strips", {"strip": table["strip"], "patch": table["patch"]}, columns)
+    heads = {"strain_min": "strain_from", "strain_max": "to", "strain_rms": "mean"}
+    table = table.rename(columns=heads | {"warp": "warp_shorter", "weft": "weft_shorter"})
+    kinds = {"length width": units.length, "area cut_area": units.area}
+    columns = columns_in(table, kinds | {"strain_from to mean warp_shorter weft_shorter": "%"})
+    yield text_table("Strips", table[["strip", "patch"]], columns)

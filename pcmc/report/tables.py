@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..accuracy import MeshCheck
 
 DIGITS = 4  # of the largest number of a column
-MIDDLE = ("middle_x", "middle_y", "middle_z")
+MIDDLE = "middle_x middle_y middle_z"
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them
 
 
@@ -99,69 +99,62 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
 
 def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
-    table = certificate.patches.rename(columns={"net": "net pressure", "mean_H": "mean curvature"})
-    pressures = [key for key in ("pressure", "snow", "net pressure") if key in table]
-    columns = columns_in(table, ["tension"], units.tension) | columns_in(table, pressures, units.pressure)
-    columns |= columns_in(table, ["area"], units.area)
-    columns |= columns_in(table, ["mean curvature"], f"1/{units.length}")
+    heads = {"net": "net_pressure", "mean_H": "mean_curvature"}
+    table = certificate.patches.rename(columns=heads)
+    pressures = " ".join(key for key in ("pressure", "snow", "net_pressure") if key in table)
+    kinds = {"tension": units.tension, pressures: units.pressure, "area": units.area}
+    columns = columns_in(table, kinds | {"mean_curvature": f"1/{units.length}"})
     columns["its largest error"] = map(small, table["variational_max"])
     weights = [patch.weight for patch in surface.patches]
-    if any(weights):
-        columns[f"weight, {units.pressure}"] = column(weights)
-    kinds = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
-    return text_table("Patches", {"patch": table["patch"], "kind": kinds}, columns)
+    columns |= {f"weight, {units.pressure}": column(weights)} if any(weights) else {}
+    kind = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
+    return text_table("Patches", {"patch": table["patch"], "kind": kind}, columns)
 
 
 def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     """Junctions and supports with their reactions, numbered as in the plan, and how far walls lean."""
     table, force = certificate.junctions, units.force or "force"
     if len(table):
-        words: Columns = {"": [f"J{k + 1}" for k in range(len(table))], "between": table["junction"]}
-        columns = columns_in(table, ["length", *MIDDLE], units.length)
+        columns = columns_in(table, {f"length {MIDDLE}": units.length})
         columns[f"force left, {units.tension}"] = map(small, table["force_left"])
-        yield text_table("Junctions", words, columns)
+        numbers = [f"J{k + 1}" for k in range(len(table))]
+        yield text_table("Junctions", {"": numbers, "between": table["junction"]}, columns)
     table = certificate.leaning
     if len(table):
         leans: Columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
-        columns = leans | columns_in(table, "xyz", units.length)
-        yield text_table("Walls: the largest angle from the vertical", {"wall": table["wall"]}, columns)
+        columns = leans | columns_in(table, {"x y z": units.length})
+        yield text_table("Walls: the largest angle from the vertical", table[["wall"]], columns)
     table = certificate.supports
     if len(table):
         own = table["name"].where(table["name"] != table["support"], "")
-        columns = columns_in(table, "xyz", units.length)
+        columns = columns_in(table, {"x y z": units.length})
         columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
         columns |= vectors_of(table, "force", "R", force)
         columns[f"largest, {units.tension}"] = column(table["per_length_max"])
         words = {"": table["support"], "of": own, "kind": table["kind"]}
         yield text_table("Supports and their reactions", words, columns)
-        balance = certificate.balance
-        columns = vectors_of(balance, "force", "F", force)
-        columns |= vectors_of(balance, "moment", "M", f"{force}·{units.length}")
-        yield text_table("Balance", {"": balance["of"]}, columns)
+        columns = vectors_of(certificate.balance, "force", "F", force)
+        columns |= vectors_of(certificate.balance, "moment", "M", f"{force}·{units.length}")
+        yield text_table("Balance", {"": certificate.balance["of"]}, columns)
 
 
 def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     """The cables with their forces, what holds their ends, and the rooms of prescribed volume."""
-    table, force = certificate.cables, units.force or "force"
+    table, force = certificate.cables.rename(columns={"tension": "force"}), units.force or "force"
     if len(table):
-        columns: Columns = {f"force, {force}": column(table["tension"])}
-        if "weight" in table:
-            columns |= columns_in(table, ["weight"], units.tension)
-        columns |= columns_in(table, ["length", *MIDDLE], units.length)
-        yield text_table("Cables", {"cable": table["cable"]}, columns)
+        weights = {"weight": units.tension} if "weight" in table else {}
+        columns = columns_in(table, {"force": force, **weights, f"length {MIDDLE}": units.length})
+        yield text_table("Cables", table[["cable"]], columns)
     table = certificate.cable_ends
     if len(table):
-        words: Columns = {
-            "cable": table["cable"],
-            "end": ["held" if held else "free" for held in table["held"]],
-        }
-        columns = columns_in(table, "xyz", units.length) | vectors_of(table, "force", "F", force)
+        ends = ["held" if held else "free" for held in table["held"]]
+        columns = columns_in(table, {"x y z": units.length}) | vectors_of(table, "force", "F", force)
+        words = {"cable": table["cable"], "end": ends}
         yield text_table("Ends of cables, and the forces on them", words, columns)
     table = certificate.rooms
     if len(table):
-        columns = columns_in(table, ["volume", "prescribed"], units.volume)
-        columns |= columns_in(table, ["pressure"], units.pressure)
-        yield text_table("Rooms of prescribed volume", {"room": table["room"]}, columns)
+        columns = columns_in(table, {"volume prescribed": units.volume, "pressure": units.pressure})
+        yield text_table("Rooms of prescribed volume", table[["room"]], columns)
 
 
 def target_table(targets: pd.DataFrame, units: Units) -> Table:
@@ -192,14 +185,15 @@ def family_table(schedule: Panels, units: Units) -> Table:
     """The first families of panels, the largest first."""
     table = schedule.families.head(MOST_FAMILIES)
     columns: Columns = {"panels": table["count"], "turned over": table["mirrored"]}
-    columns |= columns_in(table, "abc", units.length) | columns_in(table, ["area"], units.area)
+    columns |= columns_in(table, {"a b c": units.length, "area": units.area})
     return text_table("", {"family": [f"F{k}" for k in table["family"]]}, columns)
 
 
-def text_table(title: str, words: Columns, columns: Columns) -> Table:
+def text_table(title: str, words: Mapping[str, Any] | pd.DataFrame, columns: Columns) -> Table:
     """A table of columns of texts, those of ``words`` first."""
-    every = words | columns
-    return Table(title, [*every], [[*map(str, row)] for row in zip(*every.values(), strict=True)], len(words))
+    every = {**words, **columns}
+    rows = [[*map(str, row)] for row in zip(*every.values(), strict=True)]
+    return Table(title, [*every], rows, len(every) - len(columns))
 
 
 def vectors_of(table: pd.DataFrame, kind: str, letter: str, unit: str) -> Columns:
@@ -209,8 +203,14 @@ def vectors_of(table: pd.DataFrame, kind: str, letter: str, unit: str) -> Column
     return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
-def columns_in(table: pd.DataFrame, keys: Iterable[str], unit: str) -> Columns:
-    return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key in keys}
+def columns_in(table: pd.DataFrame, units: Mapping[str, str]) -> Columns:
+    """The columns of a table, by the unit of several names with blanks between them.
+
+    >>> columns_in(pd.DataFrame({"least_force": [1.0, 2.0], "area": [3.0, 4.0]}), {"least_force area": "m"})
+    {'least force, m': ['1.000', '2.000'], 'area, m': ['3.000', '4.000']}
+    """
+    pairs = [(key, unit) for keys, unit in units.items() for key in keys.split()]
+    return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key, unit in pairs}
 
 
 def small(value: float) -> str:

@@ -42,6 +42,7 @@ class Smoother:
         self._classes = replace(classes, active=np.ones(surface.m, dtype=bool), nodes=surface.nodes, **faces)
         used = np.bincount(surface.topology.faces.ravel(), minlength=surface.n) > 0
         self._surface, self._axes = surface, _axes(surface)
+        self._parts = np.where(used, surface.topology.components, -1)
         self._free, self._number = _free_coordinates(surface, used, self._axes)
         self._spaces = [_one_unknown_each(free) for free in self._free]
         self._patterns = [hessian_pattern(self._classes, space) for space in self._spaces]
@@ -56,12 +57,20 @@ class Smoother:
             self._factors.append(solver.factor(data))
 
     def solve(self, forces: Floats) -> Floats:
-        """L_α⁻¹ forces (n,3), zero where a support holds the coordinate."""
+        """L_α⁻¹ forces (n,3), zero where a support holds the coordinate.
+
+        Of forces on a connected part that nothing holds along an axis the mean is left out: it would only
+        shift that part, and far.
+        """
         local = forces @ self._axes.T
         out = np.zeros_like(local)
         for number, (free, factor) in enumerate(zip(self._free, self._factors, strict=True)):
             place = np.ix_(free, self._number == number)
-            out[place] = factor.solve(local[place])
+            part = self._parts[free]
+            loose = ~np.isin(part, self._parts[~free])[:, None]
+            count = np.maximum(np.bincount(part), 1)
+            mean = np.stack([np.bincount(part, column) / count for column in local[place].T], axis=1)
+            out[place] = factor.solve(local[place] - loose * mean[part])
         out = out @ self._axes
         return self._surface.spread(apply_supports(self._surface, out) if self._surface.on_planes else out)
 

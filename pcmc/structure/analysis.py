@@ -6,8 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import chain
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..base.arrays import Floats
 from ..base.units import Units
 from ..certificate.supports import FORCE
 from ..surface.geometry import face_areas
+from ..surface.pieces import point_text
 from .calculix import CalculixError, expect_program, run_as_far
 from .columns import column_table, column_text
 from .gas import balanced_pressure
@@ -34,7 +34,7 @@ from .model import StructuralModel, expect_model
 from .results import StepResults
 
 THROUGH = 1e-3  # of the size: a roof that has sunk farther below Π hangs through
-NOWHERE = 1e-9  # of the size: a smaller coordinate is 0
+STILL = 1e-9  # of the largest displacement: a smaller deflection is rounding
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
@@ -69,7 +69,7 @@ class Case:
     @cached_property
     def members(self) -> tuple[MemberForces, ...]:
         """What the beams carry."""
-        return members_in(self.results)
+        return members_in(self.results.model, self.results.step, self.results)
 
     @property
     def taut(self) -> float:
@@ -113,23 +113,21 @@ class Analysis:
         and ``slack_share``, that over the area; ``force_x``, …, the sum of all reactions. With a gas
         ``pressure`` and ``volume``.
         """
-        rows = []
+        rows, surface, areas = [], self.model.surface, self._areas
         for case in self.cases:
-            found, X = case.results, self.model.surface.vertices
+            found, forces = case.results, case.results.principal_forces
             size = np.linalg.norm(found.displacements, axis=1)
-            far, forces = int(np.nanargmax(size)), found.principal_forces
-            place = X[self.model.surface.faces[self.slackest(case)]].mean(axis=0)
-            area = self._areas[found.slack].sum()
+            far, slack = int(np.nanargmax(size)), areas[found.slack].sum()
+            place = surface.vertices[surface.faces[self.slackest(case)]].mean(axis=0)
             row = {"case": case.name, "share": case.share, "taut": case.taut}
-            row["down"] = max(0.0, -np.nanmin(found.deflections))
-            row["up"] = max(0.0, np.nanmax(found.deflections))
-            row |= {"moved": size[far]} | dict(zip("xyz", X[far], strict=True))
+            row["down"], row["up"] = -np.nanmin(found.deflections), np.nanmax(found.deflections)
+            row |= {way: row[way] if row[way] > STILL * size[far] else 0.0 for way in ("down", "up")}
+            row |= {"moved": size[far]} | dict(zip("xyz", surface.vertices[far], strict=True))
             row |= {"least_force": np.nanmin(forces), "largest_force": np.nanmax(forces)}
             row |= {f"least_{axis}": value for axis, value in zip("xyz", place, strict=True)}
-            row |= {"slack_area": area, "slack_share": area / self._areas.sum()}
+            row |= {"slack_area": slack, "slack_share": slack / areas.sum()}
             row |= dict(zip(FORCE, found.reactions.sum(axis=0), strict=True))
-            if self.model.gas is not None:
-                row |= {"pressure": case.pressure, "volume": case.volume}
+            row |= {"pressure": case.pressure, "volume": case.volume} if self.model.gas is not None else {}
             rows.append(row)
         return pd.DataFrame(rows)
 
@@ -143,10 +141,11 @@ class Analysis:
             for k, patch in enumerate(self.model.surface.patches):
                 mine = (patch_of == k) & np.isfinite(forces).all(axis=1)
                 if mine.any():
-                    mean = float(self._areas[mine] @ forces[mine].mean(axis=1) / self._areas[mine].sum())
-                    row = {"case": case.name, "patch": patch.name, "least_force": forces[mine].min()}
-                    row |= {"mean_force": mean, "largest_force": forces[mine].max()}
-                    rows.append(row | {"slack_area": self._areas[mine & case.results.slack].sum()})
+                    area, own = self._areas[mine], forces[mine]
+                    row = {"case": case.name, "patch": patch.name, "least_force": own.min()}
+                    row |= {"mean_force": float(area @ own.mean(axis=1) / area.sum())}
+                    row |= {"largest_force": own.max(), "slack_area": area[case.results.slack[mine]].sum()}
+                    rows.append(row)
         return pd.DataFrame(rows)
 
     @cached_property
@@ -154,21 +153,17 @@ class Analysis:
         """A row per case and support, numbered as in ``Certificate.supports``: ``support``, ``name``,
         ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts. M1, M2,
         … hold the ends of members; see ``supports_with_members``."""
-        tables = []
-        for case in self.cases:
-            table = supports_with_members(self.model, case.results.reactions)
+        tables = [supports_with_members(self.model, case.results.reactions) for case in self.cases]
+        for case, table in zip(self.cases, tables, strict=True):
             table.insert(0, "case", case.name)
-            tables.append(table)
         return pd.concat(tables, ignore_index=True)
 
     @cached_property
     def cables(self) -> pd.DataFrame:
         """A row per case and cable: the ``least`` and ``largest`` tension along it, force; below 0 it is
         slack."""
-        rows = []
-        for case in self.cases:
-            for name, along in case.results.cable_tensions.items():
-                rows.append({"case": case.name, "cable": name, "least": along.min(), "largest": along.max()})
+        pulls = [(case.name, *pull) for case in self.cases for pull in case.results.cable_tensions.items()]
+        rows = [[case, cable, along.min(), along.max()] for case, cable, along in pulls]
         return pd.DataFrame(rows, columns=["case", "cable", "least", "largest"])
 
     @property
@@ -208,17 +203,14 @@ class Analysis:
 
     def answers(self, units: Units | None = None) -> list[str]:
         """A sentence for each case that is not carried, or has slack parts, and what helps."""
-        units, lines = units or self.model.units, []
+        units, lines, surface = units or self.model.units, [], self.model.surface
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
-            surface = self.model.surface
-            at = [row[f"least_{c}"] * (abs(row[f"least_{c}"]) > NOWHERE * surface.size) for c in "xyz"]
+            at = np.array([row[f"least_{c}"] for c in "xyz"])
             patch = surface.patches[surface.patch_of_face[self.slackest(case)]].name
-            place = f"around ({', '.join(f'{value + 0.0:.3g}' for value in at)}) of {patch!r}"
-            state = (
-                f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}{units.behind('area')}"
-            )
-            state = state if row["slack_area"] > 0.0 else "nothing is slack yet"
-            state += f", the least force {row['least_force']:.3g}{units.behind('tension')} {place}"
+            state = f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}"
+            state = f"{state}{units.behind('area')}" if row["slack_area"] > 0.0 else "nothing is slack yet"
+            state += f", the least force {row['least_force']:.3g}{units.behind('tension')}"
+            state += f" around {point_text(at, surface.size)} of {patch!r}"
             if not case.carried:
                 share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
                 lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
@@ -245,18 +237,18 @@ class Analysis:
 
     def text(self) -> str:
         """The main columns of the table, and the answers, without the units of the numbers."""
+        model, units = self.model, self.model.units
         shown = ["case", "share", "taut", "down", "up", "least_force", "largest_force", "slack_area"]
-        shown += ["pressure"] if self.model.gas is not None else []
+        shown += ["pressure"] if model.gas is not None else []
         heads = {"least_force": "least force", "largest_force": "largest", "slack_area": "slack area"}
         table = self.table[shown].rename(columns=heads)
         for name in ("share", "taut"):
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
-        numbers = table.to_string(index=False, float_format=lambda v: f"{v:.4g}")
         look: dict[str, Any] = {"index": False, "float_format": "{:.4g}".format, "na_rep": "-"}
-        members = [self.members.to_string(**look)] * bool(self.model.beams)
-        about = [*sentences(self.model, self.model.units), *cable_offers(self.model)]
-        bars = [column_text(self.model, self.columns, self.model.units)] * bool(self.model.bars)
-        return "\n".join([numbers, *members, *about, *bars, *self.answers()])
+        parts = [one.to_string(**look) for one in (table, self.members) if len(one)]
+        parts += [*sentences(model, units), *cable_offers(model)]
+        parts += [column_text(model, self.columns, units)] if model.bars else []
+        return "\n".join([*parts, *self.answers()])
 
     @cached_property
     def _areas(self) -> Floats:
@@ -302,15 +294,11 @@ def analyse(
     expect_program()
     say = progress or (lambda words: None)
     permanent, others = _permanent(model)
-    start = run_as_far(model, [model.steps[0], *permanent], timeout)
-    form = _case_of(model, model.steps[0].name, start[:1], 1)
-
-    def one(step: Step) -> Case:
-        return analyse_step(model, permanent, step, timeout)
-
-    cases = [_case_of(model, step.name, start[: k + 2], k + 2) for k, step in enumerate(permanent)]
-    found = chain([form], cases, _in_parallel(one, others, say))
-    analysis = Analysis(model, tuple(found))
+    steps = [model.steps[0], *permanent]
+    start = run_as_far(model, steps, timeout)
+    cases = [_case_of(model, step.name, start[:k], k) for k, step in enumerate(steps, 1)]
+    one = partial(analyse_step, model, permanent, timeout=timeout)
+    analysis = Analysis(model, (*cases, *_in_parallel(one, others, say)))
     if analysis.carried or not remedy or model.surface.heavy:  # with weights the form would be another one
         return analysis
     return replace(analysis, remedy=_remedy(analysis, timeout, say))
@@ -343,12 +331,9 @@ def analyse_step(
 def _permanent(model: StructuralModel) -> tuple[list[Step], list[Step]]:
     """The steps of self-weight alone, which stay, and the others, combinations among them."""
     form, *others = model.steps
-    alone = [
-        step
-        for step in others[: len(model.loads)]
-        if step.gravity and (step.forces == form.forces).all() and (step.pressures == form.pressures).all()
-    ]
-    return alone, [step for step in others if all(step is not one for one in alone)]
+    same = [(o.forces == form.forces).all() and (o.pressures == form.pressures).all() for o in others]
+    alone = [o for o, as_form in zip(others[: len(model.loads)], same, strict=False) if o.gravity and as_form]
+    return alone, [step for step in others if step not in alone]
 
 
 def _case_of(

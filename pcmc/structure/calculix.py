@@ -12,18 +12,16 @@ from pathlib import Path
 
 from ..base.errors import FileError, PcmcError
 from ..base.files import writing
-from .inp import text_of, write_structure
+from .inp import text_of
 from .loads import Step
 from .model import StructuralModel
-from .results import StepResults, read_results, read_steps
+from .results import StepResults, read_steps
 
 PROGRAM = "ccx"
 MISSING = (
     f"{PROGRAM} is not installed: the load cases need CalculiX "
     "(Debian, Ubuntu: apt install calculix-ccx; else https://www.calculix.de), found as ccx on the path"
 )
-
-
 # in what the program prints where it finds no equilibrium; other errors are of the model or of the program
 NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum", "nonpositive jacobian")
 
@@ -45,17 +43,6 @@ def expect_program() -> None:
     """Refuse to go on without the program, in one line that says what to install."""
     if not available():
         raise CalculixError(MISSING, what=PROGRAM)
-
-
-def run(model: StructuralModel, timeout: float | None = None) -> tuple[StepResults, ...]:
-    """The results of each step of a structural model, all in one analysis; an error where it stops.
-
-    ``pcmc.analyse`` answers what is overloaded, too.
-    """
-    with folder_for_input() as path:
-        write_structure(path, model)
-        run_file(path, timeout)
-        return read_results(path.with_suffix(".dat"), model)
 
 
 def run_as_far(

@@ -23,6 +23,7 @@ from ..base.arrays import Floats
 from ..base.units import Units
 from ..surface.pieces import point_text
 from .member_forces import forces_on_members, frame_of
+from .members import at_points
 from .model import StructuralModel
 
 LEAST = 0.01  # of the force at a point: a smaller part that bars leave is not told, nor a smaller thrust
@@ -51,8 +52,7 @@ def column_table(model: StructuralModel, cases: Iterable[tuple[str, Floats]]) ->
     """
     rows = list[list[object]]()
     for case, reactions in cases:
-        for vertex in dict.fromkeys(bar.vertex for bar in model.bars):
-            own = [bar for bar in model.bars if bar.vertex == vertex]
+        for vertex, own in at_points(model.bars).items():
             directions, force = np.array([bar.direction for bar in own]), reactions[vertex]
             stays = np.array([bar.kind == "stay" for bar in own])
             all_of_them = np.linalg.lstsq(directions.T, force, rcond=None)[0]

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,25 +59,26 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
     results of each increment, and writes none for viewers.
     """
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
-    text = [f"*HEADING\npcmc structural model, {'' if model.certified else 'NOT CERTIFIED: '}"]
-    text += [f"{model.verdict}\n" + (f"** {model.note}\n" if model.note else "")]
+    text = [f"*HEADING\npcmc structural model, {'' if model.certificate.certified else 'NOT CERTIFIED: '}"]
+    text += [f"{model.certificate.verdict.value}\n" + (f"** {model.note}\n" if model.note else "")]
     text += [f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1)]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
     text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]
     text += [f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1)]
-    text += ["*NODE, NSET=NALL\n"]
-    text += [format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)]
+    text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes])]
     for section in (_elements, _beams, _supports):
         text += section(model)
     # σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge
-    text += ["*INITIAL CONDITIONS, TYPE=STRESS\n", _stresses(model.faces + 1, model.stresses, POINTS)]
+    prestress = [(model.faces + 1, model.stresses, POINTS)]
     for cable, area, _, numbers, along in model.cable_edges():
         pull = pull_along(surface, cable, cable.edges)[:, None, None]
-        text += [_stresses(numbers, pull / area * along[:, :, None] * along[:, None, :], CABLE_POINTS)]
-    if model.lines:  # members take over from what held the form, while its loads stay
-        text += ["*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n"]
-        rows = f"*AMPLITUDE, NAME=AT_%d_%d\n0.,{FIELD},1.,{FIELD}\n"
-        text += [format_rows(rows, *_released(model, steps[0]))]
+        prestress += [(numbers, pull / area * along[:, :, None] * along[:, None, :], CABLE_POINTS)]
+    rows = list[tuple[Any, ...]]()  # a line for each integration point
+    for elements, stress, points in prestress:
+        tensors = np.repeat(stress[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], points, axis=0)
+        point = np.tile(np.arange(1, points + 1), len(elements))
+        rows.append((np.repeat(elements, points), point, tensors))
+    text += [card("INITIAL CONDITIONS, TYPE=STRESS", *map(np.concatenate, zip(*rows, strict=True)))]
     return "".join(chain(text, *(_step(model, step, k == 0, every) for k, step in enumerate(steps))))
 
 
@@ -89,8 +91,7 @@ def _elements(model: StructuralModel) -> Iterator[str]:
     for k, thickness in zip(present, model.thicknesses[present - 1].tolist(), strict=True):
         mine = patch_of == k - 1
         corners = surface.faces[model.active[mine]]
-        yield f"*ELEMENT, TYPE={name}, ELSET=PATCH_{k}\n"
-        yield format_rows("%d,%d,%d,%d\n", model.faces[mine] + 1, *(corners.T + 1))
+        yield card(f"ELEMENT, TYPE={name}, ELSET=PATCH_{k}", model.faces[mine] + 1, corners + 1)
         yield _set(f"NODES_{k}", np.unique(corners))
         of = f"MATERIAL=MEMBRANE_{materials.index(model.materials[k - 1]) + 1}"
         if not model.materials[k - 1].cloth:
@@ -107,8 +108,7 @@ def _elements(model: StructuralModel) -> Iterator[str]:
 
     used = list(dict.fromkeys(material for _, material in model.cable_sections))
     for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
-        yield f"*ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}\n"
-        yield format_rows("%d,%d,%d\n", numbers, *(cable.edges.T + 1))
+        yield card(f"ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}", numbers, cable.edges + 1)
         yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{used.index(material) + 1}\n{short(area)}\n"
     if used:
         yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(surface.cables)))
@@ -125,14 +125,13 @@ def _beams(model: StructuralModel) -> Iterator[str]:
     number = np.zeros(len(X), dtype=np.int64)
     number[vertices] = model.surface.n + 1 + np.arange(len(vertices))
     if len(vertices):
-        yield "*NODE, NSET=BEAMS\n"
-        yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", number[vertices], *X[vertices].T)
+        yield card("NODE, NSET=BEAMS", number[vertices], X[vertices])
     first = model.surface.m + 1 + sum(len(cable.edges) for cable in model.standing.cables)
     for k, line in enumerate(model.beams, 1):
         elements, first = first + np.arange(len(line.pairs)), first + len(line.pairs)
         width, height, factor = line.member.profile.equal_rectangle
-        yield f"** MEMBER_{k}: {_line(line.name)}\n*ELEMENT, TYPE=B31, ELSET=MEMBER_{k}\n"
-        yield format_rows("%d,%d,%d\n", elements, *number[line.pairs].T)
+        yield f"** MEMBER_{k}: {_line(line.name)}\n"
+        yield card(f"ELEMENT, TYPE=B31, ELSET=MEMBER_{k}", elements, number[line.pairs])
         across = bar_axes(X, line.pairs, up)[0][:, 1].round(9) + 0.0
         rows, which = np.unique(across, axis=0, return_inverse=True)
         for a, row in enumerate(rows):
@@ -148,8 +147,8 @@ def _beams(model: StructuralModel) -> Iterator[str]:
             axes = model.axes[v]
             if v in turns:  # those that are held first
                 axes = turns[v] if len(turns[v]) > 1 else np.concatenate([turns[v], *perpendicular(turns[v])])
-            yield f"*NSET, NSET=BEAM_{node}\n{node}\n*TRANSFORM, NSET=BEAM_{node}, TYPE=R\n"
-            yield ",".join(FIELD % c for c in axes[:2].ravel()) + "\n"
+            yield f"*NSET, NSET=BEAM_{node}\n{node}\n"
+            yield card(f"TRANSFORM, NSET=BEAM_{node}, TYPE=R", axes[:2].reshape(1, 6))
         yield "".join(f"*BOUNDARY\n{node},{axis},{axis}\n" for axis in stops)
         if v in turns:
             yield f"*BOUNDARY\n{node},4,{3 + len(turns[v])}\n"
@@ -182,35 +181,27 @@ def _supports(model: StructuralModel) -> Iterator[str]:
     _, first, which = np.unique(alike, axis=0, return_index=True, return_inverse=True)
     for k, leader in enumerate(sliding[first], 1):
         yield _set(f"GUIDE_{k}", sliding[which.ravel() == k - 1])
-        yield f"*TRANSFORM, NSET=GUIDE_{k}, TYPE=R\n"
-        yield ",".join(FIELD % c for c in model.axes[leader, :2].ravel()) + "\n"
+        yield card(f"TRANSFORM, NSET=GUIDE_{k}, TYPE=R", model.axes[leader, :2].reshape(1, 6))
         yield f"*BOUNDARY\nGUIDE_{k},{'1,1' if model.freedom[leader] == 2 else '2,3'}\n"
-
-
-def _stresses(elements: Ints, stress: Floats, points: int) -> str:
-    """A line for each integration point of elements (k,) with stress tensors (k,3,3)."""
-    rows, columns = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
-    values = np.repeat(stress[:, rows, columns], points, axis=0)
-    point = np.tile(np.arange(1, points + 1), len(elements))
-    return format_rows("%d,%d" + f",{FIELD}" * 6 + "\n", np.repeat(elements, points), point, *values.T)
 
 
 def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterator[str]:
     """A step of the analysis, with all loads that act at its end."""
-    yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n"
     released = form and bool(model.lines)
+    if released:  # members take over from what held the form, while its loads stay
+        yield "*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n"
+        taken = _released(model, step)
+        yield format_rows(f"*AMPLITUDE, NAME=AT_%d_%d\n0.,{FIELD},1.,{FIELD}\n", *taken)
+    yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n"
     yield f"{1.0 if form and not released else INCREMENT},1.,{LEAST_INCREMENT},1.\n"
     sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)
     label, pressures = KINDS[model.elements][2], step.pressures[model.active]
     patch_of, rows = model.standing.patch_of_face[model.active], list[str]()
     for k in np.unique(patch_of):
-        mine = np.flatnonzero(patch_of == k)
-        values = pressures[mine]
-        if (values == values[0]).all():
-            mine, names = mine[:1], [f"PATCH_{k + 1}"]
-        else:
-            names = (model.faces[mine] + 1).astype(str).tolist()
-        rows += [f"{n},{label},{short(p)}\n" for n, p in zip(names, pressures[mine], strict=True) if p]
+        values, names = pressures[patch_of == k], (model.faces[patch_of == k] + 1).tolist()
+        even = [(f"PATCH_{k + 1}", values[0])] if (values == values[0]).all() else []
+        loaded = even or zip(names, values, strict=True)
+        rows += [f"{name},{label},{short(p)}\n" for name, p in loaded if p]
     if step.gravity:
         down = ",".join(short(-c) for c in model.standing.plane.normal)
         heavy = {f"PATCH_{k + 1}": model.materials[k].density for k in np.unique(patch_of)}
@@ -221,30 +212,25 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterat
     if not rows:  # without a line the loads of the step before would stay
         rows = [f"EALL,{label},0.\n"]
     yield "".join([f"*DLOAD, OP=NEW{', AMPLITUDE=WHOLE' if released else ''}\n", *rows])
-    forces, others = _in_axes(model, step.forces), model.nodes
+    forces, others = np.einsum("nij,nj->ni", model.axes, step.forces), model.nodes
     if released:
-        vertex, axis = _released(model, step)[:2]
-        yield format_rows("*CLOAD, AMPLITUDE=AT_%d_%d\n%d,%d,1.\n", vertex, axis, vertex, axis)
+        yield format_rows("*CLOAD, AMPLITUDE=AT_%d_%d\n%d,%d,1.\n", *taken[:2], *taken[:2])
         others = others & ~model.on_members
     if forces[others].any():
-        yield f"*CLOAD{', AMPLITUDE=WHOLE' if released else ', OP=NEW'}\n"
         vertex, axis = np.nonzero(forces * others[:, None])
-        yield format_rows(f"%d,%d,{FIELD}\n", vertex + 1, axis + 1, forces[vertex, axis])
+        how = "AMPLITUDE=WHOLE" if released else "OP=NEW"
+        yield card(f"CLOAD, {how}", vertex + 1, axis + 1, forces[vertex, axis])
     elif not form:
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
-    often = 1 if every else 1000
-    printed = [("NODE", "NSET=NALL", "U"), *([("NODE", "NSET=HELD", "RF")] if model.held.any() else [])]
-    printed += [("NODE", "NSET=ENDS", "RF")] if model.held[model.beam_vertices].any() else []
-    for kind, name, what in (*printed, *(("EL", f"ELSET={name}", "S") for name in sets)):
-        yield f"*{kind} PRINT, {name}, GLOBAL=YES, FREQUENCY={often}\n{what}\n"
+    printed = {"NODE PRINT, NSET=NALL": "U"}
+    printed |= {"NODE PRINT, NSET=HELD": "RF"} if model.held.any() else {}
+    printed |= {"NODE PRINT, NSET=ENDS": "RF"} if model.held[model.beam_vertices].any() else {}
+    printed |= {f"EL PRINT, ELSET={name}": "S" for name in sets}
+    for what, quantity in printed.items():
+        yield f"*{what}, GLOBAL=YES, FREQUENCY={1 if every else 1000}\n{quantity}\n"
     if not every:
         yield "*NODE FILE, OUTPUT=2D, GLOBAL=YES, FREQUENCY=1000\nU,RF\n*EL FILE, OUTPUT=2D, GLOBAL=YES\nS\n"
     yield "*END STEP\n"
-
-
-def _in_axes(model: StructuralModel, forces: Floats) -> Floats:
-    """Forces (n,3) on the vertices, in the axes of the nodes."""
-    return np.asarray(np.einsum("nij,nj->ni", model.axes, forces))
 
 
 def _released(model: StructuralModel, step: Step) -> tuple[Ints, Ints, Floats, Floats]:
@@ -253,10 +239,22 @@ def _released(model: StructuralModel, step: Step) -> tuple[Ints, Ints, Floats, F
 
     The program takes one course in time for each, so that both are one load.
     """
-    end = _in_axes(model, step.forces)
-    start = end - _in_axes(model, forces_on_members(model, step))
+    pulls = np.stack([step.forces, forces_on_members(model, step)])
+    end, members = np.einsum("nij,knj->kni", model.axes, pulls)
+    start = end - members
     vertex, axis = np.nonzero(((start != 0.0) | (end != 0.0)) & (model.nodes & model.on_members)[:, None])
     return vertex + 1, axis + 1, start[vertex, axis], end[vertex, axis]
+
+
+def card(head: str, *columns: Ints | Floats) -> str:
+    """A keyword line, and a data line for each row of columns (k,) or (k,c): integers, or floats in full.
+
+    >>> card("NODE", np.array([7]), np.array([[0.5, -1.0]]))
+    '*NODE\\n7,5.000000000000e-01,-1.000000000000e+00\\n'
+    """
+    parts = [part for column in columns for part in np.reshape(column, (len(column), -1)).T]
+    row = ",".join("%d" if part.dtype.kind == "i" else FIELD for part in parts)
+    return f"*{head}\n" + format_rows(f"{row}\n", *parts)
 
 
 def _set(name: str, members: Ints, kind: str = "NSET") -> str:

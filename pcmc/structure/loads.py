@@ -69,9 +69,7 @@ class Snow:
     name: str = "snow"  # of its step
     slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies where the slope is between these
     area: Sequence[Sequence[float]] = ()  # points [x, y]: it lies within their polygon; empty: everywhere
-    slides: Sequence[
-        float
-    ] = ()  # degrees: whole up to the first slope, none from the second on; linear between
+    slides: Sequence[float] = ()  # degrees: whole up to the first slope, none from the second, linear between
 
     def __post_init__(self) -> None:
         load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
@@ -169,9 +167,7 @@ def load_steps(
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
     form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
-    empty = nothing(form)
-    steps, added = [form], {FORM: (form, empty)}
-    always = {FORM: 1.0}
+    steps, added, always = [form], {FORM: (form, nothing(form))}, {FORM: 1.0}
     for together in map(acting_together, loads):
         step = replace(permanent, name=step_name(together))
         for load in together:
@@ -181,7 +177,7 @@ def load_steps(
         always |= {step.name: 1.0} if all(isinstance(load, SelfWeight) for load in together) else {}
         permanent = replace(permanent, gravity=step.gravity)
     for name, factors in (combinations or {}).items():
-        sum_ = replace(empty, name=name)
+        sum_ = replace(nothing(form), name=name)
         for case, factor in (always | dict(factors)).items():
             sum_ = sum_.plus(*added[case], factor)
         steps.append(sum_)
@@ -227,6 +223,7 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
             text = f"combinations: two cases are called {name!r}; give each a name of its own"
             raise OptionError(text, what="combinations", found=name)
     checked: dict[str, dict[str, float]] = {}
+    limits: dict[str, Any] = {"least": -1e3, "most": 1e3}
     for name, factors in given.items():
         _check_name(name)
         if name in (*steps, FORM):
@@ -238,7 +235,6 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
             if case not in (FORM, *steps):
                 text = f"combination {name!r}: {unknown('case', case, [FORM, *steps])}"
                 raise OptionError(text, what="combinations", where=name, found=case)
-        limits: dict[str, Any] = {"least": -1e3, "most": 1e3}
         checked[name] = {c: validate.number("factor", f, where=c, **limits) for c, f in factors.items()}
     return checked
 
@@ -291,14 +287,12 @@ def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
     slope = roof_slopes(surface)
     chosen: Bools = (slope >= least - 1e-9) & (slope <= most + 1e-9)
     if len(load.area):
-        x, y = surface.vertices[surface.faces].mean(axis=1)[:, :2].T
-        odd = np.zeros(surface.m, dtype=bool)
-        corners = np.array(load.area, dtype=float)
-        for (a, b), (c, d) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            crossed = (b > y) != (d > y)  # by the line from the point along x
-            with np.errstate(divide="ignore", invalid="ignore"):
-                odd ^= crossed & (x < a + (y - b) * (c - a) / (d - b))
-        chosen = chosen & odd
+        x, y = surface.vertices[surface.faces].mean(axis=1)[:, :2].T[:, :, None]
+        a, b = (corners := np.array(load.area, dtype=float)).T
+        c, d = np.roll(corners, -1, axis=0).T
+        crossed = (b > y) != (d > y)  # (m,k) by the line from the point along x
+        with np.errstate(divide="ignore", invalid="ignore"):
+            chosen &= (crossed & (x < a + (y - b) * (c - a) / (d - b))).sum(axis=1) % 2 == 1
     if not chosen.any():
         text = f"{load.name}: no triangle has its middle in the area and its slope in {[least, most]}"
         raise OptionError(f"{text}; check the zone", what=load.name)
@@ -307,17 +301,15 @@ def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
 
 def _checked_zone(kind: str, load: Snow | Wind) -> dict[str, Any]:
     """Slopes and area of a load, as tuples of numbers."""
-    area = load.area
     try:
-        points = np.array(area, dtype=float).reshape(-1, 2) if len(area) else np.empty((0, 2))
-        good = not len(area) or (len(points) >= 3 and np.shape(area) == points.shape)
-        good = good and bool(np.isfinite(points).all())
+        points = np.array(load.area, dtype=float)
+        good = not len(load.area) or (points.ndim == 2 and points.shape[1] == 2 and len(points) > 2)
     except (TypeError, ValueError):
         good = False
-    if not good:
-        validate.refuse(f"{kind}.area", area, "three or more points [x, y]")
-    corners = tuple(map(tuple, points.tolist()))
-    return {"slopes": _checked_slopes(f"{kind}.slopes", load.slopes), "area": corners}
+    if not (good and np.isfinite(points).all()):
+        validate.refuse(f"{kind}.area", load.area, "three or more points [x, y]")
+    slopes = _checked_slopes(f"{kind}.slopes", load.slopes)
+    return {"slopes": slopes, "area": tuple(map(tuple, points.tolist()))}
 
 
 def _checked_slopes(what: str, given: Any) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
 from .frames import BarFrame
 from .loads import Step
-from .members import MemberLine
+from .members import PlacedMember
 from .model import StructuralModel
 from .pulls import at_vertices, balancing_force, corner_forces, turns
 from .results import StepResults
@@ -33,7 +33,7 @@ HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of 
 class MemberForces:
     """What a beam carries along its line, and how far it moves."""
 
-    line: MemberLine
+    line: PlacedMember
     points: Floats  # (k,3) of the form
     within: Floats  # (k,6) N, V, V across, T, M, M across; see ``FrameForces.within``
     displacements: Floats  # (k,3)
@@ -66,18 +66,6 @@ class MemberForces:
         return {"least_N": N.min(), "largest_N": N.max(), "V": V.max(), "M": M.max()}
 
     @property
-    def eccentricity(self) -> float:
-        """max |M| / max |N|, length: how far the line is from one that does not bend."""
-        most = float(np.abs(self.within[:, 0]).max())
-        return self.largest["M"] / most if most > 0.0 else np.inf
-
-    @property
-    def pulled(self) -> float:
-        """The sum of the sizes of the pulls between its ends."""
-        inner = self.pulls if self.line.closed else self.pulls[1:-1]
-        return float(np.linalg.norm(inner, axis=1).sum())
-
-    @property
     def balance(self) -> tuple[float, float]:
         """The one force N along it that balances its pulls best, and the share of these that is left."""
         return balancing_force(self.points, self.pulls, self.line.closed)
@@ -106,17 +94,13 @@ class MemberForces:
 @kept_with_owner
 def members_at_rest(model: StructuralModel) -> tuple[MemberForces, ...]:
     """The beams of a model under the pull of the sheets at rest, with the displacements of beams alone."""
-    return _along_lines(model, model.steps[0])
+    return members_in(model, model.steps[0])
 
 
-def members_in(results: StepResults) -> tuple[MemberForces, ...]:
-    """The beams at the end of a step of the analysis, in the shape that the roof has there."""
-    return _along_lines(results.model, results.step, results)
-
-
-def _along_lines(
+def members_in(
     model: StructuralModel, step: Step, results: StepResults | None = None
 ) -> tuple[MemberForces, ...]:
+    """The beams at the end of a step of the analysis, in the shape that the roof has in its ``results``."""
     if not model.beams:
         return ()
     X, forces = model.standing.vertices, forces_on_members(model, step, results)
@@ -188,9 +172,10 @@ def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
     angles: the twist of hinged ends on X (n,3), all of clamped ones."""
     given = dict[int, list[Floats]]()
     for line in model.beams:
-        for v, t in line.ends(X):
+        for v, beside in line.ends:
+            along = (X[beside] - X[v]) / np.linalg.norm(X[beside] - X[v])
             if model.held[v] and model.freedom[v] == 0:
-                given.setdefault(v, []).extend([t] if line.member.ends == "hinged" else np.eye(3))
+                given.setdefault(int(v), []).extend([along] if line.member.ends == "hinged" else np.eye(3))
     found = {}
     for v, held in given.items():
         _, sizes, rows = np.linalg.svd(np.array(held))
@@ -256,7 +241,7 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         most = beam.largest
         far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
         about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment}"
-        about += f", M/N = {beam.eccentricity:.2g}{length}" if np.isfinite(beam.eccentricity) else ""
+        about += f", M/N = {most['M'] / abs(far):.2g}{length}" if far else ""
         about += f"; {beam.enough:.3g} times its E A and E I keep the"
         about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
         about += f"; alone it buckles at {beam.buckling:.3g} times this" if beam.buckling < np.inf else ""
@@ -301,7 +286,10 @@ def weak_members(
             text += f" sheets hold it; {1.0 / worst.buckling:.2g} times its E I carries it alone, without any"
             lines.append(f"{text} safety")
         case, worst = max(own, key=lambda one: one[1].deflection)
-        share = max(0.0, 1.0 - listed[0][1][k].pulled / rest.pulled)
+        first = listed[0][1][k]
+        inner = slice(None) if rest.line.closed else slice(1, -1)
+        pulls = [np.linalg.norm(beam.pulls[inner], axis=1).sum() for beam in (first, rest)]
+        share = max(0.0, 1.0 - pulls[0] / pulls[1])
         if worst.enough > 1.0 or (rest.enough > 1.0 and share > HELPED):
             text = f"{rest.line.name} is too weak: under {case} it moves {worst.deflection:.3g}"
             text += f"{units.behind('length')}, span/{worst.span / worst.deflection:.0f}, and at rest the"

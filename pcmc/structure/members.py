@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, unknown
+from ..base.units import Units
 from ..certificate.forces import Forces
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.curves import Curve
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import segment_lengths, unit_vectors
 from ..surface.pieces import point_text, to_space
+from ..surface.topology import EdgeCurve
+from .frames import bar_axes
 from .material import Material, Profile
 
 KINDS = ("beam", "cable")
@@ -95,58 +98,56 @@ class Member:
 
 
 @dataclass(frozen=True, eq=False)
-class Bar:
-    """A column or a stay, from a point that holds the surface to its foot or anchor."""
+class PlacedMember(EdgeCurve):
+    """A member where it is: along edges of the surface, or from a vertex that it holds to its foot."""
 
     name: str  # of the member; with a number where others have the same
+    kind: str  # "beam" or "cable" along edges, "column" or "stay" at a point
     member: Member
-    vertex: int  # that it holds
-    points: Floats  # (2,3) its ends, the foot or anchor last
+    points: Floats  # (k,3) of its axis; the first is not repeated where it is closed
+    wall: str = ""  # in whose place it is
+    forces: tuple[float, float] | None = None  # the least and the largest N at rest, tension above 0
 
     @property
-    def kind(self) -> str:
-        return "column" if self.member.kind == "beam" else "stay"
+    def path(self) -> Floats:
+        """(b+1,3) its points, the first again at the end where it is closed."""
+        return np.vstack([self.points, self.points[:1]]) if self.closed else self.points
 
     @property
     def length(self) -> float:
-        return float(np.linalg.norm(self.points[1] - self.points[0]))
+        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
 
     @property
     def direction(self) -> Floats:
-        """(3,) from the surface to its foot."""
-        return (self.points[1] - self.points[0]) / self.length
+        """(3,) from its first point to its last."""
+        return unit_vectors(self.points[-1] - self.points[0])
+
+    def segments(self, up: Floats) -> tuple[Floats, Floats, Floats]:
+        """(b,3) where its pieces begin; (b,3,3) rows along each, across, and upright; (b,) lengths."""
+        first = np.arange(len(self.path) - 1)
+        return self.path[:-1], *bar_axes(self.path, np.stack([first, first + 1], axis=1), up)
+
+    def texts(self, units: Units) -> dict[str, str]:
+        """What it is, in words and numbers with units, by key.
+
+        >>> mast = Member([[0, 0, 3], [0, 0, 0]], Profile.circle(0.1), Material(2.1e8))
+        >>> at = np.zeros(1, dtype=int), False, (), "mast", "column", mast, np.array(mast.on)
+        >>> texts = PlacedMember(*at, forces=(-9.0, -9.0)).texts(Units("m", "kN"))
+        >>> texts["section"], texts["N at rest"]
+        ('circle 0.1 m', '-9 kN')
+        """
+        profile, length = self.member.profile, units.behind("length")
+        texts = {"member": self.name, "kind": self.kind, "in the place of": self.wall}
+        texts["section"] = f"{profile.label}{length}" if profile.shape else ""
+        texts["area"] = f"{profile.area:.4g}{units.behind('area')}"
+        texts["Young's modulus"] = f"{self.member.material.young:.4g}{units.behind('pressure')}"
+        texts["length"] = f"{self.length:.4g}{length}"
+        ends = dict.fromkeys(f"{N:.4g}" for N in self.forces or ())
+        texts["N at rest"] = f"{' to '.join(ends)}{units.behind('force')}" if ends else ""
+        return {key: text for key, text in texts.items() if text}
 
 
-@dataclass(frozen=True, eq=False)
-class MemberLine:
-    """The edges of the surface that a member runs along."""
-
-    name: str  # of the member; with a number where it has several lines
-    member: Member
-    vertices: Ints  # (k,) in order; the first is not repeated where it is closed
-    closed: bool
-    wall: str = ""  # in whose place it is
-
-    @property
-    def pairs(self) -> Ints:
-        """(b,2) the ends of its edges, in order."""
-        order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
-        return np.stack([order[:-1], order[1:]], axis=1)
-
-    @property
-    def carried(self) -> Ints:
-        """The vertices that it carries in the place of a support: all but its ends."""
-        return self.vertices if self.closed else self.vertices[1:-1]
-
-    def ends(self, X: Floats) -> list[tuple[int, Floats]]:
-        """The vertex at each end, and the direction (3,) there on X (n,3); none if it is closed."""
-        if self.closed:
-            return []
-        first, last = self.vertices[:2], self.vertices[:-3:-1]
-        return [(int(a), (X[b] - X[a]) / np.linalg.norm(X[b] - X[a])) for a, b in (first, last)]
-
-
-def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, ...]:
+def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember, ...]:
     """The lines of members on a surface, but for those of its own cables; OptionError for a member that is on
     no edge, on a wall that rests on Π, or where another one is, and a wall that ends at one with a member.
 
@@ -157,19 +158,17 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
     >>> line.name, len(line.vertices), line.closed
     ('wall 1', 5, False)
     """
-    lines, taken = list[MemberLine](), np.zeros(len(surface.topology.edges), dtype=bool)
+    lines, taken = list[PlacedMember](), np.zeros(len(surface.topology.edges), dtype=bool)
     cut = _mirrored(surface)
-    for member in members:
-        if member.two_points or member.on in [cable.name for cable in surface.cables]:
-            continue
+    own = [cable.name for cable in surface.cables]
+    for member in (one for one in members if not (one.two_points or one.on in own)):
         for line in _lines_of(surface, member):
-            if cut[line.vertices].any():
-                text = f"member {line.name!r} meets a mirror plane; take the whole roof, whole = true"
-                raise OptionError(text, what="members", where=line.name)
             edges = surface.topology.edge_numbers(line.pairs)
-            if taken[edges].any():
-                text = f"member {line.name!r} runs where another one does; leave one of them out"
-                raise OptionError(text, what="members", where=line.name)
+            problem = "runs where another one does; leave one of them out" if taken[edges].any() else ""
+            if cut[line.vertices].any():
+                problem = "meets a mirror plane; take the whole roof, whole = true"
+            if problem:
+                raise OptionError(f"member {line.name!r} {problem}", what="members", where=line.name)
             taken[edges] = True
             lines.append(line)
     # a wall that ends at one with a member: nothing would hold its edge there
@@ -188,7 +187,9 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[MemberLine, .
     return tuple(lines)
 
 
-def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberLine]) -> tuple[Bar, ...]:
+def bars_on(
+    surface: Surface, members: Sequence[Member], lines: Sequence[PlacedMember]
+) -> tuple[PlacedMember, ...]:
     """The columns and stays at points of supports and at ends of the ``lines`` of beams; OptionError for one
     at another point, for a stay inside the roof, and where statics alone does not find their forces.
 
@@ -204,11 +205,11 @@ def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberL
     given = [member for member in members if member.two_points]
     if not given:
         return ()
-    X, plane, topo, bars = surface.vertices, surface.plane, surface.topology, list[Bar]()
+    X, plane, topo, bars = surface.vertices, surface.plane, surface.topology, list[PlacedMember]()
     alone, mirrored = Forces.of(surface).single, _mirrored(surface)
     for line in lines:
         if line.member.kind == "beam":
-            alone[[v for v, _ in line.ends(X) if surface.fixed[v]]] = True
+            alone[[v for v, _ in line.ends if surface.fixed[v]]] = True
     rim = np.zeros(surface.n, dtype=bool)
     rim[topo.edges[topo.boundary_edge]] = True
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
@@ -230,9 +231,23 @@ def bars_on(surface: Surface, members: Sequence[Member], lines: Sequence[MemberL
             problem = f"its foot is the point {at} that it holds; give another one"
         if problem:
             raise OptionError(f"member {name!r}: {problem}", what="members", where=name)
-        bars.append(Bar(name, member, int(here[0]), np.array([X[here[0]], foot])))
-    _refuse_mechanisms(bars)
+        kind = "column" if member.kind == "beam" else "stay"
+        bars.append(PlacedMember(here[:1], False, (), name, kind, member, np.array([X[here[0]], foot])))
+    for own in at_points(bars).values():
+        if np.linalg.matrix_rank([bar.direction for bar in own], tol=FLAT) < len(own):
+            names, at = ", ".join(bar.name for bar in own), point_text(own[0].points[0])
+            text = f"members {names} meet at {at}: statics finds the forces of three bars, not in one plane,"
+            text += " or of two, not in one line; leave one out"
+            raise OptionError(text, what="members", where=own[0].name)
     return tuple(bars)
+
+
+def at_points(bars: Iterable[PlacedMember]) -> dict[int, list[PlacedMember]]:
+    """The columns and stays at each vertex."""
+    found = dict[int, list[PlacedMember]]()
+    for bar in bars:
+        found.setdefault(int(bar.vertices[0]), []).append(bar)
+    return found
 
 
 def _mirrored(surface: Surface) -> Bools:
@@ -242,21 +257,7 @@ def _mirrored(surface: Surface) -> Bools:
     )
 
 
-def _refuse_mechanisms(bars: Sequence[Bar]) -> None:
-    """Refuse bars at one point whose forces do not follow from their sum."""
-    for vertex in dict.fromkeys(bar.vertex for bar in bars):
-        own = [bar for bar in bars if bar.vertex == vertex]
-        if np.linalg.matrix_rank([bar.direction for bar in own], tol=FLAT) < len(own):
-            names, at = ", ".join(bar.name for bar in own), point_text(own[0].points[0])
-            text = (
-                f"members {names} meet at {at}: statics finds the forces of three bars, not in one plane, or"
-            )
-            raise OptionError(
-                f"{text} of two, not in one line; leave one out", what="members", where=own[0].name
-            )
-
-
-def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:
+def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
     topo, names = surface.topology, [patch.name for patch in surface.patches]
     if isinstance(member.on, Curve):
         chosen = _along(surface, member.on)
@@ -280,7 +281,8 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[MemberLine]:
     curves = [(wall, curve) for wall, edges in found for curve in topo.curves_among(edges)]
     for number, (wall, curve) in enumerate(curves, 1):
         name = member.label if len(curves) == 1 else f"{member.label}-{number}"
-        yield MemberLine(name, member, curve.vertices, curve.closed, wall)
+        about = name, member.kind, member, surface.vertices[curve.vertices], wall
+        yield PlacedMember(curve.vertices, curve.closed, curve.sheets, *about)
 
 
 def _top(surface: Surface, wall: int) -> Bools:

@@ -35,7 +35,7 @@ from .loads import (
     load_steps,
 )
 from .material import Material
-from .members import Bar, Member, MemberLine, bars_on, lines_on
+from .members import Member, PlacedMember, bars_on, lines_on
 from .pulls import at_vertices, balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
@@ -135,16 +135,6 @@ class StructuralModel:
         return [load for load in single if isinstance(load, SelfWeight)]
 
     @property
-    def verdict(self) -> str:
-        """The sentence of the certificate's verdict."""
-        return str(self.certificate.verdict.value)
-
-    @property
-    def certified(self) -> bool:
-        """Whether the surface is certified."""
-        return bool(self.certificate.certified)
-
-    @property
     def note(self) -> str:
         """The units of the file's numbers in a line, or what was assumed as they are not known."""
         if self.units:
@@ -221,17 +211,17 @@ class StructuralModel:
         return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
 
     @cached_property
-    def lines(self) -> tuple[MemberLine, ...]:
+    def lines(self) -> tuple[PlacedMember, ...]:
         """The lines of the members, but for those of the surface's own cables."""
         return lines_on(self.surface, self.members)
 
     @cached_property
-    def beams(self) -> tuple[MemberLine, ...]:
+    def beams(self) -> tuple[PlacedMember, ...]:
         """Those that are beams."""
         return tuple(line for line in self.lines if line.member.kind == "beam")
 
     @cached_property
-    def bars(self) -> tuple[Bar, ...]:
+    def bars(self) -> tuple[PlacedMember, ...]:
         """The columns and stays: they carry what the points of supports do, and are no elements."""
         return bars_on(self.surface, self.members, self.lines)
 
@@ -287,9 +277,8 @@ class StructuralModel:
     def freed(self) -> Ints:
         """(n,) what a member carries in the place of a support: 1 where it is propped, 2 where it is not."""
         found = np.zeros(self.surface.n, dtype=np.int64)
-        for line in self.lines:
-            if not line.wall:
-                found[line.carried] = 1 if line.member.propped else 2
+        for line in (line for line in self.lines if not line.wall):  # all of it but its ends
+            found[line.vertices if line.closed else line.vertices[1:-1]] = 1 if line.member.propped else 2
         return found
 
     @cached_array

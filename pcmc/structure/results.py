@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from .model import StructuralModel, expect_model
 WHOLE = 1e-6  # of a step: a time so near to its end is the end
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
-DAT_COLUMNS = {"displacements": (1, 3), "forces": (1, 3), "stresses": (2, 6)}  # keys and values of a row
+KEYS = {"displacements": 1, "forces": 1, "stresses": 2}  # numbers before the 3, 3 or 6 values of a row
+SETS = {"CABLES": "cables", "ENDS": "ends"}  # sets of elements and nodes with tables of their own
+OWNERS = {"stresses": "elements", "cables": "cable elements", "forces": "held nodes"}  # of others nodes
 TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
 
 
@@ -111,15 +114,13 @@ def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tup
     return tuple(_results(model, steps, k, tables) for k in range(len(tables)))
 
 
-def _results(
-    model: StructuralModel, steps: Sequence[Step], k: int, tables: list[dict[str, ResultBlock]]
-) -> StepResults:
+def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list[Tables]) -> StepResults:
     """The arrays of step k on the surface's vertices and faces; only the standing faces are elements."""
-    blocks = tables[k]
+    blocks = {kind: of_increments[-1] for kind, of_increments in tables[k].items()}
     step, surface, stress = steps[k], model.standing, blocks["stresses"]
     share = blocks["displacements"].time - k
     if share < 1.0 - WHOLE:
-        before = steps[k - 1] if k else step.plus(step, nothing(step), -1.0)
+        before = steps[k - 1] if k else nothing(step)
         step = replace(before.plus(step, before, share), name=step.name)
     displacements, reactions = np.full((surface.n, 3), np.nan), np.zeros((surface.n, 3))
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values
@@ -137,18 +138,17 @@ def _results(
         mine = blocks["cables"].means(numbers)[:, TENSOR]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
     done = 1.0 if share >= 1.0 - WHOLE else share
-    taut = min(_taut(model, stress, k, tables[k - 1]["stresses"] if k else None), done)
+    start = tables[k - 1]["stresses"][-1:] if k else []
+    taut = min(_taut(model, k, start + tables[k]["stresses"]), done)
     return StepResults(step.name, model, displacements, reactions, stresses, tensions, step, done, taut)
 
 
-def _taut(model: StructuralModel, last: ResultBlock, k: int, start: ResultBlock | None) -> float:
+def _taut(model: StructuralModel, k: int, increments: list[ResultBlock]) -> float:
     """The time in step k at which the first face gets slack, by lines through the least principal stress at
-    the increments and at the ``start``; 1 if none does."""
-    P, blocks = model.surface.vertices[model.surface.faces[model.faces]], [last]
-    while (earlier := blocks[0].before) is not None:
-        blocks.insert(0, earlier)
-    least = [(0.0, float(model.prestress.min()))] if start is None else []
-    for block in blocks if start is None else [start, *blocks]:
+    the increments, from the end of the step before on; 1 if none does."""
+    P = model.surface.vertices[model.surface.faces[model.faces]]
+    least = [] if k else [(0.0, float(model.prestress.min()))]
+    for block in increments:
         stresses = block.means(model.faces + 1)[:, TENSOR]
         least.append((block.time - k, float(_in_planes(P, stresses).min())))
     for (time, before), (end, after) in pairwise(least):
@@ -164,47 +164,40 @@ def _in_planes(P: Floats, stresses: Floats) -> Floats:
     return np.asarray(np.linalg.eigvalsh(plane @ stresses @ plane.transpose(0, 2, 1)))
 
 
-def _check(tables: list[dict[str, ResultBlock]], model: StructuralModel, steps: Sequence[Step]) -> None:
+def _check(tables: list[Tables], model: StructuralModel, steps: Sequence[Step]) -> None:
     """Refuse results with other nodes or elements than the model's, and more steps."""
     nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
-    cables = [number for *_, numbers, _ in model.cable_edges() for number in numbers]
+    cables = np.array([number for *_, numbers, _ in model.cable_edges() for number in numbers])
+    known = {"displacements": nodes, "stresses": model.faces + 1, "forces": held, "cables": cables}
+    known["all forces"] = nodes
     for number, blocks in enumerate(tables[: len(steps)], 1):
-        for kind in ("displacements", "stresses", *(("forces",) if len(held) else ())):
-            if kind not in blocks:
+        found = {kind: np.unique(of_increments[-1].ids) for kind, of_increments in blocks.items()}
+        for kind in ("displacements", "stresses", *["forces"] * bool(len(held))):
+            if kind not in found:
                 text = f"step {number} has no {kind}; run ccx on the model's file again"
                 raise FileError(text, where=number)
-        moved, stress = blocks["displacements"], blocks["stresses"]
-        _same("nodes", moved.ids, nodes)
-        _same("elements", np.unique(stress.ids), model.faces + 1)
-        if "cables" in blocks:
-            _same("cable elements", np.unique(blocks["cables"].ids), np.array(cables))
-        if "forces" in blocks:
-            _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
-            _same("nodes", np.union1d(blocks["forces"].ids, nodes), nodes)
+        if "forces" in found:
+            found["all forces"] = np.union1d(found["forces"], nodes)
+            found["forces"] = np.intersect1d(found["forces"], held)
+        for kind, numbers in known.items():
+            own, what = found.get(kind, numbers), OWNERS.get(kind, "nodes")
+            if len(own) != len(numbers):
+                text = f"has {len(own)} {what}, the model {len(numbers)}; they belong to different surfaces"
+                raise FileError(text, found=len(own), expected=len(numbers))
+            for other in own[own != numbers][:1].tolist():
+                text = f"its {what} are numbered otherwise than the model's ({other} is not there)"
+                raise FileError(text, where=other)
     if len(tables) > len(steps):
         text = f"has {len(tables)} steps, the model {len(steps)}; is it another model's?"
         raise FileError(text, found=len(tables), expected=len(steps))
 
 
-def _same(what: str, found: Ints, expected: Ints) -> None:
-    if len(found) != len(expected):
-        text = f"has {len(found)} {what}, the model {len(expected)}; they belong to different surfaces"
-        raise FileError(text, found=len(found), expected=len(expected))
-    other = np.flatnonzero(found != expected)
-    if len(other):
-        text = f"its {what} are numbered otherwise than the model's ({found[other[0]]} is not there)"
-        raise FileError(text, where=int(found[other[0]]))
+class ResultBlock(NamedTuple):
+    """One quantity at one increment, by ascending numbers of nodes or elements."""
 
-
-@dataclass(frozen=True, eq=False)
-class ResultBlock:
-    """One quantity of one step, by ascending numbers of nodes or elements."""
-
-    kind: str  # displacements, forces, stresses, or cables: the stresses of these; ends: forces of beams'
-    time: float  # at the end of the step
+    time: float
     ids: Ints  # (k,) numbers of nodes or elements
     values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
-    before: ResultBlock | None = None  # the same at the increment before, in the same step
 
     def means(self, elements: Ints) -> Floats:
         """(k,c) the mean over the integration points of each of the elements (k,), ascending numbers."""
@@ -214,38 +207,34 @@ class ResultBlock:
         return np.stack(sums, axis=1) / np.bincount(place, minlength=len(elements))[:, None]
 
 
-def read(text: str) -> list[dict[str, ResultBlock]]:
-    """The tables of each step, which end at the times 1, 2, ...; of several in a step the last counts, so
-    that of an analysis that stopped the last step's is what it reached. Each has the one ``before`` it.
+Tables = dict[str, list[ResultBlock]]
+"""Of a step, by quantity: displacements, forces, stresses, the stresses of cables, and the forces at the ends
+of beams; at each of its increments that was printed."""
+
+
+def read(text: str) -> list[Tables]:
+    """The tables of each step, which end at the times 1, 2, ...: the last block of an analysis that stopped
+    has what it reached.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
-    >>> read(text)[0]["displacements"].values.tolist()
+    >>> read(text)[0]["displacements"][-1].values.tolist()
     [[0.5, 0.0, -0.001]]
     """
-    steps: list[dict[str, ResultBlock]] = []
-    for block in _blocks(text):
-        number = max(math.ceil(block.time - WHOLE), 1)
-        steps += [{} for _ in range(number - len(steps))]
-        earlier = steps[number - 1].get(block.kind)
-        steps[number - 1][block.kind] = replace(block, before=earlier)
-    return steps
-
-
-def _blocks(text: str) -> Iterator[ResultBlock]:
-    heads = list(DAT_HEAD.finditer(text))
+    steps, heads = list[Tables](), list(DAT_HEAD.finditer(text))
     if not heads:
         raise FileError("has no results; is it a .dat file of ccx, and has its analysis run?")
     for head, end in zip(heads, [*(head.start() for head in heads[1:]), len(text)], strict=True):
         kind, line = head[1], text.count("\n", 0, head.start()) + 1
-        if kind not in DAT_COLUMNS:
-            continue
-        keys, values = DAT_COLUMNS[kind]
-        body = re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])  # names of local axes
-        rows = _numbers(body.split(), keys + values, kind, line)
-        rows = rows[np.argsort(rows[:, 0], kind="stable")]
-        time = float(_numbers([head[4]], 1, "time", line)[0, 0])
-        kind = {"CABLES": "cables", "ENDS": "ends"}.get(head[3], kind)
-        yield ResultBlock(kind, time, rows[:, 0].astype(int), rows[:, keys:])
+        if kind in KEYS:
+            body = re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])  # names of local axes
+            rows = _numbers(body.split(), 8 if kind == "stresses" else 4, kind, line)
+            rows = rows[np.argsort(rows[:, 0], kind="stable")]
+            time = float(_numbers([head[4]], 1, "time", line)[0, 0])
+            number = max(math.ceil(time - WHOLE), 1)
+            steps += [{} for _ in range(number - len(steps))]
+            block = ResultBlock(time, rows[:, 0].astype(int), rows[:, KEYS[kind] :])
+            steps[number - 1].setdefault(SETS.get(head[3], kind), []).append(block)
+    return steps
 
 
 def _numbers(words: list[str], columns: int, what: str, line: int) -> Floats:

@@ -32,24 +32,6 @@ SHAPES: dict[tuple[str, ...], Callable[..., Profile]] = {
 
 
 @dataclass(frozen=True)
-class PatchMaterial:
-    """The material of one patch, where it is another one than the others'.
-
-    Attributes
-    ----------
-    young, poisson, density, weft, shear, warp, thickness : as in [structure], for this patch.
-    """
-
-    young: float | None = None
-    poisson: float | None = None
-    density: float | None = None
-    weft: float | None = None
-    shear: float | None = None
-    warp: Sequence[float] | None = field(default=None, metadata={"kind": "a point [x, y, z]"})
-    thickness: float | None = None
-
-
-@dataclass(frozen=True)
 class Zone:
     """Snow or wind on a part of the roof; those of one case act together, as one case of loads.
 
@@ -239,12 +221,10 @@ class Structure:
     def thicknesses(self, surface: Surface) -> float | dict[str, float]:
         """The thickness of all patches, or of each by name."""
         own = {name: given["thickness"] for name, given in self.patches.items() if "thickness" in given}
-        if not own:
-            return checked_thickness(self.thickness, surface)
-        every = self.thickness
-        if not isinstance(every, Mapping):
-            every = dict.fromkeys((patch.name for patch in surface.patches), every or 0.0)
-        return checked_thickness({**every, **own}, surface)
+        if own and not isinstance(self.thickness, Mapping):
+            own = dict.fromkeys((patch.name for patch in surface.patches), self.thickness) | own
+        every = self.thickness if isinstance(self.thickness, Mapping) else {}
+        return checked_thickness({**every, **own} if own else self.thickness, surface)
 
     @property
     def enclosed(self) -> Gas | None:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, hand_over, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
-from ..base.tolerances import FAR
+from ..base.tolerances import FAR, FORCE_ROUNDING
 from . import checks, supports
 from .checked import checked_parts
 from .geometry import bounding_size
@@ -145,7 +145,9 @@ class Surface(supports.Supported, Imaged):
 
     def _uncancelled(self, pressures: Floats) -> Floats:
         masks = [self.fixed | self.on_plane, *(mask for _, mask in self.on_planes)]
-        return supports.uncancelled_pressures(self.topology, pressures[self.patch_of_face], masks)
+        left = supports.uncancelled_pressures(self.topology, pressures[self.patch_of_face], masks)
+        # where all pressures are next to none, as in a honeycomb, they are rounding themselves
+        return np.where(np.abs(left) * self.size <= FORCE_ROUNDING * self.tensions.max(), 0.0, left)
 
     @cached_array
     def origin(self) -> Floats:
@@ -300,7 +302,8 @@ class Surface(supports.Supported, Imaged):
         ``cable_weights`` give tensions and weights per length by the name of the cable, ``volumes`` volumes
         by the name of the room. The pressure of a wall changes with the difference of its two rooms'
         pressures, and its snow with that of the snow over them, unless the wall itself is named. Of the
-        two sheets of a cushion, ``roof`` and ``roof below``, one that is not named gets the other's pressure.
+        two sheets of a cushion, ``roof`` and ``roof below``, one that is not named gets the other's pressure,
+        and a tension of the upper one changes that of the lower one in proportion, unless it is named, too.
 
         Raises
         ------

@@ -58,8 +58,8 @@ def test_a_wall_that_is_pinched_all_along_has_no_bad_triangle():
 def test_walls_that_lean_are_told_the_worst_first():
     rows = [["a", 3.0, 0, 0, 1], ["b", 0.04, 0, 0, 1], ["c", 7.25, 1.5, 0, 2]]
     table = pd.DataFrame(rows, columns=["wall", "lean", *"xyz"])
-    assert lean_texts(table) == ["'c' by 7.2° near [1.5, 0, 2]", "'a' by 3.0° near [0, 0, 1]"]
-    assert lean_texts(table.iloc[:0]) == []
+    assert lean_texts(table, 3.0) == ["'c' by 7.2° near (1.5, 0, 2)", "'a' by 3.0° near (0, 0, 1)"]
+    assert lean_texts(table.iloc[:0], 3.0) == []
 
 
 def test_the_rows_of_the_patches(squares):

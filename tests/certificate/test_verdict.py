@@ -153,7 +153,7 @@ def test_a_collapsed_triangle_is_named():
     X[c] = 0.5 * (X[a] + X[b])
     found = certify(surface.moved(X))
     assert found.verdict is Verdict.DEGENERATE
-    assert "of patch 'cap' near [" in found.detail
+    assert "of patch 'cap' near (" in found.detail
     assert found.quality < 1e-3
 
 

@@ -73,7 +73,7 @@ def test_pressures_left_over_name_the_rooms_that_they_are_between():
         patches=[PatchSpec(name, 6.0, p) for name, p in (("west", 1.0), ("middle", 0.8), ("east", 0.8))],
     ).surface()
     detail = certify(bays).detail
-    assert "along 4 edges that nothing holds (west | middle near [4.0, " in detail
+    assert "along 4 edges that nothing holds (west | middle near (4, " in detail
     assert "the pressures do not cancel: 0.2 is left over" in detail
 
 
@@ -86,7 +86,7 @@ def test_walls_put_under_a_mesh_carry_the_difference_too():
     ).surface()
     found = certify(bare)
     assert "the pressures do not cancel: 0.2 is left over" in found.detail
-    assert "edges that nothing holds (west | east near [6.0, " in found.detail
+    assert "edges that nothing holds (west | east near (6, " in found.detail
     wall = add_walls(bare).patches[-1]
     assert wall.pressure == pytest.approx(0.2)
     assert "point of Π" not in certify(add_walls(bare)).detail

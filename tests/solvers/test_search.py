@@ -205,8 +205,8 @@ def test_a_way_that_crawls_ends_at_the_saddle_and_names_the_ends_that_slip():
     assert found.verdict is Verdict.SADDLE
     for text in (result.message, found.detail):
         assert "index 1: 1 way down; the mode moves the junction left | right | wall most" in text
-        assert "[0.0, -2.0, 0.0]" in text
-        assert "[0.0, 2.0, 0.0]" in text
+        assert "(0, -2)" in text
+        assert "(0, 2)" in text
         assert "slip: one edge away the junction moves 0.54 as far" in text
 
 

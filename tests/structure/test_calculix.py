@@ -8,12 +8,12 @@ import pytest
 from refusals import refused
 from shapes import rotation
 from starts import four_fans, joined_caps, spherical_cap, stationary, two_squares
-from structures import FABRIC, model_of, pyramid, square
+from structures import FABRIC, model_of, pyramid, results_of, square
 
 import pcmc
 from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, Wind
 from pcmc.certificate.forces import load, reactions
-from pcmc.structure import calculix
+from pcmc.structure import analyse, calculix
 from pcmc.structure.calculix import CalculixError
 from pcmc.surface.geometry import face_areas
 from studies.questions import structure
@@ -37,7 +37,7 @@ def flat_square(turn=None, **more):
 def test_a_flat_film_and_its_cable_stay_where_they_are(turn):
     """Stress α/t in every element, tension τ in every edge, and τ more at the ends of the cable."""
     model = flat_square(turn)
-    (form,) = calculix.run(model)
+    (form,) = results_of(model)
     assert form.largest_displacement < 1e-12
     np.testing.assert_allclose(form.principal_stresses, 2000.0, rtol=1e-5)
     np.testing.assert_allclose(form.cable_tensions["tie"], 3.0, rtol=1e-5)
@@ -50,7 +50,7 @@ def test_weight_and_snow_arrive_at_the_supports():
     """All of ρ t g A, ρ a g ℓ and s A, those on the held nodes themselves, too."""
     model = flat_square(loads=[SelfWeight(), Snow(0.01, patches=["film"])])
     own = 0.1 * 9.81 * (1e-3 * 1.0 + 1e-4 * 1.0)
-    _, weight, snow = calculix.run(model)
+    _, weight, snow = results_of(model)
     np.testing.assert_allclose(weight.reactions.sum(axis=0), [0, 0, own], atol=1e-6)
     np.testing.assert_allclose(snow.reactions.sum(axis=0), [0, 0, own + 0.01], rtol=1e-4, atol=1e-6)
     assert snow.deflections.min() < weight.deflections.min() < 0.0
@@ -61,7 +61,7 @@ def test_the_deflection_of_a_tense_film_is_that_of_poisson():
     errors = []
     for n in (4, 8, 16):
         model = model_of(square(n), loads=[Snow(1e-3, patches=["film"])], anyway=True)
-        depth = -np.nanmin(calculix.run(model)[1].deflections)
+        depth = -np.nanmin(results_of(model)[1].deflections)
         errors.append(abs(depth / (0.0736714 * 1e-3 / 2.0) - 1.0))
     order = np.polyfit(np.log([4, 8, 16]), -np.log(errors), 1)[0]
     assert order == pytest.approx(2.0, abs=0.1)
@@ -73,7 +73,7 @@ def comparison(edge):
     """Displacement, stress and reactions of the cap's model on a mesh, against ours."""
     surface = stationary(partial(spherical_cap, edge, alpha=0.6)).surface
     model = structure.structural_model(surface)
-    form, snow = calculix.run(model)
+    form, snow = results_of(model)
     return structure.compared(model, form, snow)
 
 
@@ -109,7 +109,7 @@ def test_every_support_and_wall_is_at_rest_there(make):
     """Displacement, patches' stress and the sum of reactions agree; what slides has no reaction along."""
     surface = pcmc.solve(make(), target="stationary").surface
     model = structure.structural_model(surface)
-    form, snow = calculix.run(model)
+    form, snow = results_of(model)
     compared = structure.compared(model, form, snow)
     assert compared["displacement"] < 1e-5
     assert compared["stress_rms"] < 0.015
@@ -128,7 +128,7 @@ def test_a_turned_surface_has_turned_results():
         fixed=given.fixed, on_plane=given.on_plane, plane=pcmc.Plane(normal=turn[:, 2]),
     )  # fmt: skip
     loads = [(Snow(0.2), Wind({"left": 0.1}))]
-    one, other = (calculix.run(model_of(s, loads=loads, thickness=0.01)) for s in (given, turned))
+    one, other = (results_of(model_of(s, loads=loads, thickness=0.01)) for s in (given, turned))
     for here, there in zip(one, other, strict=True):
         scale = np.nanmax(np.abs(one[1].displacements))
         np.testing.assert_allclose(here.displacements @ turn.T, there.displacements, atol=1e-4 * scale)
@@ -141,7 +141,7 @@ def test_thicker_patches_have_less_stress_and_the_same_forces():
     surface = stationary(partial(joined_caps, 1.0)).surface
     thickness = {"left": 1e-3, "right": 2e-3, "wall": 4e-3}
     model = StructuralModel(surface, Material(1e7), thickness)
-    (form,) = calculix.run(model)
+    (form,) = results_of(model)
     means = {row["patch"]: row["mean"] for row in structure.by_patch(model, form)}
     assert means == pytest.approx(dict.fromkeys(thickness, 1.0), abs=0.02)
     assert form.reactions.sum(axis=0)[2] == pytest.approx(-load(surface), rel=1e-2)
@@ -150,13 +150,15 @@ def test_thicker_patches_have_less_stress_and_the_same_forces():
 
 def test_self_weight_is_that_of_the_elements():
     surface = stationary(partial(spherical_cap, 0.3, alpha=0.6)).surface
-    form, weight = calculix.run(model_of(surface, loads=[SelfWeight(2.0)], material=FABRIC, thickness=0.01))
+    form, weight = results_of(model_of(surface, loads=[SelfWeight(2.0)], material=FABRIC, thickness=0.01))
     change = (weight.reactions - form.reactions).sum(axis=0)
     area = face_areas(surface.vertices[surface.faces]).sum()
     assert change == pytest.approx([0, 0, 0.1 * 0.01 * 2.0 * area], rel=0.02, abs=1e-6)
 
 
 def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch, tmp_path):
+    with pytest.raises(CalculixError, match="within"):
+        analyse(model_of(pyramid()), timeout=1e-4)
     path = tmp_path / "model.inp"
     pcmc.write_structure(path, model_of(pyramid()))
     path.write_text(path.read_text().replace("*STATIC", "*STATICALLY").replace("FIXED,1,3", "FIXED,one"))
@@ -166,12 +168,10 @@ def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch,
     monkeypatch.setattr(calculix, "text_of", lambda *_, **__: wrong)
     with pytest.raises(CalculixError, match="ERROR"):  # no load that is too much
         calculix.run_as_far(model_of(pyramid()), model_of(pyramid()).steps)
-    with pytest.raises(CalculixError, match="within"):
-        calculix.run(model_of(pyramid()), timeout=1e-4)
     monkeypatch.setattr(calculix, "PROGRAM", "no-such-program")
     assert not calculix.available()
     with pytest.raises(CalculixError, match="not installed"):
-        calculix.run(model_of(pyramid()))
+        analyse(model_of(pyramid()))
     with refused(CalculixError) as caught:
         structure.data(None, True)
     assert "\n" not in str(caught.value)
@@ -194,7 +194,7 @@ def test_shells_carry_the_same_load_and_bend_less():
     for n in (8, 16):
         given = {"loads": [Snow(1e-3, patches=["film"])], "anyway": True, "thickness": 1e-4}
         for elements in ("membrane", "shell"):
-            form, snow = calculix.run(model_of(square(n), elements=elements, **given))
+            form, snow = results_of(model_of(square(n), elements=elements, **given))
             np.testing.assert_allclose(form.principal_stresses, 2e4, rtol=1e-4)
             depths.append(-np.nanmin(snow.deflections))
     assert depths[1] < 0.9 * depths[0]
@@ -217,7 +217,7 @@ def test_a_sail_between_edge_cables_is_at_rest_there():
     off = []
     for n in (6, 12):
         model = model_of(pcmc.solve(sail(n)), loads=[Snow(0.05, patches=["film"])], cable_area=1e-3)
-        form, snow = calculix.run(model)
+        form, snow = results_of(model)
         compared = structure.compared(model, form, snow)
         assert compared["displacement"] < 3e-5
         tensions = np.concatenate(list(form.cable_tensions.values()))
@@ -243,7 +243,7 @@ def test_a_film_with_a_rope_across_follows_poisson():
     share = share * (1.0 - 1.0 / np.cosh(k / 2)) / (1.0 + tension * k / 4.0 * np.tanh(k / 2))
     rope = np.append(model.surface.cables[0].edges[:, 0], model.surface.cables[0].edges[-1, 1])
     expected = (share * np.sin(k * model.surface.vertices[rope, 0])).sum(axis=0)
-    found = -calculix.run(model)[1].deflections[rope]
+    found = -results_of(model)[1].deflections[rope]
     np.testing.assert_allclose(found, expected, atol=1e-3 * expected.max())
 
 
@@ -265,7 +265,7 @@ def test_a_sail_between_ropes_follows_poisson_with_strings():
     free = np.setdiff1d(np.arange(surface.n), np.flatnonzero(surface.fixed))
     expected = np.zeros(surface.n)
     expected[free] = np.linalg.solve(K[np.ix_(free, free)], load_at[free])
-    found = -calculix.run(model)[1].deflections
+    found = -results_of(model)[1].deflections
     assert np.ptp(X[:, 2]) < 1e-9
     np.testing.assert_allclose(found, expected, atol=1e-3 * expected.max())
     edge = surface.cables[0].edges[1:, 0]
@@ -276,7 +276,7 @@ def test_a_heavy_roof_is_at_rest_under_its_own_weight():
     """Weights per area belong to the form-finding load."""
     surface = pcmc.solve(spherical_cap(0.15, alpha=0.6).retensioned(weights={"cap": 0.2})).surface
     model = structure.structural_model(surface)
-    form, snow = calculix.run(model)
+    form, snow = results_of(model)
     compared = structure.compared(model, form, snow)
     assert compared["displacement"] < 2e-6
     assert compared["reaction_rms"] < 0.01

@@ -49,7 +49,7 @@ def sail_on(*members):
 def test_a_mast_with_two_stays_has_the_forces_of_the_closed_form():
     """Stays alike on both sides of the diagonal: T = H L over their reach in plan; the mast has the rest."""
     model = sail_on(column([0, 0], [0, 0], strength=2.35e5), stay([0, 0], [-3, -1]), stay([0, 0], [-1, -3]))
-    reaction = sail().certificate.reactions[model.bars[0].vertex]
+    reaction = sail().certificate.reactions[model.bars[0].vertices[0]]
     H, V = np.hypot(*reaction[:2]), reaction[2]
     table = columns_at_rest(model)
     length, reach = np.sqrt(26.0), 4.0 * np.sqrt(2.0)  # both stays together pull along the diagonal
@@ -75,7 +75,7 @@ def test_columns_in_the_direction_of_the_reactions_carry_all_loads():
     table = columns_at_rest(upright)
     answers = column_answers(upright, table, NONE)
     assert len(answers) == 2
-    R = [sail().certificate.reactions[bar.vertex] for bar in upright.bars]
+    R = [sail().certificate.reactions[bar.vertices[0]] for bar in upright.bars]
     for bar, force, answer in zip(upright.bars, R, answers, strict=True):
         foot = bar.points[0] - bar.points[0][2] / force[2] * force
         x, y = (float(f"{c:.3g}") for c in foot[:2])
@@ -107,7 +107,7 @@ def test_a_stay_that_would_be_pressed_is_left_out_and_the_others_solved_again():
     cases = []
     for name, y in (("calm", 0.5), ("gust", 3.0)):
         reactions = np.zeros((len(sail().surface.vertices), 3))
-        reactions[model.bars[0].vertex] = -1.0, y, 5.0
+        reactions[model.bars[0].vertices[0]] = -1.0, y, 5.0
         cases.append((name, reactions))
     table = column_table(model, cases)
     root = np.sqrt(3.0)

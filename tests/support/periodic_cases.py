@@ -1,6 +1,8 @@
-"""Periodic surfaces for tests: a tube, a bay of a vault, and a surface cut out of its cell otherwise."""
+"""Periodic surfaces for tests: a tube, a bay of a vault, films on four lines, a honeycomb; other images."""
 
 from __future__ import annotations
+
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -67,3 +69,77 @@ def scattered(surface: Surface, lattice, seed: int = 0) -> Surface:
     images = pcmc.images_in(X, lattice)
     parts = surface.patch_of_face, surface.patches
     return Surface(X, faces.reshape(-1, 3), *parts, rooms=surface.rooms, images=images)
+
+
+CORNERS = {"south-west": (-1, -1), "north-west": (-1, 1), "north-east": (1, 1), "south-east": (1, -1)}
+
+
+def steiner_films(width: float, depth: float) -> Surface:
+    """Films between two plates and four lines at the corners of a rectangle; the middle one is along x."""
+    lines = [0.5 * np.array([width, depth]) * place for place in CORNERS.values()]
+    places = [*lines, np.array([-0.2, 0.0]), np.array([0.2, 0.0])]
+    ways = [(0, 4), (1, 4), (2, 5), (3, 5), (4, 5)]
+    X, faces, patch = list[list[float]](), list[list[int]](), list[int]()
+    number = dict[tuple[float, ...], int]()
+
+    def column(point: np.ndarray) -> int:
+        key = tuple(point.round(9))
+        if key not in number:
+            number[key] = len(X)
+            X.extend([*point, height] for height in (0.0, 0.25, 0.5, 0.75, 1.0))
+        return number[key]
+
+    for label, (start, end) in enumerate(ways):
+        steps = 2 if label == 4 else 4
+        line = [places[start] + (places[end] - places[start]) * k / steps for k in range(steps + 1)]
+        for p, q in pairwise(line):
+            i, j = column(p), column(q)
+            for k in range(4):
+                faces += [[i + k, j + k, j + k + 1], [i + k, j + k + 1, i + k + 1]]
+                patch += [label, label]
+    Z = np.array(X)
+    fixed = np.isclose(np.abs(Z[:, 0]), width / 2) & np.isclose(np.abs(Z[:, 1]), depth / 2)
+    patches = [Patch(name, 1.0, 0.0) for name in [*CORNERS, "middle"]]
+    return Surface(Z, faces, patch, patches, fixed=fixed, images=pcmc.images_in(Z, [[0, 0, 1]]))
+
+
+def honeycomb(u, v, corner=None, side: int = 2) -> Surface:
+    """side² prismatic bubbles of height 1 at the points of a lattice u, v in the plane, periodic in all ways.
+
+    The films "a", "b" and "c" of each bubble lead from a corner P, by default in the middle of the bubbles at
+    0, u and v, to u + v - P, v - P and u - P. The volumes of all bubbles but the last are prescribed.
+    """
+    u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
+    P = (u + v) / 3.0 if corner is None else corner
+    kinds = {"a": (u + v - P, (0, 1), (1, 0)), "b": (v - P, (0, 0), (0, 1)), "c": (u - P, (1, 0), (0, 0))}
+    shares, heights = np.linspace(0.0, 1.0, 4), np.linspace(0.0, 1.0, 5)
+    corners, patch, names, signs = list[np.ndarray](), list[int](), list[str](), list[np.ndarray]()
+    for i, j in np.ndindex(side, side):
+        for kind, (end, left, right) in kinds.items():
+            way = P + shares[:, None] * (end - P) + i * u + j * v
+            for (p, q), (low, high) in product(pairwise(way), pairwise(heights)):
+                a, b, c, d = ([*p, low], [*q, low], [*q, high], [*p, high])
+                corners.append(np.array([[a, b, c], [a, c, d]]))
+                patch += [len(names)] * 2
+            sign = np.zeros((side, side), dtype=int)  # the normal leads to the right of the way
+            for step, (k, l) in ((1, left), (-1, right)):
+                sign[(i + k) % side, (j + l) % side] += step
+            names.append(f"{kind}{i}{j}")
+            signs.append(sign.ravel())
+    places = np.concatenate(corners).reshape(-1, 3)
+    _, first, faces = np.unique(np.round(places * 1e9), axis=0, return_index=True, return_inverse=True)
+    volume = float(abs(u[0] * v[1] - u[1] * v[0]))
+    rooms = [
+        Room(f"bubble {k + 1}", {name: int(s) for name, s in zip(names, row, strict=True) if s}, volume)
+        for k, row in enumerate(np.array(signs).T[:-1])
+    ]
+    images = pcmc.images_in(places[first], [[*(side * u), 0.0], [*(side * v), 0.0], [0.0, 0.0, 1.0]])
+    films = [Patch(name, 1.0, 0.0) for name in names]
+    return Surface(places[first], faces.reshape(-1, 3), patch, films, rooms=rooms, images=images)
+
+
+def honeycomb_energy(u, v) -> float:
+    """The area of the films of one bubble: of the shortest net that joins a triangle's corners 0, u, v."""
+    u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
+    area = 0.5 * abs(u[0] * v[1] - u[1] * v[0])
+    return float(np.sqrt(0.5 * (u @ u + v @ v + (u - v) @ (u - v)) + 2.0 * 3.0**0.5 * area))

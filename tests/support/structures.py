@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Cable, Material, Patch, SelfWeight, Snow, Surface, Wind
-from pcmc.structure import StructuralModel
+from pcmc.structure import StepResults, StructuralModel, analyse
 
 FABRIC = Material(young=1e6, poisson=0.3, density=0.1)
 LOADS = [SelfWeight(), Snow(0.5), (Snow(0.2), Wind({"roof": 0.3}))]
@@ -40,6 +40,13 @@ def pyramid() -> Surface:
 def model_of(surface: Surface, **more: object) -> StructuralModel:
     """The model of a surface in FABRIC, a thousandth thick."""
     return StructuralModel(surface, **{"material": FABRIC, "thickness": 1e-3, **more})
+
+
+def results_of(model: StructuralModel) -> list[StepResults]:
+    """The results of each step of a model that carries all of its loads, by CalculiX."""
+    analysis = analyse(model, remedy=False)
+    assert analysis.carried
+    return [case.results for case in analysis.cases]
 
 
 def dat_text(model: StructuralModel, seed: int = 0) -> tuple[str, list[dict[str, np.ndarray]]]:
