@@ -3,7 +3,6 @@
 The process that hands out the tests reads this file, too: fixtures import what takes long.
 """
 
-import gc
 import os
 import shutil
 import signal
@@ -41,11 +40,6 @@ def pytest_sessionstart():
             pytest.exit(text, returncode=1)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ["PCMC_CACHE"] = "off"  # no test takes a roof that another run has solved
-
-
-def pytest_collection_finish():
-    """Collections of garbage need not look at what has been imported, which stays."""
-    gc.freeze()
 
 
 @pytest.fixture(scope="session")
