@@ -131,37 +131,31 @@ class PanelNet:
 
     def text(self, units: Units = NO_UNITS) -> str:
         """Totals, with the units of the numbers if they are given."""
-        table, beams = self.panels, self.beams
+        table, beams, nodes = self.panels, self.beams, self.nodes
         kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
         worst, area = table.iloc[table["planarity"].argmax()], table["area"]
-        covered = f"{100.0 * self.covered:.2f} % of the roof's; panels {area.min():.3g} to {area.max():.3g}"
-        warp = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
-        away = f"nodes {self.nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
-        turns = [(beams[name].median(), beams[name].max()) for name in ("torsion", "torsion_normal")]
+        rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
+        rows |= {"units": units.sentence} if units else {}
+        rows["panels"] = f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"
+        rows["area"] = f"{area.sum():.6g}, {100.0 * self.covered:.2f} % of the roof's;"
+        rows["area"] += f" panels {area.min():.3g} to {area.max():.3g}"
+        rows["planarity"] = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
+        rows["planarity"] += f" (panel {worst['panel']}, {worst['kind']})"
+        away = f"nodes {nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
+        rows["distance"] = f"from the surface, {away}"
+        turns = [f(beams[name]) for name in ("torsion", "torsion_normal") for f in (np.median, np.max)]
         torsion = "of beams, median {:.2g}, largest {:.3g} degrees; along normals {:.2g} and {:.3g}"
-        rows = [
-            ("panels", f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"),
-            ("area", f"{area.sum():.6g}, {covered}"),
-            ("planarity", f"{warp} (panel {worst['panel']}, {worst['kind']})"),
-            ("distance", f"from the surface, {away}"),
-            ("torsion", torsion.format(*turns[0], *turns[1])),
-        ]
+        rows["torsion"] = torsion.format(*turns)
         if len(self.umbilics):
             places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])
-            rows.append(("umbilics", f"{len(self.umbilics)}: {places}"))
-        far = self.nodes["distance"].max() / self.size
-        if far > FAR:
+            rows["umbilics"] = f"{len(self.umbilics)}: {places}"
+        if (far := nodes["distance"].max() / self.size) > FAR:
             text = f"nodes are up to {100.0 * far:.0f} % of the size from the surface: choose a smaller size"
-            rows.append(("far off", f"{text}, or pattern 'quads'"))
-        flat = table["panel"][table["area"] < NO_AREA * self.size**2].tolist()
-        if flat:
+            rows["far off"] = f"{text}, or pattern 'quads'"
+        if flat := table["panel"][area < NO_AREA * self.size**2].tolist():
             text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
-            rows.append(("slivers", text))
-        if units:
-            rows.insert(0, ("units", units.sentence))
-        if not self.certificate.certified:
-            rows.insert(0, ("not certified", self.certificate.verdict.value))
-        return "\n".join(f"{name:>14}  {text}" for name, text in rows)
+            rows["slivers"] = text
+        return "\n".join(f"{name:>14}  {text}" for name, text in rows.items())
 
 
 def panel_net(
