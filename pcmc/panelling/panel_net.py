@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 
@@ -18,17 +19,18 @@ from ..certificate.certificate import certified
 from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
-from ..surface.geometry import cross_2d, face_areas
+from ..surface.geometry import cross_2d, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
+from .distance import distances
 from .isothermic import curvature_coordinates
-from .net import INSIDE, SheetNet, net, nudged
-from .net_tables import net_tables, tidied, without_flat
-from .planar import before, planarised, torsion_free_axes
+from .net import INSIDE, Net, SheetNet, net, nudged, tidied, without_flat
+from .planar import before, convex, planarised, planarity, polygon_areas, torsion, torsion_free_axes
 from .sheet import SheetMesh, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
+KINDS = np.array(["inside", "edge", "corner"])  # of nodes
 FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
 NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
 
@@ -236,3 +238,57 @@ def _sheet_net(
         raise OptionError(f"{text}; choose 'planar-quads'", what="pattern", found=pattern)
     none = np.zeros(len(sheet.X), dtype=bool)
     return SheetNet(name, faces, sheet, at, np.flatnonzero(none), none, np.full(len(faces), np.nan))
+
+
+def net_tables(
+    surface: Surface, parts: Sequence[SheetNet], net: Net, axes: Floats
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Nodes, panels and beams of a net; see ``PanelNet``."""
+    P, N, start, corner = net.points, net.normals, net.start, net.corner
+    middle = np.add.reduceat(P[corner], start[:-1]) / np.diff(start)[:, None]
+    roof = surface.faces[surface.roof[surface.patch_of_face]]
+    away = distances(np.concatenate([P, middle]), surface.vertices, roof)
+    cosine = np.einsum("ni,ni->n", axes, N) / np.linalg.norm(axes, axis=1)
+    nodes = pd.DataFrame(
+        {
+            "node": np.arange(len(P)) + 1,
+            **dict(zip("xyz", P.T, strict=True)),
+            "kind": KINDS[net.kind],
+            "distance": away[: len(P)],
+            "lean": np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))),
+        }
+    )
+    inside = np.add.reduceat(net.kind[corner] != INSIDE, start[:-1]) == 0
+    umbilic = inside & (np.diff(start) != 4) & any(len(part.umbilics) for part in parts)
+    panels = pd.DataFrame(
+        {
+            "panel": np.arange(len(middle)) + 1,
+            "patch": [parts[k].name for k in net.sheet],
+            "kind": np.select([net.cut, umbilic], ["cut", "umbilic"], "whole"),
+            "corners": np.diff(start),
+            "area": polygon_areas(P, start, corner),
+            "planarity": planarity(P, start, corner),
+            "convex": convex(P, start, corner),
+            "distance": np.maximum(np.maximum.reduceat(away[corner], start[:-1]), away[len(P) :]),
+            "turned": net.turned,
+        }
+    )
+    panel = np.repeat(panels["panel"].to_numpy(), panels["corners"])
+    ends, first, row = np.unique(net.sides, axis=0, return_index=True, return_inverse=True)
+    neighbour = np.zeros(len(ends), dtype=np.int64)
+    other = np.ones(len(panel), dtype=bool)
+    other[first] = False
+    neighbour[row.ravel()[other]] = panel[other]
+    beams = pd.DataFrame(
+        {
+            "beam": np.arange(len(ends)) + 1,
+            "node": ends[:, 0] + 1,
+            "other": ends[:, 1] + 1,
+            "length": segment_lengths(P, ends),
+            "panel": panel[first],
+            "neighbour": neighbour,
+            "torsion": torsion(P, ends, axes),
+            "torsion_normal": torsion(P, ends, N),
+        }
+    )
+    return nodes, panels, beams
