@@ -11,7 +11,7 @@ io plan                    surfaces from and to files; surfaces from the lines o
 stability certificate      lowest modes, Morse index; the verdict on a finished surface, a proof, its figures
 solvers                    the paper's flow, L-BFGS, the geometric Newton solver; branches; further starts
 accuracy                   error bars from finer meshes, meshes for an accuracy, margins to the edge
-equilibria                 the other equilibria of a roof, and the barriers to them
+equilibria                 the other equilibria of a roof, and the barriers to them; cells of free size
 design                     tensions that meet targets
 compas                     meshes of COMPAS, and a server for them
 panelling structure        families of panels; structural models
@@ -36,7 +36,14 @@ if TYPE_CHECKING:
     from .certificate.theorem import Theorem, verify
     from .cloth import CuttingPattern, cutting_pattern
     from .design import Design, Parameter, Target, meet, sensitivities
-    from .equilibria import Equilibria, find_equilibria
+    from .equilibria import (
+        Equilibria,
+        NeighbourSwap,
+        cell_stress,
+        find_equilibria,
+        free_cell,
+        swap_neighbours,
+    )
     from .forces.curvature import curvature_error, mean_curvature, target_curvature
     from .forces.functional import energy, gradient
     from .forces.rooms import room_volume_gradients, room_volumes
@@ -78,6 +85,7 @@ __all__ = [
     "Member",
     "MeshCheck",
     "MeshVerdict",
+    "NeighbourSwap",
     "PanelNet",
     "Panels",
     "Parameter",
@@ -95,6 +103,7 @@ __all__ = [
     "Verdict",
     "Wind",
     "analyse",
+    "cell_stress",
     "certify",
     "check_mesh",
     "curvature_error",
@@ -106,6 +115,7 @@ __all__ = [
     "fewer_families",
     "find_equilibria",
     "follow",
+    "free_cell",
     "gradient",
     "hessian",
     "images_in",
@@ -123,6 +133,7 @@ __all__ = [
     "sensitivities",
     "solve",
     "solve_to_accuracy",
+    "swap_neighbours",
     "target_curvature",
     "verify",
     "write",
@@ -140,7 +151,14 @@ _NAMES = {
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
     "forces.rooms": ("room_volume_gradients", "room_volumes"),
-    "equilibria": ("Equilibria", "find_equilibria"),
+    "equilibria": (
+        "Equilibria",
+        "NeighbourSwap",
+        "cell_stress",
+        "find_equilibria",
+        "free_cell",
+        "swap_neighbours",
+    ),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (

@@ -8,6 +8,10 @@
 
 ``from_program`` is how far the area of the second mesh is from Surface Evolver's, in the torus of the cell,
 after it took a Newton step of its own: relative to the area.
+
+``free`` has cells whose size is free: that of Schwarz P under a suction of 1, where its energy c s² and
+-s³ have a maximum together at s = 2c/3, and Kelvin's foam, whose box begins with sides of 1.1, 1 and 1/1.1
+and keeps its volume: ``away`` is how far it ends from a cube.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ import numpy as np
 import pandas as pd
 
 from generators import kelvin_foam, minimal_cell, minimal_cell_area, weaire_phelan_foam
-from pcmc import Patch, Room, Surface, certify, solve
+from pcmc import Patch, Room, Surface, certify, free_cell, solve
 from pcmc.forces.functional import patch_areas
 from pcmc.surface.images import lattice_of
 
@@ -29,6 +33,8 @@ from ..orders import limit_order, richardson, slope
 from ..reference import evolver
 from ..study import Study
 
+BOX = np.diag([1.1, 1.0, 1.0 / 1.1])
+SIDE = 2.0 / 3.0 * minimal_cell_area("P")
 DRAWN = 1  # number of the mesh that is drawn and that Surface Evolver has, from the coarsest
 PROGRAM = 'm 0\ng\nhessian_normal\nhessian\nprintf "A %.17g\\n", total_area'
 
@@ -110,6 +116,25 @@ def data(folder: Folder, short: bool) -> None:
                     row["from_program"] = abs(float(patch_areas(surface).sum()) / area - 1.0)
             records.append(row)
     folder.write_table("records", pd.DataFrame(records))
+    folder.write_table("free", pd.DataFrame([_free(*which) for which in _free_cells(short)]))
+
+
+def _free_cells(short: bool) -> list[tuple[Cell, int]]:
+    cells = [cell for cell in CELLS if cell.name in ("schwarz_p", "kelvin")]
+    return [(cell, level) for cell in cells for level in cell.levels[: 3 if short else None]]
+
+
+def _free(cell: Cell, level: int) -> dict[str, Any]:
+    """A row of ``free``."""
+    start = cell.build(level)
+    if cell.bubbles:
+        found = free_cell(start.rebuilt(vertices=start.vertices @ BOX))
+        away = float(np.abs(BOX @ found.stretch - np.eye(3)).max())
+    else:
+        found = free_cell(start, -1.0, free="size")
+        away = abs(float(found.stretch[0, 0]) / SIDE - 1.0)
+    row = {"cell": cell.name, "level": level, "triangles": start.m, "area": cell.normalised(found.surface)}
+    return row | {"away": away, "ways_down": found.ways_down, "solves": found.solves}
 
 
 def _index_at_volumes(surface: Surface) -> int:
@@ -147,6 +172,8 @@ def table(folder: Folder) -> dict[str, float]:
         )
     frame = pd.DataFrame(rows)
     folder.write_table("areas", frame)
+    free = folder.read_table("free")
+    side, box = (free[free.cell == name] for name in ("schwarz_p", "kelvin"))
     foam = frame[frame.cell.isin([cell.name for cell in CELLS if cell.bubbles])]
     minimal = frame.drop(foam.index)
     return {
@@ -156,6 +183,11 @@ def table(folder: Folder) -> dict[str, float]:
         "largest_difference_foams": float(foam.difference.abs().max()),
         "largest_difference_program": float(frame.from_program.max()),
         "pressure_weaire_phelan": float(foam.pressure_range.max()),
+        "order_side": slope(0.5 ** side.level.to_numpy(float), side.away.to_numpy()).order,
+        "side": float(side.away.iloc[-1]),
+        "limit_free_kelvin": richardson(box.area.to_numpy()[-3:], (2, 4)),
+        "away_from_cube": float(box.away.iloc[-1]),
+        "ways_down_kelvin": float(box.ways_down.max()),
         "not_converged": float((records.status != "converged").sum()),
     }
 
@@ -201,6 +233,6 @@ STUDY = Study(
     table,
     figure,
     parameters={cell.name: {"levels": list(cell.levels)} for cell in CELLS},
-    seconds=15,
+    seconds=40,
     paper=False,
 )
