@@ -302,7 +302,8 @@ class Surface(supports.Supported, Imaged):
         ``cable_weights`` give tensions and weights per length by the name of the cable, ``volumes`` volumes
         by the name of the room. The pressure of a wall changes with the difference of its two rooms'
         pressures, and its snow with that of the snow over them, unless the wall itself is named. Of the
-        two sheets of a cushion, ``roof`` and ``roof below``, one that is not named gets the other's pressure.
+        two sheets of a cushion, ``roof`` and ``roof below``, one that is not named gets the other's pressure,
+        and a tension of the upper one changes that of the lower one in proportion, unless it is named, too.
 
         Raises
         ------

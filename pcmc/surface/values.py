@@ -2,7 +2,8 @@
 and which patches are walls.
 
 Those of a wall follow from its neighbours': its pressure is the difference of its two rooms', its snow that
-of the snow over them, and its tension must balance theirs. The two sheets of a cushion have one pressure.
+of the snow over them, and its tension must balance theirs. The two sheets of a cushion have one pressure,
+and the tension of the lower one is that of the upper one times a factor.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,6 +82,7 @@ def with_values(
     of_patches = changes["patches"]
     of_patches["wall"] = dict.fromkeys(walls, True)
     of_patches["pressure"] = of_both_sheets(surface, of_patches.get("pressure", {}))
+    of_patches["tension"] = with_sheets_below(surface, of_patches.get("tension", {}))
     changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
     following: dict[str, dict[str, Any]] = {}
     for field in ("pressure", "snow"):
@@ -107,7 +110,8 @@ def _replaced(
 
 def rates_of(surface: Any, kind: str, by_name: Mapping[str, float]) -> Floats:
     """The rates of change of the values of one kind, given by name; what is not named follows."""
-    by_name = of_both_sheets(surface, by_name) if kind == "pressures" else by_name
+    following = {"pressures": of_both_sheets, "tensions": with_sheets_below}
+    by_name = following[kind](surface, by_name) if kind in following else by_name
     named = {part_index(surface, kind, name): rate for name, rate in by_name.items()}
     rates = np.zeros(len(getattr(surface, KINDS[kind][0])))
     rates[list(named)] = list(named.values())
@@ -122,6 +126,18 @@ def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, fl
         other = name.removesuffix(BELOW) if name.endswith(BELOW) else f"{name}{BELOW}"
         if name in present and present.get(other) == present[name]:
             both.setdefault(other, value)
+    return both
+
+
+def with_sheets_below(surface: Any, tensions: Mapping[str, float]) -> dict[str, float]:
+    """Tensions, or their rates, by patch: a cushion's lower sheet that is not named keeps its factor."""
+    patches = {patch.name: patch for patch in surface.patches}
+    both = dict(tensions)
+    for name, value in tensions.items():
+        above, below = patches.get(name), patches.get(f"{name}{BELOW}")
+        one = above and below and above.pressure == below.pressure != 0.0 < above.tension
+        if one and isinstance(value, Real):
+            both.setdefault(below.name, value * below.tension / above.tension)
     return both
 
 
