@@ -143,28 +143,27 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
 
 def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
     """The beams of a model as a frame at X (n,3), and the vertices (k,) that its points are."""
-    pairs, vertices = np.concatenate([line.pairs for line in model.beams]), model.beam_vertices
+    pairs, vertices = [line.pairs for line in model.beams], model.beam_vertices
     place = np.full(len(X), -1)
     place[vertices] = np.arange(len(vertices))
-    stiffness = list[Floats]()
+    stiffness = list[list[float]]()
     for line in model.beams:
         material, profile = line.member.material, line.member.profile
-        up, across = profile.moments
-        E, G = material.young, material.young / (2.0 + 2.0 * material.poisson)
-        one = np.array([E * profile.area, E * up, E * across, G * profile.torsion])
-        stiffness.append(np.tile(one, (len(line.pairs), 1)))
+        E, (up, across) = material.young, profile.moments
+        G = E / (2.0 + 2.0 * material.poisson)
+        stiffness.append([E * profile.area, E * up, E * across, G * profile.torsion])
+    of_bars = np.repeat(np.array(stiffness), list(map(len, pairs)), axis=0)
     rows, turns = list[Floats](), held_turns(model, X)
     for v in vertices[model.held[vertices]].tolist():
-        freedom, axes = int(model.freedom[v]), model.axes[v]
-        stops = (axes, axes[1:], axes[:1])[freedom]
-        for shift, stopped in ((0, stops), (3, turns.get(v, ()))):
+        axes = model.axes[v]
+        for kind, stopped in enumerate(((axes, axes[1:], axes[:1])[model.freedom[v]], turns.get(v, ()))):
             for direction in stopped:
-                row = np.zeros(6 * len(vertices))
-                row[6 * place[v] + shift : 6 * place[v] + shift + 3] = direction
-                rows.append(row)
+                row = np.zeros((len(vertices), 2, 3))  # the displacement and the turn of each
+                row[place[v], kind] = direction
+                rows.append(row.ravel())
     holds = np.array(rows).reshape(-1, 6 * len(vertices))
     normal = np.array(model.surface.plane.normal)
-    return BarFrame(X[vertices], place[pairs], np.vstack(stiffness), holds, normal), vertices
+    return BarFrame(X[vertices], place[np.concatenate(pairs)], of_bars, holds, normal), vertices
 
 
 def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
