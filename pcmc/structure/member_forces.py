@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.distance import pdist
 
 from ..base.arrays import Floats, Ints, cached_array, kept_with_owner
 from ..base.units import Units
@@ -48,10 +49,7 @@ class MemberForces:
     @property
     def span(self) -> float:
         """The distance of its ends, or of the two points farthest apart if it is closed."""
-        P = self.points
-        if not self.line.closed:
-            return float(np.linalg.norm(P[-1] - P[0]))
-        return float(max(np.linalg.norm(P - one, axis=1).max() for one in P))
+        return float(pdist(self.points if self.line.closed else self.points[[0, -1]]).max())
 
     @property
     def deflection(self) -> float:
