@@ -272,7 +272,7 @@ def figure(folder: Folder) -> None:
     cases = [name for name, case in CASES.items() if case.exists]
     canvas = new(1200, 640)
     for k, case in enumerate(cases, 1):
-        axes = style(canvas.add_subplot(2, (len(cases) + 1) // 2, k))
+        axes = style(canvas.add_subplot(len(cases) // 4, 4, k))
         for number, program in enumerate(PROGRAMS):
             mine = runs[(runs.case == case) & (runs.program == program) & runs.seconds.notna()]
             if mine.empty:
@@ -293,7 +293,8 @@ def figure(folder: Folder) -> None:
                 )
         axes.set(xscale="log", yscale="log")
         axes.set_xlabel("triangles", fontsize=SMALL)
-        axes.set_ylabel("seconds", fontsize=SMALL)
+        if k % 4 == 1:
+            axes.set_ylabel("seconds", fontsize=SMALL)
         axes.set_title(case, fontsize=SMALL)
     canvas.axes[0].plot(
         [], [], "o", markersize=5, color="black", markerfacecolor="white", label="not at rest"
