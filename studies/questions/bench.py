@@ -30,6 +30,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,6 +49,7 @@ from pcmc.solvers.result import Progress
 from pcmc.stability.equilibrium import Equilibrium
 from pcmc.surface.supports import apply_supports
 
+from ..benchmarks.run import machine
 from ..folder import Folder
 from ..reference import evolver, kratos
 from ..study import Study
@@ -246,8 +248,24 @@ def data(folder: Folder, short: bool) -> None:
                 rows.append([name, start.m, program, end.seconds, left, value, error, end.said[:160]])
                 if not (left <= NEAR and end.seconds <= LIMIT):
                     asked.remove(program)
+    programs = pd.DataFrame(versions().items(), columns=["program", "version"])
+    folder.write_table("programs_times", programs)
     columns = ["case", "triangles", "program", "seconds", "residual", "energy", "error", "said"]
     folder.write_table("runs_times", pd.DataFrame(rows, columns=columns))
+
+
+def versions() -> dict[str, str]:
+    """What ran, and on which machine."""
+    apart = {"jax_fdm": (FDM_PYTHON, "jax_fdm"), "Kratos": (kratos.PYTHON, "KratosMultiphysics")}
+    found = {"machine": machine(), "Surface Evolver": evolver.version()}
+    for name, library in (("NLopt L-BFGS", "nlopt"), ("scipy L-BFGS", "scipy")):
+        found[name] = f"{library} {metadata.version(library)}"
+    for name, (variable, library) in apart.items():
+        ask = f"from importlib.metadata import version; print(version({library!r}))"
+        command = [os.environ.get(variable, sys.executable), "-c", ask]
+        done = subprocess.run(command, capture_output=True, text=True)
+        found[name] = f"{library} {done.stdout.strip()}" if done.returncode == 0 else "not installed"
+    return found
 
 
 def held_energy(surface: Surface) -> float:
