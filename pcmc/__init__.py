@@ -36,7 +36,14 @@ if TYPE_CHECKING:
     from .certificate.theorem import Theorem, verify
     from .cloth import CuttingPattern, cutting_pattern
     from .design import Design, Parameter, Target, meet, sensitivities
-    from .equilibria import Equilibria, cell_stress, find_equilibria, free_cell
+    from .equilibria import (
+        Equilibria,
+        NeighbourSwap,
+        cell_stress,
+        find_equilibria,
+        free_cell,
+        swap_neighbours,
+    )
     from .forces.curvature import curvature_error, mean_curvature, target_curvature
     from .forces.functional import energy, gradient
     from .forces.rooms import room_volume_gradients, room_volumes
@@ -78,6 +85,7 @@ __all__ = [
     "Member",
     "MeshCheck",
     "MeshVerdict",
+    "NeighbourSwap",
     "PanelNet",
     "Panels",
     "Parameter",
@@ -125,6 +133,7 @@ __all__ = [
     "sensitivities",
     "solve",
     "solve_to_accuracy",
+    "swap_neighbours",
     "target_curvature",
     "verify",
     "write",
@@ -142,7 +151,14 @@ _NAMES = {
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
     "forces.rooms": ("room_volume_gradients", "room_volumes"),
-    "equilibria": ("Equilibria", "cell_stress", "find_equilibria", "free_cell"),
+    "equilibria": (
+        "Equilibria",
+        "NeighbourSwap",
+        "cell_stress",
+        "find_equilibria",
+        "free_cell",
+        "swap_neighbours",
+    ),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (

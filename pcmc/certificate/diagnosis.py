@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
 from ..meshing.quality import edge_lengths, triangle_quality
+from ..meshing.strips import strip_of
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
 from ..surface.pieces import point_text
@@ -158,8 +159,11 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
         f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
         f" {point_text(place, surface.size)}, quality {quality:.1e}"
     )
-    if change := _exchange(surface, int(surface.patch_of_face[face])):
-        worst += f"; {change}"
+    if films := vanished_films(surface):
+        strip = strip_of(surface, surface.patch_index(films[0]))
+        others = f" and {len(films) - 1} more" if len(films) > 1 else ""
+        meeting = strip.meeting(surface, "then") if strip else ""
+        return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; try pcmc.swap_neighbours(surface)"
     if held_wall_down(surface, pinchable):
         return worst + (
             "; the junction there comes down on the held bottom of its wall, so the wall has no height"
@@ -174,30 +178,17 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     return worst
 
 
-def _exchange(surface: Surface, patch: int) -> str:
-    """Names the patches that meet once a film between two junctions has vanished; empty if it does not.
-
-    Of the two patches beside each junction, those on the same side of the film meet, as in a T1 of a foam.
-    """
-    X, F, topo = surface.vertices, surface.faces, surface.topology
-    curves = [curve for curve in topo.junctions if patch in curve.sheets]
-    beside = [[k for k in curve.sheets if k != patch] for curve in curves]
-    around = [k for pair in beside for k in pair]
-    if [len(pair) for pair in beside] != [2, 2] or len(set(around)) < 4:
-        return ""
-    area = np.bincount(surface.patch_of_face, face_areas(X[F]), len(surface.patches))
-    if area[patch] > NARROW * area[around].min():
-        return ""
-    apart = []  # across the film at each junction, from the one patch beside it to the other
-    for curve, pair in zip(curves, beside, strict=True):
-        f, k = np.nonzero(np.isin(topo.edge_of_face, topo.edge_numbers(curve.pairs)))
-        inwards = X[F[f, k]] - 0.5 * (X[F[f, k - 1]] + X[F[f, k - 2]])
-        one, other = (inwards[surface.patch_of_face[f] == own].sum(axis=0) for own in pair)
-        apart.append(other - one)
-    (a, b), (c, d) = beside[0], beside[1][:: 1 if apart[0] @ apart[1] > 0.0 else -1]
-    name = [repr(p.name) for p in surface.patches]
-    meet = f"{name[a]} and {name[c]} then meet, and {name[b]} and {name[d]}"
-    return f"patch {name[patch]} may vanish: {meet}; start from a mesh where they do"
+def vanished_films(surface: Surface) -> list[str]:
+    """The films between two junctions that have vanished, by name: narrow, and small beside the others."""
+    area = np.bincount(
+        surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
+    )
+    names = []
+    for patch in np.flatnonzero(area < NARROW * area.max()):
+        strip = strip_of(surface, int(patch))
+        if strip and area[patch] < NARROW * area[list(strip.sheets)].min() and strip.width < strip.height:
+            names.append(surface.patches[patch].name)
+    return names
 
 
 def held_wall_down(surface: Surface, pinchable: Bools) -> bool:

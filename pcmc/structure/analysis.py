@@ -16,6 +16,7 @@ from ..base.arrays import Floats
 from ..base.units import Units
 from ..certificate.supports import FORCE
 from ..surface.geometry import face_areas
+from ..surface.pieces import point_text
 from .calculix import CalculixError, expect_program, run_as_far
 from .columns import column_table, column_text
 from .gas import balanced_pressure
@@ -33,7 +34,7 @@ from .model import StructuralModel, expect_model
 from .results import StepResults
 
 THROUGH = 1e-3  # of the size: a roof that has sunk farther below Π hangs through
-NOWHERE = 1e-9  # of the size: a smaller coordinate is 0
+STILL = 1e-9  # of the largest displacement: a smaller deflection is rounding
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
@@ -119,8 +120,8 @@ class Analysis:
             far, slack = int(np.nanargmax(size)), areas[found.slack].sum()
             place = surface.vertices[surface.faces[self.slackest(case)]].mean(axis=0)
             row = {"case": case.name, "share": case.share, "taut": case.taut}
-            row["down"] = max(0.0, -np.nanmin(found.deflections))
-            row["up"] = max(0.0, np.nanmax(found.deflections))
+            row["down"], row["up"] = -np.nanmin(found.deflections), np.nanmax(found.deflections)
+            row |= {way: row[way] if row[way] > STILL * size[far] else 0.0 for way in ("down", "up")}
             row |= {"moved": size[far]} | dict(zip("xyz", surface.vertices[far], strict=True))
             row |= {"least_force": np.nanmin(forces), "largest_force": np.nanmax(forces)}
             row |= {f"least_{axis}": value for axis, value in zip("xyz", place, strict=True)}
@@ -204,12 +205,12 @@ class Analysis:
         """A sentence for each case that is not carried, or has slack parts, and what helps."""
         units, lines, surface = units or self.model.units, [], self.model.surface
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
-            at = [row[f"least_{c}"] * (abs(row[f"least_{c}"]) > NOWHERE * surface.size) + 0.0 for c in "xyz"]
+            at = np.array([row[f"least_{c}"] for c in "xyz"])
             patch = surface.patches[surface.patch_of_face[self.slackest(case)]].name
             state = f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}"
             state = f"{state}{units.behind('area')}" if row["slack_area"] > 0.0 else "nothing is slack yet"
             state += f", the least force {row['least_force']:.3g}{units.behind('tension')}"
-            state += f" around ({', '.join(f'{value:.3g}' for value in at)}) of {patch!r}"
+            state += f" around {point_text(at, surface.size)} of {patch!r}"
             if not case.carried:
                 share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
                 lines.append(f"{case.name}: {share} carried, then it gives way; {state}")

@@ -13,6 +13,7 @@ from under_load import ALPHA, THICK, cap, parts, stiffness, strip
 
 import pcmc
 from pcmc import Material, SelfWeight, Snow, Wind
+from pcmc.plan import Plan
 from pcmc.structure import analyse, analysis, calculix
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
@@ -36,6 +37,18 @@ def test_a_flat_membrane_sinks_as_a_paraboloid():
         off.append(np.sqrt(np.mean((found / (1e-3 / 8.0) - (1.0 - x**2 - y**2)) ** 2)))
     assert np.polyfit(np.log([0.2, 0.1, 0.05]), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.25)
     assert off[-1] < 2e-3
+
+
+@needs_ccx
+def test_an_upward_deflection_of_rounding_is_none():
+    masts = [[0, 0, 4], [10, 0, 0], [10, 10, 3], [0, 10, 0]]
+    outline = [mast[:2] for mast in masts]
+    cables = {"edge": "cable", "cable": 9.0, "supports": masts, "tension": 1.0, "pressure": 0.0}
+    sail = pcmc.solve(Plan(outline, edge_length=1.5, weight=0.01, **cables).surface()).surface
+    model = pcmc.StructuralModel(sail, Material(5e5), thickness=1e-3, cable_area=1e-4, loads=[Snow(0.05)])
+    snow = analyse(model).table.set_index("case").loc["snow"]
+    assert snow["down"] > 0.01
+    assert snow["up"] == 0.0
 
 
 @needs_ccx

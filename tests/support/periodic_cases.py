@@ -1,4 +1,4 @@
-"""Periodic surfaces for tests: a tube, a bay of a vault, a honeycomb; a surface with other images."""
+"""Periodic surfaces for tests: a tube, a bay of a vault, films on four lines, a honeycomb; other images."""
 
 from __future__ import annotations
 
@@ -69,6 +69,38 @@ def scattered(surface: Surface, lattice, seed: int = 0) -> Surface:
     images = pcmc.images_in(X, lattice)
     parts = surface.patch_of_face, surface.patches
     return Surface(X, faces.reshape(-1, 3), *parts, rooms=surface.rooms, images=images)
+
+
+CORNERS = {"south-west": (-1, -1), "north-west": (-1, 1), "north-east": (1, 1), "south-east": (1, -1)}
+
+
+def steiner_films(width: float, depth: float) -> Surface:
+    """Films between two plates and four lines at the corners of a rectangle; the middle one is along x."""
+    lines = [0.5 * np.array([width, depth]) * place for place in CORNERS.values()]
+    places = [*lines, np.array([-0.2, 0.0]), np.array([0.2, 0.0])]
+    ways = [(0, 4), (1, 4), (2, 5), (3, 5), (4, 5)]
+    X, faces, patch = list[list[float]](), list[list[int]](), list[int]()
+    number = dict[tuple[float, ...], int]()
+
+    def column(point: np.ndarray) -> int:
+        key = tuple(point.round(9))
+        if key not in number:
+            number[key] = len(X)
+            X.extend([*point, height] for height in (0.0, 0.25, 0.5, 0.75, 1.0))
+        return number[key]
+
+    for label, (start, end) in enumerate(ways):
+        steps = 2 if label == 4 else 4
+        line = [places[start] + (places[end] - places[start]) * k / steps for k in range(steps + 1)]
+        for p, q in pairwise(line):
+            i, j = column(p), column(q)
+            for k in range(4):
+                faces += [[i + k, j + k, j + k + 1], [i + k, j + k + 1, i + k + 1]]
+                patch += [label, label]
+    Z = np.array(X)
+    fixed = np.isclose(np.abs(Z[:, 0]), width / 2) & np.isclose(np.abs(Z[:, 1]), depth / 2)
+    patches = [Patch(name, 1.0, 0.0) for name in [*CORNERS, "middle"]]
+    return Surface(Z, faces, patch, patches, fixed=fixed, images=pcmc.images_in(Z, [[0, 0, 1]]))
 
 
 def honeycomb(u, v, corner=None, side: int = 2) -> Surface:
