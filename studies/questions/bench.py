@@ -56,7 +56,7 @@ from ..study import Study
 from .bench_cases import CASES, Case
 
 LIMIT, LONGEST = 60.0, 100.0  # seconds: of a run, and of one that cannot be stopped at that
-FAR = 1e6  # beyond this a surface has run away
+FAR = 1e3  # beyond this a surface has run away
 REST, NEAR = 1e-6, 1e-4  # relative residual of a surface at rest, and near it; pcmc asks for 1e-8
 NEWTON = "hessian_normal on\n" + "hessian_seek\n" * 10 + "hessian\n" * 4
 SCRIPTS = f"U\ng 200\nU\n{NEWTON}", f"g 20\n{NEWTON}"
