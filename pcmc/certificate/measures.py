@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import OptionError
+from ..base.errors import OptionError, SurfaceError
 from ..forces.functional import gradient_by, weighted
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
@@ -209,12 +209,16 @@ def _lean(surface: Surface, of: str | None) -> Measurement:
     sines = np.where(np.isin(surface.patch_of_face, walls), lean_sines(surface), 0.0)
     signs = np.repeat([1.0, -1.0], surface.m)
     own = np.flatnonzero(np.tile(np.isin(surface.patch_of_face, walls), 2))
+    if not len(own):
+        name = "every wall" if of is None else f"{of}: the wall"
+        raise SurfaceError(f"lean of {name} rests on Π all along, so it does not lean", what="of", found=of)
 
     def branches(near: Ints) -> Branches:
         sign, face = signs[own[near]], own[near] % surface.m
         s, corners = sines[face][:, None], surface.vertices[surface.faces[face]]
         normal = 2.0 * area_vectors(corners)
         length = np.linalg.norm(normal, axis=1)[:, None]
+        length[length == 0.0] = np.inf  # a triangle without area has no slope
         across = (np.array(surface.plane.normal) - s * normal / length) / length
         rate = np.degrees(sign[:, None] / np.sqrt(np.maximum(1.0 - s * s, 1e-12)))
         sides = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)

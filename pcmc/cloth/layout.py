@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.guides import Plane
@@ -24,8 +24,8 @@ NARROWER = 0.98  # of the width square to x or y: another direction must do bett
 class ClothSheet:
     """A sheet between curves and cables, cut into strips at equal steps of their width."""
 
-    number: int
     patch: str
+    source: Bools  # (m,) its faces of the surface
     along: Floats  # (3,) unit vector of the warp
     across: Floats  # (3,) unit vector; the seams lie near to levels of x · across
     levels: Floats  # (k,) ascending, with both ends: k - 1 strips, seams between
@@ -82,31 +82,29 @@ def level_ends(mesh: CutMesh, faces: Bools, height: Floats, level: float) -> Ite
             yield ends[0], ends[1]
 
 
-def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet], sheet_of_source: Ints) -> CutMesh:
+def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
     """The mesh cut along geodesics between the ends of each sheet's levels; ends of several sheets meet."""
-    number = int(mesh.seam.max(initial=-1)) + 1
-    ends: list[tuple[int, int]] = []  # the sheet and the vertex of each
+    number, before = int(mesh.seam.max(initial=-1)) + 1, list[int]()  # the vertices at ends of other sheets
     for sheet in sheets:
-        meet, mine = MEET * float(np.diff(sheet.levels).min()), sheet_of_source[mesh.source] == sheet.number
-        height = mesh.X @ sheet.across  # a geodesic may cross the next level, so all ends come first
-        lines = [
-            line for level in sheet.levels[1:-1].tolist() for line in level_ends(mesh, mine, height, level)
-        ]
-        for line in lines:
+        meet, height = MEET * float(np.diff(sheet.levels).min()), mesh.X @ sheet.across
+        own = [level_ends(mesh, sheet.source[mesh.source], height, level) for level in sheet.levels[1:-1]]
+        met = list[int]()
+        for line in [line for lines in own for line in lines]:  # a geodesic may cross the next level
             vertices = []
             for point in line:
-                mine = sheet_of_source[mesh.source] == sheet.number
-                others = [v for owner, v in ends if owner != sheet.number and (mesh.F[mine] == v).any()]
+                mine = sheet.source[mesh.source]
+                others = [vertex for vertex in before if (mesh.F[mine] == vertex).any()]
                 away = np.linalg.norm(mesh.X[others] - point, axis=1) if others else np.array([np.inf])
                 if away.min() <= meet:
                     vertices.append(others[int(away.argmin())])
                 else:
                     mesh, vertex = mesh.with_vertex(point, mine)
                     vertices.append(vertex)
-            mine = sheet_of_source[mesh.source] == sheet.number
+            mine = sheet.source[mesh.source]
             mesh = mesh.with_seam(vertices[0], vertices[1], number, f"a seam of {sheet.patch!r}", mine)
-            ends += [(sheet.number, vertex) for vertex in vertices]
+            met += vertices
             number += 1
+        before += met
     return mesh
 
 

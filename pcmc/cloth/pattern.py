@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..base.errors import OptionError, SurfaceError
 from ..base.libraries import load_library
 from ..certificate import Certificate
@@ -86,17 +86,17 @@ def cutting_pattern_of(
     if not len(base.F):
         text = "surface: it has no roof to be cut: every patch is a wall"
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
-    sheets, sheet_of_source = _sheets(surface, base, options)
+    sheets = _sheets(surface, base, options)
     widest: list[float] = []
     for _ in range(ROUNDS):
-        mesh = with_levels(base, sheets, sheet_of_source)
+        mesh = with_levels(base, sheets)
         piece = mesh.pieces.piece
         opened = np.unique(piece[mesh.cut_edge[mesh.topology.edge_of_face].any(axis=1)])
         for closed in np.setdiff1d(piece, opened).tolist():
             name = surface.patches[surface.patch_of_face[mesh.source[piece == closed][0]]].name
             text = f"patch {name!r} is closed, without a rim: no seam starts anywhere;"
             raise SurfaceError(f"{text} draw seams that open it", what="surface", where=name)
-        cloth = Cloth.of(surface, mesh, sheets, sheet_of_source, options)
+        cloth = Cloth.of(surface, mesh, sheets, options)
         points = cloth.laid_flat()
         moved = _moved_levels(cloth, points, sheets, options, widest)
         if moved is None:
@@ -118,29 +118,24 @@ def _narrowest(surface: Surface, options: CuttingOptions) -> float:
     return min(widths, default=np.inf)
 
 
-def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> tuple[list[ClothSheet], Ints]:
-    """The sheets without drawn seams, at even levels; the sheet of each face of the surface, or -1."""
-    pieces, topo = base.pieces, base.topology
+def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[ClothSheet]:
+    """The sheets without drawn seams, at even levels."""
+    piece, topo, net = base.pieces.piece, base.topology, options.net_width
     drawn = np.zeros(len(topo.edges), dtype=bool)
     drawn[topo.edge_numbers(base.cuts[base.seam >= 0])] = True
-    with_seams = set(pieces.piece[drawn[topo.edge_of_face].any(axis=1)].tolist())
-    sheet_of_source = np.full(surface.m, -1)
     sheets: list[ClothSheet] = []
-    for piece in range(pieces.piece.max() + 1):
-        mine = pieces.piece == piece
-        name = surface.patches[surface.patch_of_face[base.source[mine][0]]].name
-        count, net = options.of_patch("strips", name), options.net_width
-        if piece in with_seams or (count is None and net is None):
+    for k in np.setdiff1d(piece, piece[drawn[topo.edge_of_face].any(axis=1)]).tolist():
+        source, P = base.source[piece == k], base.X[base.F[piece == k]]
+        name = surface.patches[surface.patch_of_face[source[0]]].name
+        if (count := options.of_patch("strips", name)) is None and net is None:
             continue
-        P = base.X[base.F[mine]]
         along, across = sheet_axes(P, surface.plane, options.of_patch("direction", name))
         low, high = (P @ across).min(), (P @ across).max()
         number = count if net is None else int(np.ceil((high - low) / net - 1e-9))
-        sheet_of_source[base.source[mine]] = len(sheets)
-        sheets.append(
-            ClothSheet(len(sheets), name, along, across, np.linspace(low, high, max(number, 1) + 1))
-        )
-    return sheets, sheet_of_source
+        mine = np.isin(np.arange(surface.m), source)
+        levels = np.linspace(low, high, max(number, 1) + 1)
+        sheets.append(ClothSheet(name, mine, along, across, levels))
+    return sheets
 
 
 def _moved_levels(

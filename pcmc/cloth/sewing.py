@@ -43,12 +43,7 @@ class Cloth:
 
     @classmethod
     def of(
-        cls,
-        surface: Surface,
-        mesh: CutMesh,
-        sheets: Sequence[ClothSheet],
-        sheet_of_source: Ints,
-        options: CuttingOptions,
+        cls, surface: Surface, mesh: CutMesh, sheets: Sequence[ClothSheet], options: CuttingOptions
     ) -> Cloth:
         """Strips in the order of their patches, then of their places across the sheet."""
         piece = mesh.pieces.piece
@@ -57,10 +52,10 @@ class Cloth:
         first[piece[::-1]] = np.arange(len(piece))[::-1]
         centre = mesh.X[mesh.F].mean(axis=1)
         middle = np.stack([np.bincount(piece, c) / np.bincount(piece) for c in centre.T], axis=1)
-        sheet = sheet_of_source[mesh.source[first]]
-        place = np.array(
-            [sheets[s].across @ m if s >= 0 else m[0] for m, s in zip(middle, sheet, strict=True)]
-        )
+        sheet, place = np.full(count, -1), middle[:, 0].copy()
+        for s, one in enumerate(sheets):
+            mine = one.source[mesh.source[first]]
+            sheet[mine], place[mine] = s, middle[mine] @ one.across
         order = np.lexsort((place.round(9), sheet, surface.patch_of_face[mesh.source[first]]))
         rank = np.empty(count, dtype=np.int64)
         rank[order] = np.arange(count)

@@ -176,25 +176,16 @@ class CuttingPattern:
         """Totals and the table of strips, with the units of the numbers if they are given."""
         table, seams = self.table, self.seam_table
         sewn = seams[seams["kind"] != "rim"]
-        rows = [
-            (
-                "strips",
-                f"{len(table)}, up to {table['length'].max():.5g} long and {table['width'].max():.5g} wide",
-            ),
-            ("area", f"{table['area'].sum():.6g} on the roof, {table['cut_area'].sum():.6g} cut"),
-            ("strain", f"{table['strain_min'].min():.2g} to {table['strain_max'].max():.2g} %"),
-            (
-                "seams",
-                f"{len(sewn)}, {sewn['length'].sum():.5g} long; their sides differ by at most "
-                f"{self.largest_difference:.1g} of the length",
-            ),
-        ]
+        rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
+        rows |= {"units": units.sentence} if units else {}
+        long, wide = table["length"].max(), table["width"].max()
+        rows["strips"] = f"{len(table)}, up to {long:.5g} long and {wide:.5g} wide"
+        rows["area"] = f"{table['area'].sum():.6g} on the roof, {table['cut_area'].sum():.6g} cut"
+        rows["strain"] = f"{table['strain_min'].min():.2g} to {table['strain_max'].max():.2g} %"
+        apart = f"their sides differ by at most {self.largest_difference:.1g} of the length"
+        rows["seams"] = f"{len(sewn)}, {sewn['length'].sum():.5g} long; {apart}"
         if table[["warp", "weft"]].to_numpy().any():
-            shorter = [f"{table[way].min():.3g} to {table[way].max():.3g} %" for way in ("warp", "weft")]
-            rows.append(("cut shorter", f"by {shorter[0]} along the warp, {shorter[1]} along the weft"))
-        if units:
-            rows.insert(0, ("units", units.sentence))
-        if not self.certificate.certified:
-            rows.insert(0, ("not certified", self.certificate.verdict.value))
-        head = "\n".join(f"{name:>13}  {text}" for name, text in rows)
+            warp, weft = (f"{table[way].min():.3g} to {table[way].max():.3g} %" for way in ("warp", "weft"))
+            rows["cut shorter"] = f"by {warp} along the warp, {weft} along the weft"
+        head = "\n".join(f"{name:>13}  {text}" for name, text in rows.items())
         return f"{head}\n\n{table.to_string(index=False, float_format=lambda x: f'{x:.4g}')}"

@@ -199,7 +199,7 @@ def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tu
             f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
             " sides; unless you want that, reverse the faces of one"
         )
-    return tuple(filter(None, (seam, opposed, wrong_up)))
+    return tuple(filter(None, (seam, opposed, wrong_up, "" if axis else _down(data, path))))
 
 
 def _open_seam(X: Floats, outer: Ints) -> str:
@@ -220,6 +220,15 @@ def _open_seam(X: Floats, outer: Ints) -> str:
         f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
         " drew the mesh, or with pcmc repair --weld"
     )
+
+
+def _down(data: MeshData, path: str | os.PathLike[str]) -> str:
+    """A sentence where most triangles of a roof look down."""
+    down = -area_vectors(data.vertices[data.faces])
+    if down[:, 2].sum() <= FACES_ONE_WAY * float(np.linalg.norm(down, axis=1).sum()):
+        return ""
+    turn = f"turn them: pcmc repair {os.fspath(path)} -o turned.obj"
+    return f"the triangles face down, so a pressure above 0 pushes the roof down; if it is to rise, {turn}"
 
 
 def _up(data: MeshData, outer: Ints) -> str:

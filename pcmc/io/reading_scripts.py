@@ -254,6 +254,7 @@ def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: Any) -> tu
     mesh = meshes.current_mesh()
     turned = np.einsum("ij,ij->i", old, _area_vectors(mesh.vertex_matrix(), mesh.face_matrix())) < 0.0
     changes["triangles turned"] += min(np.count_nonzero(turned), np.count_nonzero(~turned))
+    over = bool(2 * np.count_nonzero(turned) > len(turned))
     faces = mesh.face_matrix()
     size = len(faces)
     if holes >= 3:
@@ -263,7 +264,8 @@ def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: Any) -> tu
     points = meshes.current_mesh().vertex_matrix()
     up = _area_vectors(points, faces)[:, 2]
     if abs(up.sum()) > 0.01 * np.abs(up).sum() and up.sum() < 0.0:  # a roof that looks down
-        faces = faces[:, ::-1]
+        faces, over = faces[:, ::-1], not over
+    changes["patches turned over"] += int(over)
     return faces, _vertices(meshes.current_mesh())
 
 

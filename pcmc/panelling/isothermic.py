@@ -57,11 +57,10 @@ class _OpenSheet:
         self.sheet, self.frame, m = sheet, directions.frame, len(sheet.F)
         one, other = sheet.topology.neighbours.T
         self.f, self.g = f, g = one // 3, other // 3
-        # corners at the ends of each inner edge, as f runs along it; g runs the other way
-        self.fa, self.fb = (3 * f + (one + step) % 3 for step in (1, 2))
-        self.ga, self.gb = (3 * g + (other + step) % 3 for step in (2, 1))
-        corner = sheet.F.ravel()
-        self.a, self.b = corner[self.fa], corner[self.fb]
+        # the corners of f at the ends a, b of each inner edge, as f runs along it, and those of g there
+        steps = (f, one, 1), (f, one, 2), (g, other, 2), (g, other, 1)
+        self.ends = np.stack([3 * face + (side + step) % 3 for face, side, step in steps], axis=1)
+        self.a, self.b = sheet.F.ravel()[self.ends[:, :2]].T
         root, along = np.sqrt(directions.w), sheet.X[self.b] - sheet.X[self.a]
         seen_f, seen_g = (root[face] * np.conj(_complex(self.frame[face], along)) for face in (f, g))
         same = (seen_g * np.conj(seen_f)).real > 0.0
@@ -76,15 +75,15 @@ class _OpenSheet:
         sign = np.where(label[:m] < label[m:], 1.0, -1.0)
         self.root = root * sign
         self.flip = np.where(same, 1.0, -1.0) * sign[f] * sign[g]  # of z from f to g
-        ends = np.stack([np.append(self.fa, self.fb), np.append(self.ga, self.gb)], axis=1)
-        self.place = components(ends[np.tile(~cut, 2)], 3 * m).astype(np.int64)  # of corners: open vertices
+        shared = self.ends[~cut][:, [0, 2, 1, 3]].reshape(-1, 2)
+        self.place = components(shared, 3 * m).astype(np.int64)  # of corners: open vertices
         self.count = int(self.place.max()) + 1
+        self.pin = self._rows(np.zeros((1, 1), dtype=np.int64), np.ones(1))  # of the first open vertex
         P = X[F]
         self.area = face_areas(P)
         slopes = [0.5j * _complex(self.frame, P[:, k - 1] - P[:, k - 2]) / self.area for k in range(3)]
-        slope = np.stack(slopes, axis=1)  # of the function that is 1 at a corner
-        values = np.stack([slope.real, slope.imag], axis=1).reshape(-1, 3)
-        self.gradient = self._rows(np.repeat(self.place.reshape(-1, 3), 2, axis=0), values)
+        slope = np.stack(slopes, axis=1).view(float).reshape(m, 3, 2, 1)  # of the function that is 1 there
+        self.gradient = block_rows(slope, self.place.reshape(-1, 3), self.count)
 
     def _rows(self, places: Ints, values: Floats) -> csr_array:
         """The matrix with the values (r,k) in columns ``places`` (r,k) of open vertices."""
@@ -115,7 +114,7 @@ class _OpenSheet:
         lines = [[c for c, one in zip(curves, along, strict=True) if one == axis] for axis in range(2)]
         # across a cut edge the difference along it is the same up to the sign
         flip, one = self.flip[e], np.ones(len(e))
-        corners = np.stack([self.gb, self.ga, self.fb, self.fa], axis=1)[e]
+        corners = self.ends[e][:, ::-1]
         shared = self._rows(place[corners], np.stack([one, -one, -flip, flip], axis=1))
         common = [
             vstack([shared, *(self._rows(place[self._corners(c)], np.array([1.0, -1.0])) for c in mine)])
@@ -131,7 +130,7 @@ class _OpenSheet:
         corner_of[self.sheet.F.ravel()] = np.arange(place.size)
         chains = self._chains()
         flip = self.flip[chains]
-        pairs = place[np.stack([self.ga, self.fa], axis=1)[chains]]
+        pairs = place[self.ends[chains][:, [2, 0]]]
         jumps = self._rows(pairs, np.stack([np.ones(len(flip)), -flip], axis=1))  # c of z → ±z + c
         solved = []
         for axis in range(2):
@@ -144,7 +143,7 @@ class _OpenSheet:
             held, to = self._rows(on[:, None], np.ones(1)), np.rint(value[on] - rest) + rest
             if not len(on):
                 middle = np.average(value[place].reshape(-1, 3).mean(axis=1), weights=self.area)
-                held, to = self._rows(np.zeros((1, 1), dtype=np.int64), np.ones(1)), value[:1] - middle + 0.5
+                held, to = self.pin, value[:1] - middle + 0.5
             value = self._solve(scale * parts[axis], common[axis], held, to)
             for k in range(len(chains)):  # one after the other: some follow from those before
                 held, to = vstack([held, jumps[[k]]]), np.append(to, np.rint(jumps[[k]] @ value))
@@ -166,7 +165,7 @@ class _OpenSheet:
     ) -> Floats:
         """(count,) f with the gradient ``part`` (m,) in the mean, common @ f = 0 and held @ f = to."""
         if held is None or to is None:
-            held, to = self._rows(np.zeros((1, 1), dtype=np.int64), np.ones(1)), np.zeros(1)
+            held, to = self.pin, np.zeros(1)
         weighted = self.gradient.T @ diags_array(np.repeat(self.area, 2))
         target = np.stack([part.real, part.imag], axis=1).ravel()
         C, d = vstack([common, held]), np.append(np.zeros(common.shape[0]), to)

@@ -8,7 +8,7 @@ triangles join of the pieces. It has a node where three panels or two and a rim 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,9 +18,9 @@ from ..base.compiled import compiled
 from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..surface import Surface
-from ..surface.geometry import cross_2d, unit_vectors
+from ..surface.geometry import cross_2d, segment_lengths, unit_vectors
 from ..surface.topology import components
-from .planar import before
+from .planar import before, polygon_areas
 from .sheet import SheetMesh
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])  # corners of the panels from their place
@@ -32,6 +32,9 @@ GRID = 1e-10  # of a step: cuts lie on a grid so fine
 SAME = 1e-8  # of the size: points that are so near are one
 ROUNDING = 1e-6  # of barycentric coordinates
 INSIDE, EDGE, CORNER = 0, 1, 2
+SHORT = 0.1  # of the size: the ends of an edge that is shorter become one node
+BESIDE = 0.15  # of the size: beside a corner, √SLIVER and more, so that no sliver has the corner
+SLIVER = 0.02  # of the size squared: twice the area of a panel between a rim and its chord that is left out
 
 
 class SheetNet(NamedTuple):
@@ -144,6 +147,62 @@ def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool
         np.bincount(owner, rim[order] & ~on_line.all(axis=1)) > 0,
         turned[panel[a[start[:-1]]]],
     )
+
+
+def tidied(net: Net, size: float) -> Net:
+    """A net without short edges and slivers."""
+    P, kind, start, corner = net.points, net.kind, net.start, net.corner
+    # the ends of short edges become one node: a corner, else one of a ridge or rim; two corners both stay
+    pairs = np.stack([corner, corner[before(start)]], axis=1)
+    short = size * np.where((kind[pairs] == CORNER).any(axis=1), BESIDE, SHORT)
+    label = components(pairs[segment_lengths(P, pairs) < short], len(P))
+    first = np.lexsort((-kind, label))
+    stays = first[np.unique(label[first], return_index=True)[1]]
+    crowded = np.bincount(label[kind == CORNER], minlength=len(stays)) > 1
+    number = np.where(crowded[label], np.arange(len(P)), stays[label])
+    owner = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    used = number[corner]
+    shown = used != used[before(start)]
+    while True:
+        used, owner = used[shown], owner[shown]
+        start = np.append(np.flatnonzero(np.diff(owner, prepend=-1)), len(owner))
+        on_rim = np.add.reduceat(kind[used] == INSIDE, start[:-1]) == 0
+        sliver = on_rim & (2.0 * polygon_areas(P, start, used) < SLIVER * size**2)
+        alone = (kind[used] == CORNER) & (np.bincount(used)[used] == 1)
+        sliver &= ~np.logical_or.reduceat(alone, start[:-1])  # the corner would be cut off
+        shown = np.repeat((np.diff(start) > 2) & ~sliver, np.diff(start))
+        uses = np.bincount(used[shown], minlength=len(P))
+        shown &= (kind[used] != EDGE) | (uses[used] > 1)  # else no other panel ends there
+        if shown.all():
+            break
+    left, panels = owner[start[:-1]], dict[str, Any](start=start)
+    panels |= {name: getattr(net, name)[left] for name in ("sheet", "cut", "turned")}
+    nodes, panels["corner"] = np.unique(used, return_inverse=True)
+    return net._replace(points=P[nodes], normals=net.normals[nodes], kind=kind[nodes], **panels)
+
+
+def without_flat(net: Net, size: float) -> Net:
+    """Without triangles that planarity has laid flat on a straight rim; their nodes come to lie on it.
+
+    The panels on both sides of such a triangle reach the rim: their planes meet only there, and so their
+    common node comes to lie on it.
+    """
+    P, start, corner, sides = net.points, net.start, net.corner, net.sides
+    _, row, uses = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    back, rim, count = before(start), uses[row.ravel()] == 1, np.diff(start)
+    tip = corner[back[back]]  # of a triangle, opposite the side that ends at a corner
+    flat = (count == 3) & (2.0 * polygon_areas(P, start, corner) < SLIVER * size**2)
+    flat &= np.add.reduceat(rim, start[:-1]) == 1
+    flat &= np.add.reduceat(rim & (net.kind[tip] == INSIDE), start[:-1]) == 1
+    on_rim = rim & np.repeat(flat, count)
+    tip, first, last = (nodes[on_rim] for nodes in (tip, corner[back], corner))
+    along = P[last] - P[first]
+    share = np.einsum("ti,ti->t", P[tip] - P[first], along) / np.einsum("ti,ti->t", along, along)
+    P, kind = P.copy(), net.kind.copy()
+    P[tip], kind[tip] = P[first] + share[:, None] * along, EDGE
+    corner, start = corner[np.repeat(~flat, count)], np.append(0, np.cumsum(count[~flat]))
+    rest = {name: getattr(net, name)[~flat] for name in ("sheet", "cut", "turned")}
+    return net._replace(points=P, kind=kind, start=start, corner=corner, **rest)
 
 
 def _pieces(at: Floats, hexagons: bool) -> tuple[Ints, Ints, Floats]:

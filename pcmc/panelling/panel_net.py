@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 
@@ -18,17 +19,18 @@ from ..certificate.certificate import certified
 from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
-from ..surface.geometry import cross_2d, face_areas
+from ..surface.geometry import cross_2d, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
+from .distance import distances
 from .isothermic import curvature_coordinates
-from .net import INSIDE, SheetNet, net, nudged
-from .net_tables import net_tables, tidied, without_flat
-from .planar import before, planarised, torsion_free_axes
+from .net import INSIDE, Net, SheetNet, net, nudged, tidied, without_flat
+from .planar import before, convex, planarised, planarity, polygon_areas, torsion, torsion_free_axes
 from .sheet import SheetMesh, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
+KINDS = np.array(["inside", "edge", "corner"])  # of nodes
 FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
 NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
 
@@ -131,37 +133,31 @@ class PanelNet:
 
     def text(self, units: Units = NO_UNITS) -> str:
         """Totals, with the units of the numbers if they are given."""
-        table, beams = self.panels, self.beams
+        table, beams, nodes = self.panels, self.beams, self.nodes
         kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
         worst, area = table.iloc[table["planarity"].argmax()], table["area"]
-        covered = f"{100.0 * self.covered:.2f} % of the roof's; panels {area.min():.3g} to {area.max():.3g}"
-        warp = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
-        away = f"nodes {self.nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
-        turns = [(beams[name].median(), beams[name].max()) for name in ("torsion", "torsion_normal")]
+        rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
+        rows |= {"units": units.sentence} if units else {}
+        rows["panels"] = f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"
+        rows["area"] = f"{area.sum():.6g}, {100.0 * self.covered:.2f} % of the roof's;"
+        rows["area"] += f" panels {area.min():.3g} to {area.max():.3g}"
+        rows["planarity"] = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
+        rows["planarity"] += f" (panel {worst['panel']}, {worst['kind']})"
+        away = f"nodes {nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
+        rows["distance"] = f"from the surface, {away}"
+        turns = [f(beams[name]) for name in ("torsion", "torsion_normal") for f in (np.median, np.max)]
         torsion = "of beams, median {:.2g}, largest {:.3g} degrees; along normals {:.2g} and {:.3g}"
-        rows = [
-            ("panels", f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"),
-            ("area", f"{area.sum():.6g}, {covered}"),
-            ("planarity", f"{warp} (panel {worst['panel']}, {worst['kind']})"),
-            ("distance", f"from the surface, {away}"),
-            ("torsion", torsion.format(*turns[0], *turns[1])),
-        ]
+        rows["torsion"] = torsion.format(*turns)
         if len(self.umbilics):
             places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])
-            rows.append(("umbilics", f"{len(self.umbilics)}: {places}"))
-        far = self.nodes["distance"].max() / self.size
-        if far > FAR:
+            rows["umbilics"] = f"{len(self.umbilics)}: {places}"
+        if (far := nodes["distance"].max() / self.size) > FAR:
             text = f"nodes are up to {100.0 * far:.0f} % of the size from the surface: choose a smaller size"
-            rows.append(("far off", f"{text}, or pattern 'quads'"))
-        flat = table["panel"][table["area"] < NO_AREA * self.size**2].tolist()
-        if flat:
+            rows["far off"] = f"{text}, or pattern 'quads'"
+        if flat := table["panel"][area < NO_AREA * self.size**2].tolist():
             text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
-            rows.append(("slivers", text))
-        if units:
-            rows.insert(0, ("units", units.sentence))
-        if not self.certificate.certified:
-            rows.insert(0, ("not certified", self.certificate.verdict.value))
-        return "\n".join(f"{name:>14}  {text}" for name, text in rows)
+            rows["slivers"] = text
+        return "\n".join(f"{name:>14}  {text}" for name, text in rows.items())
 
 
 def panel_net(
@@ -242,3 +238,57 @@ def _sheet_net(
         raise OptionError(f"{text}; choose 'planar-quads'", what="pattern", found=pattern)
     none = np.zeros(len(sheet.X), dtype=bool)
     return SheetNet(name, faces, sheet, at, np.flatnonzero(none), none, np.full(len(faces), np.nan))
+
+
+def net_tables(
+    surface: Surface, parts: Sequence[SheetNet], net: Net, axes: Floats
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Nodes, panels and beams of a net; see ``PanelNet``."""
+    P, N, start, corner = net.points, net.normals, net.start, net.corner
+    middle = np.add.reduceat(P[corner], start[:-1]) / np.diff(start)[:, None]
+    roof = surface.faces[surface.roof[surface.patch_of_face]]
+    away = distances(np.concatenate([P, middle]), surface.vertices, roof)
+    cosine = np.einsum("ni,ni->n", axes, N) / np.linalg.norm(axes, axis=1)
+    nodes = pd.DataFrame(
+        {
+            "node": np.arange(len(P)) + 1,
+            **dict(zip("xyz", P.T, strict=True)),
+            "kind": KINDS[net.kind],
+            "distance": away[: len(P)],
+            "lean": np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))),
+        }
+    )
+    inside = np.add.reduceat(net.kind[corner] != INSIDE, start[:-1]) == 0
+    umbilic = inside & (np.diff(start) != 4) & any(len(part.umbilics) for part in parts)
+    panels = pd.DataFrame(
+        {
+            "panel": np.arange(len(middle)) + 1,
+            "patch": [parts[k].name for k in net.sheet],
+            "kind": np.select([net.cut, umbilic], ["cut", "umbilic"], "whole"),
+            "corners": np.diff(start),
+            "area": polygon_areas(P, start, corner),
+            "planarity": planarity(P, start, corner),
+            "convex": convex(P, start, corner),
+            "distance": np.maximum(np.maximum.reduceat(away[corner], start[:-1]), away[len(P) :]),
+            "turned": net.turned,
+        }
+    )
+    panel = np.repeat(panels["panel"].to_numpy(), panels["corners"])
+    ends, first, row = np.unique(net.sides, axis=0, return_index=True, return_inverse=True)
+    neighbour = np.zeros(len(ends), dtype=np.int64)
+    other = np.ones(len(panel), dtype=bool)
+    other[first] = False
+    neighbour[row.ravel()[other]] = panel[other]
+    beams = pd.DataFrame(
+        {
+            "beam": np.arange(len(ends)) + 1,
+            "node": ends[:, 0] + 1,
+            "other": ends[:, 1] + 1,
+            "length": segment_lengths(P, ends),
+            "panel": panel[first],
+            "neighbour": neighbour,
+            "torsion": torsion(P, ends, axes),
+            "torsion_normal": torsion(P, ends, N),
+        }
+    )
+    return nodes, panels, beams

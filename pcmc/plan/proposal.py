@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from shapely.affinity import affine_transform
 
 from ..base.errors import OptionError, PlanError, unknown
 from ..surface.curves import Curve
@@ -31,6 +32,7 @@ ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
 ABOVE_LEAST = 1.6  # a first tension, over the least at which a roof over the plan exists
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
+SEAM = 1e-9  # of a plan's size: rounding that would leave a gap between it and its image
 MANY, ROUGH = 4000, 1e-5  # curves of more points are simplified, by so much of their length
 NEAR = 1e-4  # of the length of all parts' edges: a part this near to a point of a divider is beside it
 
@@ -62,9 +64,24 @@ def parts_of(drawing: Drawing) -> list[Part]:
 
 
 def plan_area(plan: Plan) -> Any:
-    """The plan on Π without its holes, as a polygon; small level holes are filled."""
-    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
-    return _roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
+    """The whole plan on Π without its holes, as a polygon; small level holes are filled."""
+    holes, mirrors = (
+        [curve.local(plan.plane) for curve in curves]
+        for curves in ([hole.curve for hole in plan.holes], plan.mirrors)
+    )
+    return _unfolded(_roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE), mirrors)
+
+
+def _unfolded(area: Any, mirrors: Sequence[Curve]) -> Any:
+    """A polygon and its images behind straight lines, in rounds, as a piece of 60° or 45° has images of
+    images; between parallel lines, where they never end, a strip of several."""
+    for mirror in (*mirrors, *mirrors) if len(mirrors) > 1 else mirrors:
+        a, b = mirror.at([0.0, 1.0])[:, :2]
+        along = (b - a) / np.linalg.norm(b - a)
+        turn = 2.0 * np.outer(along, along) - np.eye(2)
+        image = affine_transform(area, [*turn.ravel(), *(a - turn @ a)])
+        area = shapely.union_all([area, image], grid_size=SEAM * math.sqrt(area.area))
+    return area
 
 
 def _roof_area(outline: Curve, holes: Iterable[Curve], smallest: float = 0.0) -> Any:
@@ -197,7 +214,8 @@ def _patches(
     if not parts:
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
-    least = least_tension(_roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE))
+    roof = _roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE)
+    least = least_tension(_unfolded(roof, drawing.mirrors))
     default = two_digits(ABOVE_LEAST * least) if tension is None else tension
     labels, specs = _labels(parts, drawing), []
     for k, part in enumerate(parts):

@@ -27,7 +27,8 @@ def model_with_members(
     try:
         if surface is None:
             return outcome.model(project.structure, anyway=True)
-        return project.structure.model(surface, True, certificate, outcome.units, project.plan)
+        about = {"certificate": certificate, "units": outcome.units}
+        return project.structure.model(surface, project.plan, anyway=True, **about)
     except OptionError:
         return None
 

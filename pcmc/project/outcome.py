@@ -285,12 +285,11 @@ class Outcome:
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         plan = None if self.project is None else self.project.plan
-        model = structure.model(self.shown.surface, anyway, self.shown.certificate, self.units, plan)
+        surface, certificate = self.shown
+        model = structure.model(surface, plan, anyway=anyway, certificate=certificate, units=self.units)
         if self.unfold and (model.bars or any(not line.wall for line in model.lines)):
-            text = (
-                "a member at an edge or a point is known for the part of the plan alone, not for its images"
-            )
-            raise OptionError(f"{text}; leave out whole, or the member", what="whole")
+            text = "a member at an edge or a point is known for the part of the plan alone, not for its"
+            raise OptionError(f"{text} images; leave out whole, or the member", what="whole")
         return model
 
     @property

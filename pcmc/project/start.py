@@ -89,13 +89,16 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
         ]
     if len(mesh.supports):
         changes |= {"fixed": _supported(surface, mesh.supports)}
-        changes |= dict.fromkeys(("on_plane", "on_planes", "on_line"), ())
+        changes |= dict.fromkeys(("on_plane", "on_line"), ())
+        changes["on_planes"] = tuple((plane, on) for plane, on in surface.on_planes if plane.mirror)
     return (surface.rebuilt(**changes).with_held_snow() if changes else surface), data
 
 
 def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
     """(n,) the vertices that the supports of a project fix."""
-    X, boundary = surface.vertices, surface.topology.on_boundary
+    X, boundary = surface.vertices, np.zeros(surface.n, dtype=bool)
+    outer = surface.topology.boundary_edge & ~surface.mirror_edge  # at a mirror the roof goes on
+    boundary[surface.topology.edges[outer]] = True
     if supports == BOUNDARY:
         return boundary
     height = surface.plane.height(X)

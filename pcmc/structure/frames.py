@@ -79,16 +79,15 @@ class BarFrame:
             ends, held = (np.cumsum(mine) - 1)[self.bars[bars]], holds[holds.any(axis=1)]
             return BarFrame(self.points[mine], ends, self.stiffness[bars], held, self.up).buckling(N[bars])
         (EA, EI, across, _), L, n = self.stiffness.T, self._axes[1], 6 * len(self.points)
-        G = self._assembled(
-            _blocks(L, 0.0 * N, N / (30 * L), N / (30 * L), N * (EI + across) / (EA * L), PULLED)
-        )
+        bent = N / (30 * L)
+        G = self._assembled(_blocks(L, 0.0 * N, bent, bent, N * (EI + across) / (EA * L), PULLED))
         factor = self._factor[0]
 
-        def bent(u: Floats) -> Floats:  # the largest eigenvalue of -K⁻¹ G is 1/λ
+        def answer(u: Floats) -> Floats:  # the largest eigenvalue of -K⁻¹ G is 1/λ
             return np.asarray(factor.solve(np.pad(-(G @ u.ravel()), (0, factor.shape[0] - n)))[:n])
 
         start = np.random.default_rng(0).standard_normal(n)  # no mode is square to it, as to an even vector
-        most = float(eigs(LinearOperator((n, n), bent), 1, which="LR", v0=start, tol=EXACT)[0][0].real)
+        most = float(eigs(LinearOperator((n, n), answer), 1, which="LR", v0=start, tol=EXACT)[0][0].real)
         return 1.0 / most if most > 0.0 else np.inf
 
     @cached_property
@@ -98,10 +97,7 @@ class BarFrame:
     @cached_property
     def _turn(self) -> Floats:
         """(b,12,12) from the coordinates of space to those of the bars."""
-        turn = np.zeros((len(self.bars), 12, 12))
-        for k in range(0, 12, 3):
-            turn[:, k : k + 3, k : k + 3] = self._axes[0]
-        return turn
+        return np.einsum("pq,bij->bpiqj", np.eye(4), self._axes[0]).reshape(-1, 12, 12)
 
     @cached_property
     def _place(self) -> Ints:
@@ -124,16 +120,14 @@ class BarFrame:
     def _factor(self) -> tuple[Any, float]:
         """The factors of K with what is held and the rigid motions of parts that nothing holds; the scale of
         these rows."""
-        n, label, motions = len(self.points), components(self.bars, len(self.points)), []
+        n, label, motions = len(self.points), components(self.bars, len(self.points)), list[Floats]()
         for part in np.unique(label[self.bars]):
             mine = label == part
-            arms = self.points - self.points[mine].mean(axis=0)
-            size, still = float(np.abs(arms[mine]).max()), np.zeros_like(self.points)
+            arms, still = self.points - self.points[mine].mean(axis=0), np.zeros_like(self.points)
+            size = float(np.abs(arms[mine]).max())
             for axis in np.eye(3):
-                motions += [
-                    np.hstack([still + axis, still]) * mine[:, None],
-                    np.hstack([np.cross(axis, arms), still + axis]) / size * mine[:, None],
-                ]
+                shift, turn = [still + axis, still], [np.cross(axis, arms), still + axis]
+                motions += [np.hstack(shift) * mine[:, None], np.hstack(turn) / size * mine[:, None]]
         R = np.array([motion.ravel() for motion in motions]).T
         free = null_space(self.holds @ R, rcond=LOOSE) if len(self.holds) else np.eye(R.shape[1])
         loose = np.linalg.qr(R @ free)[0].T if free.shape[1] else np.zeros((0, 6 * n))

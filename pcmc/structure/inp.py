@@ -83,36 +83,30 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
 
 
 def _elements(model: StructuralModel) -> Iterator[str]:
-    """Elements, node sets and sections by patch and by cable, and their materials."""
+    """Elements, node sets, materials and sections by patch and by cable."""
     surface, (name, section, _) = model.standing, KINDS[model.elements]
     patch_of = surface.patch_of_face[model.active]
-    present = np.unique(patch_of) + 1
-    materials = list(dict.fromkeys(model.materials[k - 1] for k in present))
-    for k, thickness in zip(present, model.thicknesses[present - 1].tolist(), strict=True):
-        mine = patch_of == k - 1
+    for k in np.unique(patch_of) + 1:
+        mine, material, thickness = patch_of == k - 1, model.materials[k - 1], short(model.thicknesses[k - 1])
         corners = surface.faces[model.active[mine]]
         yield card(f"ELEMENT, TYPE={name}, ELSET=PATCH_{k}", model.faces[mine] + 1, corners + 1)
-        yield _set(f"NODES_{k}", np.unique(corners))
-        of = f"MATERIAL=MEMBRANE_{materials.index(model.materials[k - 1]) + 1}"
-        if not model.materials[k - 1].cloth:
-            yield f"*{section} SECTION, ELSET=PATCH_{k}, {of}\n{short(thickness)}\n"
+        yield _set(f"NODES_{k}", np.unique(corners)) + _material(f"PATCH_{k}", material)
+        if not material.cloth:
+            yield f"*{section} SECTION, ELSET=PATCH_{k}, MATERIAL=PATCH_{k}\n{thickness}\n"
             continue
         axes, which = np.unique(model.warps(k - 1).reshape(-1, 6).round(9) + 0.0, axis=0, return_inverse=True)
         for a, row in enumerate(axes):
             one = f"WARP_{k}_{a + 1}"
             yield f"*ORIENTATION, NAME={one}, SYSTEM=RECTANGULAR\n{','.join(map(short, row))}\n"
             yield _set(one, model.faces[mine][which.ravel() == a], "ELSET")
-            yield f"*{section} SECTION, ELSET={one}, {of}, ORIENTATION={one}\n{short(thickness)}\n"
-    yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
-    yield from (_material(f"MEMBRANE_{k}", material) for k, material in enumerate(materials, 1))
-
-    used = list(dict.fromkeys(material for _, material in model.cable_sections))
+            yield f"*{section} SECTION, ELSET={one}, MATERIAL=PATCH_{k}, ORIENTATION={one}\n{thickness}\n"
+    yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k + 1},\n" for k in np.unique(patch_of))
     for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
         yield card(f"ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}", numbers, cable.edges + 1)
-        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{used.index(material) + 1}\n{short(area)}\n"
-    if used:
+        yield _material(f"CABLE_{k}", material)
+        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{k}\n{short(area)}\n"
+    if surface.cables:
         yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(surface.cables)))
-    yield from (_material(f"CABLE_{k}", material) for k, material in enumerate(used, 1))
 
 
 def _beams(model: StructuralModel) -> Iterator[str]:

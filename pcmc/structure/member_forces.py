@@ -202,10 +202,10 @@ def supports_with_members(model: StructuralModel, reactions: Floats) -> pd.DataF
     beside[ends] = False
     there = [beside[on].any() or alone[on].any() for on in support_vertices(acting).values()]
     table = table[there if model.lines else [True] * len(table)]
-    rows = [
-        [f"M{k}", " + ".join(names[v]), "member end", 0.0, *standing.vertices[v], *(reactions - alone)[v]]
-        for k, v in enumerate(ends, 1)
-    ]
+    rows = list[list[object]]()
+    for k, v in enumerate(ends, 1):
+        numbers = 0.0, *standing.vertices[v], *(reactions - alone)[v]
+        rows.append([f"M{k}", " + ".join(names[v]), "member end", *numbers])
     own = pd.DataFrame(rows, columns=table.columns)
     return pd.concat([table, own], ignore_index=True) if rows else table.reset_index(drop=True)
 
@@ -248,11 +248,8 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         if beam.line.wall:
             about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
             low, high = np.nanmin(beam.wall_tensions[:, 1]), np.nanmax(beam.wall_tensions[:, 1])
-            about += (
-                f"; without bending a wall would pull with {low:.3g} to {high:.3g}{units.behind('tension')}"
-            )
-            if N <= 0.0:
-                about += "; N is a thrust, which no cable has"
+            about += f"; without bending a wall would pull with {low:.3g} to {high:.3g}"
+            about += units.behind("tension") + "; N is a thrust, which no cable has" * (N <= 0.0)
         lines.append(about)
     return lines
 

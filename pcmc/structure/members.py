@@ -252,9 +252,8 @@ def at_points(bars: Iterable[PlacedMember]) -> dict[int, list[PlacedMember]]:
 
 def _mirrored(surface: Surface) -> Bools:
     """(n,) the vertices in mirror planes."""
-    return np.any(
-        [mask & plane.mirror for plane, mask in surface.on_planes] or [np.zeros(surface.n, bool)], axis=0
-    )
+    masks = [mask for plane, mask in surface.on_planes if plane.mirror]
+    return np.any([np.zeros(surface.n, dtype=bool), *masks], axis=0)
 
 
 def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
@@ -271,12 +270,11 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
         if not walls:
             known = [name for name, wall in zip(names, surface.walls, strict=True) if wall]
             known += [cable.name for cable in surface.cables]
-            text = f"member {member.label!r}: {unknown('wall or cable', member.on, known)}"
+            text = unknown("wall or cable", member.on, known)
             if member.on in names:
-                text = f"member {member.label!r}: {member.on!r} is no wall; it stands in the place of one"
-            raise OptionError(
-                f"{text}; a divider needs a wall to have a member", what="members", found=member.on
-            )
+                text = f"{member.on!r} is no wall; it stands in the place of one"
+            text = f"member {member.label!r}: {text}; a divider needs a wall to have a member"
+            raise OptionError(text, what="members", found=member.on)
         found = [(names[k], _top(surface, k)) for k in walls]
     curves = [(wall, curve) for wall, edges in found for curve in topo.curves_among(edges)]
     for number, (wall, curve) in enumerate(curves, 1):

@@ -8,8 +8,6 @@ from typing import Any
 
 from ..base import validate
 from ..base.errors import OptionError, unknown
-from ..base.units import NO_UNITS, Units
-from ..certificate import Certificate
 from ..plan import Plan
 from ..plan.parts import check_keys, curve_of
 from ..surface import Surface
@@ -261,31 +259,15 @@ class Structure:
         bars_on(surface, members, lines_on(surface, members))
         checked_areas(self.cable_area, surface, [str(member.on) for member in members])
 
-    def model(
-        self,
-        surface: Any,
-        anyway: bool = False,
-        certificate: Certificate | None = None,
-        units: Units = NO_UNITS,
-        plan: Plan | None = None,
-    ) -> StructuralModel:
+    def model(self, surface: Any, plan: Plan | None = None, **about: Any) -> StructuralModel:
         """The structural model of a surface at rest or of a result, with the members that its ``plan`` names;
-        errors as in ``pcmc.StructuralModel``."""
+        ``about``: ``anyway``, ``certificate`` and ``units``. Errors as of ``pcmc.StructuralModel``."""
         plain: Surface = getattr(surface, "surface", surface)
-        return StructuralModel(
-            surface,
-            self.materials(plain),
-            self.thicknesses(plain),
-            self.loads_on(plain),
-            anyway=anyway,
-            cable_area=self.cable_area,
-            cable_material=self.material if plain.cables else None,
-            certificate=certificate,
-            units=units,
-            combinations=self.combinations,
-            gas=self.enclosed,
-            members=members_of(self.members, plan),
-        )
+        about |= {"combinations": self.combinations, "gas": self.enclosed}
+        about |= {"cable_area": self.cable_area, "members": members_of(self.members, plan)}
+        about |= {"cable_material": self.material} if plain.cables else {}
+        cloth = self.materials(plain), self.thicknesses(plain)
+        return StructuralModel(surface, *cloth, self.loads_on(plain), **about)
 
 
 def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tuple[Member, ...]:

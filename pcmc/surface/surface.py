@@ -23,7 +23,7 @@ from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .images import Imaged, check_translations
 from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs, summary
-from .values import part_index, wall_patches, with_values
+from .values import part_index, sheets_below, wall_patches, with_values
 
 
 def _of_patches(field: str) -> cached_property[Any]:
@@ -302,7 +302,8 @@ class Surface(supports.Supported, Imaged):
         ``cable_weights`` give tensions and weights per length by the name of the cable, ``volumes`` volumes
         by the name of the room. The pressure of a wall changes with the difference of its two rooms'
         pressures, and its snow with that of the snow over them, unless the wall itself is named. Of the
-        two sheets of a cushion, ``roof`` and ``roof below``, one that is not named gets the other's pressure.
+        two sheets of a cushion, ``roof`` and ``roof below``, one that is not named gets the other's pressure,
+        and a tension of the upper one changes that of the lower one in proportion, unless it is named, too.
 
         Raises
         ------
@@ -333,7 +334,8 @@ class Surface(supports.Supported, Imaged):
         Parameters
         ----------
         snow : s, force per area of the plan; Π's normal points up.
-        patches : names of the patches that it lies on; by default all that are no walls, or all if all are.
+        patches : names of the patches that it lies on; by default all that are no walls and no lower sheets
+            of cushions, or all if there are no others.
 
         Raises
         ------
@@ -347,7 +349,8 @@ class Surface(supports.Supported, Imaged):
         """
         snow = validate.number("snow", snow, error=SurfaceError)
         every = [patch.name for patch in self.patches]
-        roof = [name for name, wall in zip(every, self.walls.tolist(), strict=True) if not wall]
+        shelter = {*sheets_below(self).values(), *(every[k] for k in np.flatnonzero(self.walls))}
+        roof = [name for name in every if name not in shelter]
         names = list(patches) if patches is not None else roof or every
         snows = {patch.name: patch.snow for patch in self.patches} | dict.fromkeys(names, snow)
         return self.retensioned(snows=snows).with_held_snow()

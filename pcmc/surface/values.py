@@ -2,7 +2,8 @@
 and which patches are walls.
 
 Those of a wall follow from its neighbours': its pressure is the difference of its two rooms', its snow that
-of the snow over them, and its tension must balance theirs. The two sheets of a cushion have one pressure.
+of the snow over them, and its tension must balance theirs. The two sheets of a cushion have one pressure,
+and the tension of the lower one is that of the upper one times a factor.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,6 +82,7 @@ def with_values(
     of_patches = changes["patches"]
     of_patches["wall"] = dict.fromkeys(walls, True)
     of_patches["pressure"] = of_both_sheets(surface, of_patches.get("pressure", {}))
+    of_patches["tension"] = with_sheets_below(surface, of_patches.get("tension", {}))
     changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
     following: dict[str, dict[str, Any]] = {}
     for field in ("pressure", "snow"):
@@ -107,21 +110,38 @@ def _replaced(
 
 def rates_of(surface: Any, kind: str, by_name: Mapping[str, float]) -> Floats:
     """The rates of change of the values of one kind, given by name; what is not named follows."""
-    by_name = of_both_sheets(surface, by_name) if kind == "pressures" else by_name
+    following = {"pressures": of_both_sheets, "tensions": with_sheets_below}
+    by_name = following[kind](surface, by_name) if kind in following else by_name
     named = {part_index(surface, kind, name): rate for name, rate in by_name.items()}
     rates = np.zeros(len(getattr(surface, KINDS[kind][0])))
     rates[list(named)] = list(named.values())
     return rates + wall_changes(surface, rates, named) if kind in ("pressures", "snows") else rates
 
 
+def sheets_below(surface: Any) -> dict[str, str]:
+    """The lower sheet of each cushion by the name of the upper one, which has the same pressure."""
+    patches = {patch.name: patch for patch in surface.patches}
+    pairs = ((patch, patches.get(f"{patch.name}{BELOW}")) for patch in surface.patches)
+    return {p.name: q.name for p, q in pairs if q is not None and p.pressure == q.pressure != 0.0}
+
+
 def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, float]:
     """Pressures, or their rates, by patch: what is given for one sheet of a cushion alone is that of both."""
-    present = {patch.name: patch.pressure for patch in surface.patches}
     both = dict(pressures)
-    for name, value in pressures.items():
-        other = name.removesuffix(BELOW) if name.endswith(BELOW) else f"{name}{BELOW}"
-        if name in present and present.get(other) == present[name]:
-            both.setdefault(other, value)
+    for above, below in sheets_below(surface).items():
+        for name, other in (above, below), (below, above):
+            if name in pressures:
+                both.setdefault(other, pressures[name])
+    return both
+
+
+def with_sheets_below(surface: Any, tensions: Mapping[str, float]) -> dict[str, float]:
+    """Tensions, or their rates, by patch: a cushion's lower sheet that is not named keeps its factor."""
+    present = {patch.name: patch.tension for patch in surface.patches}
+    both = dict(tensions)
+    for above, below in sheets_below(surface).items():
+        if present[above] > 0.0 and isinstance(value := tensions.get(above), Real):
+            both.setdefault(below, value * present[below] / present[above])
     return both
 
 

@@ -116,3 +116,18 @@ def test_a_tension_is_found_for_a_rise_or_for_the_targets(tmp_path, vary, line):
         load(path)
     assert line in str(caught.value)
     assert "give patch 'west' tension = instead of rise =" in str(caught.value)
+
+
+def test_the_span_of_a_half_is_that_of_the_whole_roof(given):
+    roofs = {
+        "whole": "outline = [[0, 0], [12, 0], [12, 8], [0, 8]]",
+        "half": "outline = [[0, 0], [6, 0], [6, 8], [0, 8]]\nmirrors = [[[6, 0], [6, 8]]]",
+        "quarter": "outline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
+        "mirrors = [[[6, 0], [6, 4]], [[0, 4], [6, 4]]]",
+    }
+    for text in roofs.values():
+        outcome = run_project(
+            given(f"[plan]\nedge_length = 1.2\n{text}\nspan_ratio = 8.0\n"), use_cache=False
+        )
+        assert outcome.good
+        assert apex(outcome) == pytest.approx(1.0, rel=1e-6)

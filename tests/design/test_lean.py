@@ -103,3 +103,12 @@ def test_an_upright_wall_stays_upright_on_finer_meshes(finer, turned):
         assert mask[own].all()
         assert np.abs(plane.height(fine.vertices[own])).max() < 1e-12 * fine.size
     assert certify(fine).leaning["lean"].max() < 1e-4
+
+
+def test_a_search_that_brings_a_wall_down_goes_on_with_one_that_stands():
+    patches = {"west": {"tension": 2.0, "pressure": 0.4}, "east": {"tension": 2.2, "pressure": 0.3}}
+    outline = [[0, 0], [12, 0], [12, 6], [8, 9], [0, 9]]
+    start = Plan(outline, [Divider([[7, 0], [5, 9]], 0.7)], patches=patches, edge_length=1.2).surface()
+    design = meet(start, Target("lean", "wall 1", 12.0), "wall 1")
+    assert design.met
+    assert certify(design.surface).leaning["lean"].max() == pytest.approx(12.0, rel=1e-6)

@@ -5,6 +5,7 @@ import pytest
 from periodic_cases import honeycomb, honeycomb_energy, scattered, steiner_films
 
 import pcmc
+from generators.cells import _foam
 from pcmc.meshing.elevation import elevate
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.neighbour_swap import swap
@@ -87,6 +88,19 @@ def test_a_honeycomb_sheared_on_becomes_that_of_the_next_lattice(shear: float) -
     assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.75**0.5, rel=1e-9)
 
 
+def test_kelvins_foam_stretched_until_its_squares_vanish() -> None:
+    sides = np.array([1.35, 0.9, 1.0 / (1.35 * 0.9)])
+    cube = _foam(np.array([[0.0, 0.0, 0.0], [0.5, 0.5, 0.5]]), np.eye(3), 1, 1.0, 1.0)
+    X = cube.vertices * sides
+    vanished = pcmc.solve(cube.rebuilt(vertices=X, images=pcmc.images_in(X, np.diag(sides))))
+    assert "and 1 more may vanish" in vanished.certificate.detail
+    swapped = pcmc.swap_neighbours(vanished.surface)
+    assert swapped.kept
+    assert swapped.result.certificate.index == 0
+    assert swapped.result.energy < vanished.energy - 0.005
+    assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.5, rel=1e-9)
+
+
 def roof(width: float, depth: float, **pressures: float) -> pcmc.Surface:
     """Four rooms below a raised rim; the wall "middle" along x is between those in south and north."""
     x, y = 0.5 * width, 0.5 * depth
@@ -124,6 +138,9 @@ def test_below_a_roof_two_rooms_become_neighbours() -> None:
     assert str(swapped).startswith(f"'{west}' and '{east}' now meet; E = ")
     assert swapped.result.certificate.verdict is pcmc.Verdict.STABLE
     assert swapped.surface.walls.tolist() == start.walls.tolist()
+    wall = swapped.surface.patch_index("middle")
+    (ridge,) = (c for c in swapped.surface.topology.junctions if wall in c.sheets and min(c.sheets) < 4)
+    assert len(ridge.vertices) > 3  # several columns of triangles, so that it can bend
     other = pcmc.solve(roof(6.0, 3.2))  # turned by 90°, on a mesh of its own
     assert swapped.result.energy == pytest.approx(other.energy, rel=2e-3)
     assert swapped.result.energy < vanished.energy

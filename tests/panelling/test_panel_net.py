@@ -9,8 +9,7 @@ import pcmc
 from generators import delaunay, spherical_cap, two_squares
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.panelling import panel_net
-from pcmc.panelling.net import CORNER, EDGE, Net
-from pcmc.panelling.net_tables import tidied
+from pcmc.panelling.net import CORNER, EDGE, Net, tidied
 from pcmc.panelling.planar import by_corners
 from pcmc.panelling.sheet import shape_operators
 from pcmc.plan import Plan

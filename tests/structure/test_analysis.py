@@ -200,6 +200,6 @@ def test_materials_by_patch_have_their_own_weight_and_stiffness(tmp_path):
     assert weight.sum(axis=0) == pytest.approx([0, 0, -0.2 * 10.0 * 1e-3 * 0.5])
     pcmc.write_structure(tmp_path / "two.inp", model)
     text = (tmp_path / "two.inp").read_text()
-    assert "ELSET=PATCH_2, MATERIAL=MEMBRANE_2" in text
+    assert "ELSET=PATCH_2, MATERIAL=PATCH_2" in text
     assert "PATCH_1,GRAV" in text
     assert "PATCH_2,GRAV" not in text

@@ -259,6 +259,7 @@ def test_the_quickest_runs_that_are_accurate_enough(tmp_path):
     assert curved._cheapest(runs, curved.CASES[0], 1e-7) == {}
 
 
+@pytest.mark.nightly
 def test_a_mesh_graded_towards_the_corner_of_an_l_keeps_its_order():
     even, graded = (
         [

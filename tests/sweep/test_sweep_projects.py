@@ -64,7 +64,8 @@ def test_both_sheets_of_a_cushion_have_the_pressure_that_one_is_given(tmp_path):
         assert varied(path, {name: 0.8})[1].pressures.tolist() == [0.8, 0.8]
     both = {"patch 1.pressure": 0.8, "patch 1 below.pressure": 0.7}
     assert varied(path, both)[1].pressures.tolist() == [0.8, 0.7]
-    assert varied(path, {"patch 1.tension": 5.0})[1].tensions.tolist() == [5.0, 4.8]
+    assert varied(path, {"patch 1.tension": 5.0})[1].tensions.tolist() == [5.0, 6.0]  # its factor stays
+    assert varied(path, {"patch 1 below.tension": 5.0})[1].tensions.tolist() == [4.0, 5.0]
 
 
 def test_lines_and_points_are_shifted_as_they_are(roof):
