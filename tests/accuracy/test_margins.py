@@ -56,6 +56,7 @@ def test_the_heaviest_long_strip():
     assert "symmetric in" in found.detail
 
 
+@pytest.mark.nightly
 def test_the_heaviest_rope():
     """z + τ/g = c cosh(x/c) from ±1 at z = 1 only where τ/g + 1 ≥ cosh(t)/t."""
     rope = solve(hanging(8)).surface

@@ -77,6 +77,7 @@ def test_a_project_asks_for_margins(roof, capsys):
     assert "times the tension of roof: then the roof inflates (fold" in lines[2]
 
 
+@pytest.mark.nightly
 def test_a_project_has_a_margin_as_a_target(roof):
     """Its start is not at rest, and has no margin."""
     target = """[targets]

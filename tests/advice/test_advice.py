@@ -67,6 +67,7 @@ def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, kind):
     assert outcome_of(tmp_path, typed(text, lines)).good
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
 def test_a_failed_target_keeps_the_diagnosis_of_a_plain_solve(tmp_path, capsys):
     text = WRONG["a wall too weak for its neighbours"]

@@ -228,6 +228,7 @@ def test_the_version(capsys):
     assert capsys.readouterr().out == f"pcmc {version('pcmc-surfaces')}\n"
 
 
+@pytest.mark.nightly
 def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
     given = ["sweep", "generators:two_squares", "alpha_aux=1,a,b", "n=2", "--workers", "1"]
     assert cli.main(given) == 1

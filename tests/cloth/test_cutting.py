@@ -90,6 +90,7 @@ def test_gores_of_a_sphere_are_the_closed_form():
     assert (orders(errors) > 1.9).all()
 
 
+@pytest.mark.nightly
 def test_a_sphere_is_cut_into_gores_along_drawn_seams():
     """A zone of a sphere, closed around its axis, falls into gores that are alike."""
     n, X = 12, on_sphere(np.arange(48) * 2.0 * np.pi / 48, np.linspace(-1.0, 1.0, 25))
@@ -128,6 +129,7 @@ def test_the_table_of_seams_has_both_ends_of_each():
     assert ends == pytest.approx(np.array([seam.points[[0, -1]].ravel() for seam in pattern.seams]))
 
 
+@pytest.mark.nightly
 def test_the_strain_of_strips_is_of_order_two_in_their_width():
     strains = [cutting_pattern(cap(), strips=count).table["strain_rms"].max() for count in (4, 8)]
     assert orders(strains) == pytest.approx(2.0, abs=0.3)

@@ -29,6 +29,7 @@ def sewn(count, part=1.0):
     return surface, cloth_forces(surface, part * cut, stiffness), alpha, stiffness
 
 
+@pytest.mark.nightly
 def test_the_cloth_of_a_sewn_roof_carries_about_its_tension():
     surface, forces, alpha, stiffness = sewn(6)
     assert len(np.unique(surface.topology.boundary_edge)) == 2

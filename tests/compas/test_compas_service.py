@@ -26,6 +26,7 @@ rooms = pytest.importorskip("pcmc.compas")
 from compas import rpc as compas_rpc  # noqa: E402
 from compas.datastructures import Mesh  # noqa: E402
 
+from pcmc.base.compiled import KEPT_IN  # noqa: E402
 from pcmc.compas.__main__ import command as service_main  # noqa: E402
 from pcmc.compas.server import set_up, settings_path  # noqa: E402
 
@@ -38,6 +39,7 @@ def service(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HOME", str(home))
         patch.setenv("USERPROFILE", str(home))
+        patch.setenv("NUMBA_CACHE_DIR", str(Path(KEPT_IN).parent))  # or all is compiled anew
         path = set_up(folder)
         arguments = json.loads(path.read_text())["proxy"]
         command = [sys.executable, "-m", arguments["service"], "--port", str(arguments["port"])]

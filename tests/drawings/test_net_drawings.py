@@ -6,6 +6,7 @@ import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
+from nightly import at_night
 
 import pcmc
 from pcmc.base.units import Units
@@ -36,7 +37,7 @@ def _area(outline):
     return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("mm", 1000.0)])
+@pytest.mark.parametrize(("unit", "factor"), [*at_night(("m", 1.0)), ("mm", 1000.0)])
 def test_each_file_of_the_command_has_the_panels_at_true_size(file, tmp_path, unit, factor, capfd):
     names = ["n.csv", "n.obj", "n.dxf", "n.svg", "n.pdf"]
     outputs = [word for name in names for word in ("-o", str(tmp_path / name))]

@@ -79,6 +79,7 @@ def catenoids(edge):
     return find_equilibria(film, apart, starts=0)
 
 
+@pytest.mark.nightly
 def test_the_wide_catenoid_breaks_over_the_deep_one():
     """The deep one gets new triangles: with those of the wide one its energy does not come nearer."""
     pytest.importorskip("mmgpy")

@@ -59,6 +59,7 @@ def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
     assert page.complaints() == []
 
 
+@pytest.mark.nightly
 def test_dragging_a_slider_with_the_mouse_is_one_step(page):
     from selenium.webdriver import ActionChains
 
@@ -101,6 +102,7 @@ def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(
         running.close()
 
 
+@pytest.mark.nightly
 def test_a_saddle_is_named_and_its_motion_shown(driver):
     running = explore.start(four_fans(rings=5, alpha_aux=6.0))
     try:
@@ -172,6 +174,7 @@ vary = ["west", "east", {patch = "east", kind = "pressure", low = 0.5, high = 2.
 """
 
 
+@pytest.mark.nightly
 def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT)

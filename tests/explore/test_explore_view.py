@@ -127,6 +127,7 @@ def test_colours_come_with_their_scale(page):
     assert page.complaints() == []
 
 
+@pytest.mark.nightly
 def test_many_families_of_panels_are_coloured_by_how_many_are_alike(page, explorer):
     family = family_of_face(explorer.start.surface)
     sizes = np.bincount(family[np.isfinite(family)].astype(int))[1:]
@@ -161,6 +162,7 @@ def test_few_families_of_panels_have_a_colour_each(driver):
         running.close()
 
 
+@pytest.mark.nightly
 def test_the_view_turns_by_keys_mouse_and_fingers(page):
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -243,6 +245,7 @@ def small_screen(page, width=400, height=800):
         page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+@pytest.mark.nightly
 def test_a_wide_page_never_scrolls_its_header_away(page):
     page.find("#variants button[type=submit]").click()
     page.idle()
@@ -262,6 +265,7 @@ def test_a_wide_page_never_scrolls_its_header_away(page):
     assert top == 0
 
 
+@pytest.mark.nightly
 def test_on_a_small_screen_half_is_left_for_the_values_and_nothing_lies_over_the_roof(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(HALL_TOML)
@@ -306,6 +310,7 @@ def test_on_a_small_screen_the_verdict_stays_in_view(page):
         page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+@pytest.mark.nightly
 def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path):
     running = browser(tmp_path, "--disable-3d-apis")
     try:
@@ -362,6 +367,7 @@ def test_points_are_measured_by_mouse_and_keys_and_a_section_follows_its_slider(
     running.close()
 
 
+@pytest.mark.nightly
 def test_colours_are_light_or_dark_as_the_system_or_the_user_wants(page):
     def ground():
         page.idle()

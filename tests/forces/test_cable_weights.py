@@ -132,6 +132,7 @@ def heavy_rope():
     return solve(surface).surface
 
 
+@pytest.mark.nightly
 def test_a_margin_ends_where_a_cable_is_compressed():
     found = pcmc.margin(heavy_rope(), "cable")
     assert found.ends_by is pcmc.accuracy.MarginEnd.COMPRESSION

@@ -145,6 +145,7 @@ def test_kelvins_foam():
     assert (4.0 * areas[2] - areas[1]) / 3.0 == pytest.approx(5.3063, abs=1e-4)
 
 
+@pytest.mark.nightly
 def test_the_foam_of_weaire_and_phelan():
     """5.288 (Weaire and Phelan 1994); six bubbles of one pressure, and two of a higher one."""
     areas = []

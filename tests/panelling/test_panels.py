@@ -314,6 +314,7 @@ def test_the_command_writes_schedule_surface_and_picture(tmp_path, squares, caps
     assert np.array_equal(written, again.panels[["a", "b", "c"]].to_numpy())
 
 
+@pytest.mark.nightly
 def test_the_curve_of_families_against_change_of_shape_has_its_costs(tmp_path, squares, capsys):
     fewer = pcmc.fewer_families(squares, 0.01, 0.02)
     assert fewer.steps.iloc[0].tolist() == [fewer.before.count, 0.0]

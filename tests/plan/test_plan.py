@@ -296,6 +296,7 @@ def test_heights_in_closed_form():
     np.testing.assert_allclose(base, mesh.points[:, 0] * 2 + 1, atol=1e-12)
 
 
+@pytest.mark.nightly
 def test_twenty_thousand_triangles():
     surface = plan_from({**tomllib.loads(L_WITH_COURTYARD), "edge_length": 0.2}).surface()
     assert surface.m > 20_000

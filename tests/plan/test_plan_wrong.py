@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from nightly import at_night
 from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
@@ -175,7 +176,7 @@ def test_a_hole_keeps_its_name_however_often_the_plan_is_changed():
     assert [hole.name for hole in plan.holes] == ["hole 'court'"]
 
 
-@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("closed", [*at_night(False), True])
 def test_a_line_with_loops_is_refused_where_it_crosses_itself(closed):
     turn = np.linspace(0.0, 34.0 * np.pi, 20_000)
     radius = 5.0 + 2.0 * np.sin(2.37 * turn)
@@ -198,7 +199,7 @@ def comb(dividers):
     return Plan(BOX, [[[x, 0], [x, 12]] for x in places], tension=5.0, edge_length=4.0)
 
 
-@pytest.mark.parametrize(("plan", "few"), [(star, 2000), (comb, 50)])
+@pytest.mark.parametrize(("plan", "few"), [(star, 2000), *at_night((comb, 50))])
 def test_the_cost_of_a_plan_grows_as_its_lines_do(plan, few):
     """Four times as many lines take at most 8 times the work; 16 times if each is compared with each."""
 

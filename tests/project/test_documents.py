@@ -8,6 +8,7 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
+from nightly import at_night
 from PIL import Image
 from printed import words_of
 from refusals import refused
@@ -218,7 +219,7 @@ def test_remesh_writes_no_documents(tmp_path, monkeypatch):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fine.pcmc", "roof.toml"]
 
 
-@pytest.mark.parametrize("command", ["solve", "report", "draw", "structure"])
+@pytest.mark.parametrize("command", ["solve", *at_night("report", "draw", "structure")])
 def test_documents_of_a_symmetric_roof_show_the_whole(tmp_path, monkeypatch, command):
     """The plan is one half; the drawing has all of its triangles, the report its full width."""
     import ezdxf

@@ -243,6 +243,7 @@ def test_masts_have_their_reactions(tmp_path):
     assert "weight," in text
 
 
+@pytest.mark.nightly
 def test_names_as_long_and_odd_as_they_may_be_are_laid_out(tmp_path, caps):
     """Names that do not fit a column are broken; none is markup or mathematics."""
     names = ["W" * 100, "$\\frac{$ </b> & %s", "x" * 50 + " " + "y" * 49]

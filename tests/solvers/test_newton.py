@@ -62,7 +62,7 @@ FINER = {
     "joined caps": (partial(joined_caps, 1.0), 2, 0),
     "joined caps with a weak wall": (partial(joined_caps, 1.0, **SADDLE_CAPS), 2, 1),
 }
-SHORT = ("cap", "Fig. 4", "Example 1, wall 3", "Example 2")
+SHORT = ("cap", "Example 1, wall 3")
 
 
 def marked(names, large):

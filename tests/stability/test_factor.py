@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from motion_cases import SURFACES
+from nightly import at_night
 from refusals import refused
 from scipy.sparse import csr_array
 
@@ -149,7 +150,7 @@ def test_a_matrix_without_rows(backend):
 
 
 @every_backend
-@pytest.mark.parametrize("used", [False, True])
+@pytest.mark.parametrize("used", [*at_night(False), True])
 def test_memory_is_given_back_with_the_factoriser(backend, used, monkeypatch):
     pattern, data = upper(np.eye(50))
     released = []

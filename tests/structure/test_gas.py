@@ -18,6 +18,7 @@ from pcmc.structure.loads import in_the_open
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
+@pytest.mark.nightly
 @needs_ccx
 def test_enclosed_gas_gives_way_as_the_volume_does():
     """(p_a + p) V = const with ΔV = A w of the sphere: p falls by q κ / (1 + κ), κ = (p_a + p) A / (k V)."""

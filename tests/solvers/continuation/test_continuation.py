@@ -26,6 +26,7 @@ def caps():
 # ------------------------------------------------------------------------------ the cap's fold
 
 
+@pytest.mark.nightly
 def test_cap_folds_at_the_hemisphere_with_second_order(caps):
     for branch in caps:
         assert branch.ending is Ending.REACHED

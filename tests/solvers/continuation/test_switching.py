@@ -46,6 +46,7 @@ def catenoids():
     return [follow(start, BoundaryMotion(rings(start), 0.5), step=0.05, folds=1) for start in starts]
 
 
+@pytest.mark.nightly
 def test_catenoids_fold_at_the_widest_distance_with_second_order(catenoids):
     assert [branch.ending for branch in catenoids] == [Ending.FOLDS] * 3
     error = np.array([branch.folds.parameter[0] for branch in catenoids]) - catenoid_fold()
