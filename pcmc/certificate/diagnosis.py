@@ -186,7 +186,11 @@ def vanished_films(surface: Surface) -> list[str]:
     names = []
     for patch in np.flatnonzero(area < NARROW * area.max()):
         strip = strip_of(surface, int(patch))
-        if strip and area[patch] < NARROW * area[list(strip.sheets)].min() and strip.width < strip.height:
+        if (
+            strip
+            and area[patch] < NARROW * area[list(strip.sheets)].min()
+            and strip.width < 2.0 * strip.height
+        ):
             names.append(surface.patches[patch].name)
     return names
 

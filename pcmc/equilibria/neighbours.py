@@ -14,6 +14,7 @@ from ..meshing.strips import strip_of
 from ..solvers import solve
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
+from ..surface.parts import listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def swap_neighbours(
     expect_surface(surface)
     names = [patches] if isinstance(patches, str) else patches or vanished_films(surface)
     if not names:
-        known = ", ".join(patch.name for patch in surface.patches)
+        known = listed([patch.name for patch in surface.patches])
         text = f"no film between two junctions has vanished; name the one to swap: patches=..., of {known}"
         raise SurfaceError(text, what="patches")
     changed, sentences = surface, []

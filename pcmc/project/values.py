@@ -16,7 +16,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
-from ..surface.values import KINDS, all_values
+from ..surface.values import KINDS, all_values, sheets_below
 from .file import Project, project_of
 from .start import surface_of
 
@@ -33,9 +33,11 @@ Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
     """The values of a surface that can be changed, by kind and name; points are [x, y, z].
 
-    Not those that follow from others: pressures around rooms of given volume and of walls, snow of walls.
+    Not those that follow from others: pressures around rooms of given volume, of walls and of the lower
+    sheets of cushions, snow of walls.
     """
     computed = _names(surface, surface.room_signs.any(axis=0) | surface.walls)
+    computed |= {*sheets_below(surface).values()}
     points = surface.vertices[single_points(surface)].tolist()
     return {
         **(values := all_values(surface)),
@@ -204,8 +206,15 @@ class _Writer(NamedTuple):
                 self.plan[key] = _with_point(self.plan[key], old, [_number(x) for x in new.tolist()], key)
 
     def write_patches(self, key: str, wanted: Mapping[str, float], shared: bool) -> None:
-        """Values of patches, in the table of each or in that of the plan."""
-        plan, patches = self.plan, [p for p in self.asked.patches if not p.wall]
+        """Values of patches, in the table of each or in that of the plan; of lower sheets by the factor."""
+        plan, lower = self.plan, sheets_below(self.asked) if "cushion" in self.plan else {}
+        patches = [p for p in self.asked.patches if not p.wall and p.name not in lower.values()]
+        if key == "tension" and lower:
+            tensions = {p.name: p.tension for p in self.asked.patches}
+            plan["cushion"] = _number(tensions[lower[patches[0].name]] / tensions[patches[0].name])
+        wanted = {name: value for name, value in wanted.items() if name not in lower.values()}
+        if not wanted:
+            return
         whole = "drawing" not in plan and not plan.get("patches")  # the plan has one value for all patches
         if shared and (whole or key in plan) and len({getattr(p, key) for p in patches}) == 1:
             if key == "tension" and key not in plan:

@@ -23,7 +23,7 @@ from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .images import Imaged, check_translations
 from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs, summary
-from .values import part_index, wall_patches, with_values
+from .values import part_index, sheets_below, wall_patches, with_values
 
 
 def _of_patches(field: str) -> cached_property[Any]:
@@ -334,7 +334,8 @@ class Surface(supports.Supported, Imaged):
         Parameters
         ----------
         snow : s, force per area of the plan; Π's normal points up.
-        patches : names of the patches that it lies on; by default all that are no walls, or all if all are.
+        patches : names of the patches that it lies on; by default all that are no walls and no lower sheets
+            of cushions, or all if there are no others.
 
         Raises
         ------
@@ -348,7 +349,8 @@ class Surface(supports.Supported, Imaged):
         """
         snow = validate.number("snow", snow, error=SurfaceError)
         every = [patch.name for patch in self.patches]
-        roof = [name for name, wall in zip(every, self.walls.tolist(), strict=True) if not wall]
+        shelter = {*sheets_below(self).values(), *(every[k] for k in np.flatnonzero(self.walls))}
+        roof = [name for name in every if name not in shelter]
         names = list(patches) if patches is not None else roof or every
         snows = {patch.name: patch.snow for patch in self.patches} | dict.fromkeys(names, snow)
         return self.retensioned(snows=snows).with_held_snow()

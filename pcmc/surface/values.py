@@ -118,26 +118,30 @@ def rates_of(surface: Any, kind: str, by_name: Mapping[str, float]) -> Floats:
     return rates + wall_changes(surface, rates, named) if kind in ("pressures", "snows") else rates
 
 
+def sheets_below(surface: Any) -> dict[str, str]:
+    """The lower sheet of each cushion by the name of the upper one, which has the same pressure."""
+    patches = {patch.name: patch for patch in surface.patches}
+    pairs = ((patch, patches.get(f"{patch.name}{BELOW}")) for patch in surface.patches)
+    return {p.name: q.name for p, q in pairs if q is not None and p.pressure == q.pressure != 0.0}
+
+
 def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, float]:
     """Pressures, or their rates, by patch: what is given for one sheet of a cushion alone is that of both."""
-    present = {patch.name: patch.pressure for patch in surface.patches}
     both = dict(pressures)
-    for name, value in pressures.items():
-        other = name.removesuffix(BELOW) if name.endswith(BELOW) else f"{name}{BELOW}"
-        if name in present and present.get(other) == present[name]:
-            both.setdefault(other, value)
+    for above, below in sheets_below(surface).items():
+        for name, other in (above, below), (below, above):
+            if name in pressures:
+                both.setdefault(other, pressures[name])
     return both
 
 
 def with_sheets_below(surface: Any, tensions: Mapping[str, float]) -> dict[str, float]:
     """Tensions, or their rates, by patch: a cushion's lower sheet that is not named keeps its factor."""
-    patches = {patch.name: patch for patch in surface.patches}
+    present = {patch.name: patch.tension for patch in surface.patches}
     both = dict(tensions)
-    for name, value in tensions.items():
-        above, below = patches.get(name), patches.get(f"{name}{BELOW}")
-        one = above and below and above.pressure == below.pressure != 0.0 < above.tension
-        if one and isinstance(value, Real):
-            both.setdefault(below.name, value * below.tension / above.tension)
+    for above, below in sheets_below(surface).items():
+        if present[above] > 0.0 and isinstance(value := tensions.get(above), Real):
+            both.setdefault(below, value * present[below] / present[above])
     return both
 
 

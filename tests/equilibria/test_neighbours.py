@@ -5,6 +5,7 @@ import pytest
 from periodic_cases import honeycomb, honeycomb_energy, scattered, steiner_films
 
 import pcmc
+from generators.cells import _foam
 from pcmc.meshing.elevation import elevate
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.neighbour_swap import swap
@@ -40,6 +41,41 @@ def test_the_seam_of_the_cell_may_be_anywhere() -> None:
     held = films.rebuilt(fixed=np.isclose(np.abs(films.vertices[:, :2]), 0.5).all(axis=1))
     swapped = pcmc.swap_neighbours(held, "middle")
     assert swapped.result.energy == pytest.approx(1.0 + 3**0.5, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_turned_and_renumbered_films_with_patches_turned_over(seed: int) -> None:
+    films, rng = steiner_films(0.5, 1.0), np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    order, rows = rng.permutation(films.n), rng.permutation(films.m)
+    faces = np.argsort(order)[films.faces]
+    over = (rng.random(5) < 0.5)[films.patch_of_face]
+    faces = np.where(over[:, None], faces[:, ::-1], faces)[rows]
+    X = (films.vertices @ turn.T + rng.normal(size=3))[order]
+    images, parts = pcmc.images_in(X, [turn[:, 2]]), (films.patch_of_face[rows], films.patches)
+    other = pcmc.Surface(X, faces, *parts, fixed=films.fixed[order], images=images)
+    swapped = pcmc.swap_neighbours(pcmc.solve(other).surface)
+    assert swapped.result.energy == pytest.approx(1.0 + 0.5 * 3**0.5, abs=1e-12)
+
+
+def cone(width: float, depth: float) -> pcmc.Surface:
+    """The same films from the origin, where all end, up to a plate that they slide on."""
+    films = between_plates(steiner_films(width, depth))
+    X, height = films.vertices.copy(), films.vertices[:, 2]
+    X[:, :2] *= height[:, None]
+    number = np.where(height == 0.0, 0, np.arange(films.n))
+    faces = number[films.faces]
+    left = (faces[:, [1, 2, 0]] != faces).all(axis=1)
+    used, faces = np.unique(faces[left], return_inverse=True)
+    parts = films.patch_of_face[left], films.patches
+    fixed, (top, on_top) = (films.fixed | (height == 0.0))[used], films.on_planes[0]
+    return pcmc.Surface(X[used], faces.reshape(-1, 3), *parts, fixed, on_planes={top: on_top[used]})
+
+
+def test_a_film_whose_junctions_have_an_end_in_common() -> None:
+    swapped = pcmc.swap_neighbours(cone(0.5, 1.0), "middle")
+    assert swapped.kept
+    assert swapped.result.energy == pytest.approx(pcmc.solve(cone(1.0, 0.5)).energy, rel=1e-3)
 
 
 def test_junctions_with_different_numbers_of_vertices() -> None:
@@ -87,6 +123,19 @@ def test_a_honeycomb_sheared_on_becomes_that_of_the_next_lattice(shear: float) -
     assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.75**0.5, rel=1e-9)
 
 
+def test_kelvins_foam_stretched_until_its_squares_vanish() -> None:
+    sides = np.array([1.35, 0.9, 1.0 / (1.35 * 0.9)])
+    cube = _foam(np.array([[0.0, 0.0, 0.0], [0.5, 0.5, 0.5]]), np.eye(3), 1, 1.0, 1.0)
+    X = cube.vertices * sides
+    vanished = pcmc.solve(cube.rebuilt(vertices=X, images=pcmc.images_in(X, np.diag(sides))))
+    assert "and 1 more may vanish" in vanished.certificate.detail
+    swapped = pcmc.swap_neighbours(vanished.surface)
+    assert swapped.kept
+    assert swapped.result.certificate.index == 0
+    assert swapped.result.energy < vanished.energy - 0.005
+    assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.5, rel=1e-9)
+
+
 def roof(width: float, depth: float, **pressures: float) -> pcmc.Surface:
     """Four rooms below a raised rim; the wall "middle" along x is between those in south and north."""
     x, y = 0.5 * width, 0.5 * depth
@@ -124,6 +173,9 @@ def test_below_a_roof_two_rooms_become_neighbours() -> None:
     assert str(swapped).startswith(f"'{west}' and '{east}' now meet; E = ")
     assert swapped.result.certificate.verdict is pcmc.Verdict.STABLE
     assert swapped.surface.walls.tolist() == start.walls.tolist()
+    wall = swapped.surface.patch_index("middle")
+    (ridge,) = (c for c in swapped.surface.topology.junctions if wall in c.sheets and min(c.sheets) < 4)
+    assert len(ridge.vertices) > 3  # several columns of triangles, so that it can bend
     other = pcmc.solve(roof(6.0, 3.2))  # turned by 90°, on a mesh of its own
     assert swapped.result.energy == pytest.approx(other.energy, rel=2e-3)
     assert swapped.result.energy < vanished.energy
