@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -13,13 +14,14 @@ import numpy as np
 from ..advice.rises import first_tension
 from ..base import validate
 from ..base.arrays import Bools
-from ..base.errors import OptionError, PlanError
+from ..base.errors import FileWarning, OptionError, PlanError
 from ..base.files import PathLike
 from ..base.units import NO_UNITS, Units
 from ..io import read_bare
 from ..io.mesh_data import MeshData
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.pieces import point_text
 from .checking import in_file
 from .file import Project, load
 from .outcome import Outcome
@@ -117,6 +119,9 @@ def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
         if len(line) == 1:
             away = np.linalg.norm(X - line[0], axis=1)
             found = (away == away.min()) & (away.min() <= reach)
+            if NEAR * surface.size < away.min() <= reach:
+                text = f"mesh.supports: number {number} is {away.min():.3g} from the nearest vertex, at"
+                warnings.warn(f"{text} {point_text(X[found][0])}, which is fixed", FileWarning, stacklevel=4)
         else:
             away = np.full(surface.n, np.inf)
             for a, b in pairwise(line):

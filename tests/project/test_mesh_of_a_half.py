@@ -3,8 +3,9 @@
 import pytest
 
 import pcmc
+from pcmc.base.errors import FileWarning
 from pcmc.plan import Plan
-from pcmc.project import designed
+from pcmc.project import build, designed
 
 SIDES = "[[[6, 0, 0], [0, 0, 0], [0, 9, 0], [6, 9, 0]]]"
 
@@ -20,3 +21,16 @@ def test_supports_of_a_project_leave_the_mirror_plane_of_its_mesh(tmp_path, supp
     assert roof.good
     assert len(roof.surface.on_planes) == 1
     assert roof.surface.vertices[:, 2].max() == pytest.approx(plain.surface.vertices[:, 2].max(), rel=1e-6)
+
+
+def test_a_point_beside_the_nearest_vertex_is_told(tmp_path):
+    pcmc.write(
+        tmp_path / "sail.obj", Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=3.0, pressure=0.0).surface()
+    )
+    path = tmp_path / "roof.toml"
+    path.write_text('[mesh]\nfile = "sail.obj"\nsupports = [[0.2, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]]\n')
+    with pytest.warns(
+        FileWarning, match="number 1 is 0.2 from the nearest vertex, at .*, which is fixed"
+    ) as told:
+        assert build(path).fixed.sum() == 4
+    assert len(told) == 1
