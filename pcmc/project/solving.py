@@ -20,7 +20,7 @@ from ..plan import Plan
 from ..solvers import solve, solve_once
 from ..solvers.result import Progress, Result, Status
 from ..structure.calculix import expect_program
-from ..surface import Surface
+from ..surface import Surface, mirrored
 from . import cache
 from .checking import in_file
 from .file import Project, load
@@ -215,8 +215,11 @@ def _check_wishes(project: Project, surface: Surface) -> None:
     """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
     with in_file(project.path):
         structure, output = project.structure, project.output
+        if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
+            text = "the roof has no mirror planes, so it is the whole already; leave out whole"
+            raise OptionError(f"{text}, or give the plan mirrors", what="whole")
         if structure is not None and (output.structure is not None or structure.run):
-            structure.check(surface, project.plan)
+            structure.check(mirrored(surface) if output.whole else surface, project.plan)
         if structure is not None and structure.run and (output.structure or output.report):
             expect_program()
         if project.pattern is not None and (output.pattern or output.report):
@@ -226,9 +229,6 @@ def _check_wishes(project: Project, surface: Surface) -> None:
 
             for what in project.margin:
                 Varied.of(surface, what)
-        if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
-            text = "the roof has no mirror planes, so it is the whole already; leave out whole"
-            raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     pinchable = standing_part(surface).walls.pinchable
     if imbalance := unbalanced(surface, pinchable):
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
