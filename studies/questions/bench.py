@@ -30,6 +30,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,13 +49,14 @@ from pcmc.solvers.result import Progress
 from pcmc.stability.equilibrium import Equilibrium
 from pcmc.surface.supports import apply_supports
 
+from ..benchmarks.run import machine
 from ..folder import Folder
 from ..reference import evolver, kratos
 from ..study import Study
 from .bench_cases import CASES, Case
 
-LIMIT, LONGEST = 60.0, 150.0  # seconds: of a run, and of one that cannot be stopped at that
-FAR = 1e6  # beyond this a surface has run away
+LIMIT, LONGEST = 60.0, 100.0  # seconds: of a run, and of one that cannot be stopped at that
+FAR = 1e3  # beyond this a surface has run away
 REST, NEAR = 1e-6, 1e-4  # relative residual of a surface at rest, and near it; pcmc asks for 1e-8
 NEWTON = "hessian_normal on\n" + "hessian_seek\n" * 10 + "hessian\n" * 4
 SCRIPTS = f"U\ng 200\nU\n{NEWTON}", f"g 20\n{NEWTON}"
@@ -144,7 +146,8 @@ def surface_evolver(surface: Surface) -> End:
     end = End(np.nan, None, "")
     for script in SCRIPTS:
         end = _evolved(surface, script)
-        if end.surface is not None and certify(end.surface, modes=0).residual <= REST:
+        at_rest = end.surface is not None and certify(end.surface, modes=0).residual <= REST
+        if at_rest or "did not finish" in end.said:
             break
     return end
 
@@ -245,8 +248,24 @@ def data(folder: Folder, short: bool) -> None:
                 rows.append([name, start.m, program, end.seconds, left, value, error, end.said[:160]])
                 if not (left <= NEAR and end.seconds <= LIMIT):
                     asked.remove(program)
+    programs = pd.DataFrame(versions().items(), columns=["program", "version"])
+    folder.write_table("programs_times", programs)
     columns = ["case", "triangles", "program", "seconds", "residual", "energy", "error", "said"]
     folder.write_table("runs_times", pd.DataFrame(rows, columns=columns))
+
+
+def versions() -> dict[str, str]:
+    """What ran, and on which machine."""
+    apart = {"jax_fdm": (FDM_PYTHON, "jax_fdm"), "Kratos": (kratos.PYTHON, "KratosMultiphysics")}
+    found = {"machine": machine(), "Surface Evolver": evolver.version()}
+    for name, library in (("NLopt L-BFGS", "nlopt"), ("scipy L-BFGS", "scipy")):
+        found[name] = f"{library} {metadata.version(library)}"
+    for name, (variable, library) in apart.items():
+        ask = f"from importlib.metadata import version; print(version({library!r}))"
+        command = [os.environ.get(variable, sys.executable), "-c", ask]
+        done = subprocess.run(command, capture_output=True, text=True)
+        found[name] = f"{library} {done.stdout.strip()}" if done.returncode == 0 else "not installed"
+    return found
 
 
 def held_energy(surface: Surface) -> float:
@@ -272,7 +291,7 @@ def figure(folder: Folder) -> None:
     cases = [name for name, case in CASES.items() if case.exists]
     canvas = new(1200, 640)
     for k, case in enumerate(cases, 1):
-        axes = style(canvas.add_subplot(2, (len(cases) + 1) // 2, k))
+        axes = style(canvas.add_subplot(len(cases) // 4, 4, k))
         for number, program in enumerate(PROGRAMS):
             mine = runs[(runs.case == case) & (runs.program == program) & runs.seconds.notna()]
             if mine.empty:
@@ -293,7 +312,8 @@ def figure(folder: Folder) -> None:
                 )
         axes.set(xscale="log", yscale="log")
         axes.set_xlabel("triangles", fontsize=SMALL)
-        axes.set_ylabel("seconds", fontsize=SMALL)
+        if k % 4 == 1:
+            axes.set_ylabel("seconds", fontsize=SMALL)
         axes.set_title(case, fontsize=SMALL)
     canvas.axes[0].plot(
         [], [], "o", markersize=5, color="black", markerfacecolor="white", label="not at rest"

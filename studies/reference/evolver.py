@@ -31,6 +31,16 @@ def available() -> bool:
     return shutil.which(PROGRAM) is not None
 
 
+def version() -> str:
+    """What the program calls itself, or that it is not installed."""
+    if not available():
+        return "not installed"
+    done = subprocess.run(
+        [PROGRAM, "-V"], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60
+    )
+    return (done.stdout.strip() or "unknown").splitlines()[0]
+
+
 def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0, upright: bool = False) -> str:
     """What the program prints for commands (one or more lines) given on the surface.
 

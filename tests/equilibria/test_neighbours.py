@@ -43,6 +43,41 @@ def test_the_seam_of_the_cell_may_be_anywhere() -> None:
     assert swapped.result.energy == pytest.approx(1.0 + 3**0.5, abs=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_turned_and_renumbered_films_with_patches_turned_over(seed: int) -> None:
+    films, rng = steiner_films(0.5, 1.0), np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    order, rows = rng.permutation(films.n), rng.permutation(films.m)
+    faces = np.argsort(order)[films.faces]
+    over = (rng.random(5) < 0.5)[films.patch_of_face]
+    faces = np.where(over[:, None], faces[:, ::-1], faces)[rows]
+    X = (films.vertices @ turn.T + rng.normal(size=3))[order]
+    images, parts = pcmc.images_in(X, [turn[:, 2]]), (films.patch_of_face[rows], films.patches)
+    other = pcmc.Surface(X, faces, *parts, fixed=films.fixed[order], images=images)
+    swapped = pcmc.swap_neighbours(pcmc.solve(other).surface)
+    assert swapped.result.energy == pytest.approx(1.0 + 0.5 * 3**0.5, abs=1e-12)
+
+
+def cone(width: float, depth: float) -> pcmc.Surface:
+    """The same films from the origin, where all end, up to a plate that they slide on."""
+    films = between_plates(steiner_films(width, depth))
+    X, height = films.vertices.copy(), films.vertices[:, 2]
+    X[:, :2] *= height[:, None]
+    number = np.where(height == 0.0, 0, np.arange(films.n))
+    faces = number[films.faces]
+    left = (faces[:, [1, 2, 0]] != faces).all(axis=1)
+    used, faces = np.unique(faces[left], return_inverse=True)
+    parts = films.patch_of_face[left], films.patches
+    fixed, (top, on_top) = (films.fixed | (height == 0.0))[used], films.on_planes[0]
+    return pcmc.Surface(X[used], faces.reshape(-1, 3), *parts, fixed, on_planes={top: on_top[used]})
+
+
+def test_a_film_whose_junctions_have_an_end_in_common() -> None:
+    swapped = pcmc.swap_neighbours(cone(0.5, 1.0), "middle")
+    assert swapped.kept
+    assert swapped.result.energy == pytest.approx(pcmc.solve(cone(1.0, 0.5)).energy, rel=1e-3)
+
+
 def test_junctions_with_different_numbers_of_vertices() -> None:
     films = pcmc.solve(between_plates(steiner_films(0.5, 1.0))).surface
     finer = refine_faces(films, films.patch_faces([2, 3]))

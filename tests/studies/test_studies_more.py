@@ -345,7 +345,7 @@ def test_a_program_that_moves_vertices_alone_gets_the_pressure_that_leaves_the_l
     rest = bench.newton(start).surface
     assert certify(bench.ended(start, rest.vertices), modes=0).residual < 1e-9
     assert certify(start.moved(rest.vertices), modes=0).residual > 0.1
-    assert bench.ended(start, 1e9 * rest.vertices) is None
+    assert bench.ended(start, 1e4 * rest.vertices) is None
 
 
 def test_the_form_finding_of_kratos_gets_the_tensions_the_pressures_and_the_supports(monkeypatch):
