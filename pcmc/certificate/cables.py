@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -19,19 +20,46 @@ from .forces import cable_parts
 from .proof import WeakCable
 
 
-def chord(surface: Surface, of: str) -> tuple[Ints, Floats, Floats]:
-    """The vertices (k,) of a cable, its two ends last, which share of the chord between these they are at,
-    and how far out from it (k,3). OptionError for a cable that is closed, branched or in several parts.
+class Chord(NamedTuple):
+    """The straight line between the two ends of a cable, and where its vertices are beside it."""
+
+    vertices: Ints  # (k,) of the cable, its two ends last
+    ends: Ints  # (2,) of the chord; twice the same vertex for a vertex and its mirror image
+    share: Floats  # (k,) of the chord that the vertices are at
+    out: Floats  # (k,3) from it to them
+    length: float
+
+
+def chord(surface: Surface, of: str) -> Chord:
+    """The chord of a cable. Where it ends in a mirror plane, in which nothing fixes it, it goes on behind, so
+    there its chord is that of the whole cable, from the other end to its image. OptionError for a cable that
+    is closed, branched or in several parts, or goes on behind mirror planes at both ends.
     """
     vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
-    if (count > 2).any() or (count == 1).sum() != 2:
+    order = np.asarray(vertices[np.argsort(count == 1, kind="stable")])
+    ends = _chord_ends(surface, order)
+    if (count > 2).any() or (count == 1).sum() != 2 or ends is None:
         message = f"sag of {of}: the cable is closed, branched or in several parts, so it has no chord"
         raise OptionError(f"{message}; give each span a cable of its own", what="of", found=of)
-    order = np.asarray(vertices[np.argsort(count == 1, kind="stable")])
-    X = surface.vertices[order]
-    across = X[-1] - X[-2]
-    share = (X - X[-2]) @ across / (across @ across)
-    return order, share, X - X[-2] - share[:, None] * across
+    numbers, (first, last) = ends
+    X, across = surface.vertices[order], last - first
+    share = (X - first) @ across / (across @ across)
+    return Chord(order, numbers, share, X - first - share[:, None] * across, float(np.linalg.norm(across)))
+
+
+def _chord_ends(surface: Surface, cable: Ints) -> tuple[Ints, Floats] | None:
+    """(2,) vertices and (2,3) places of the ends of a chord, from the vertices (k,) of a cable with its two
+    ends last; None if it goes on behind mirror planes at both."""
+    ends, found = cable[-2:], []
+    for end, other in (ends, ends[::-1]):
+        for plane, on in surface.on_planes:
+            if plane.mirror and on[end] and not on[cable].all() and not surface.pinned[end]:
+                place = surface.vertices[other]
+                image = place - 2.0 * plane.height(place) * np.array(plane.normal)
+                found.append((ends[ends == other].repeat(2), np.stack([place, image])))
+    if len(found) > 1:
+        return None
+    return found[0] if found else (ends, surface.vertices[ends])
 
 
 def too_long(surface: Surface) -> str:
@@ -42,7 +70,9 @@ def too_long(surface: Surface) -> str:
     for cable, curve in cable_parts(surface):
         if curve.closed or len(curve.sheets) != 1 or cable.weight:
             continue
-        chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
+        if (ends := _chord_ends(surface, np.roll(curve.vertices, -1))) is None:
+            continue
+        chord = float(np.linalg.norm(ends[1][1] - ends[1][0]))
         tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
         if chord * tension > widest:
             enough = two_digits(chord * tension, math.ceil)  # an arc of 60°, 0.13 of its chord high

@@ -234,14 +234,13 @@ def _sag(surface: Surface, of: str) -> Measurement:
     With the chord from a to b and x at the share s of it, the distance along the unit vector e changes by
     ⟨e, dx - (1 - s) da - s db⟩.
     """
-    order, share, out = chord(surface, of)
+    order, both, share, out, size = chord(surface, of)
     distance = np.linalg.norm(out, axis=1)
-    size = float(np.linalg.norm(np.diff(surface.vertices[order[-2:]], axis=0)))
     direction = out / np.where(distance > 0.0, distance, 1.0)[:, None]
 
     def branches(near: Ints) -> Branches:
         along, e = share[near][:, None], direction[near]
-        ends = np.tile(order[-2:], (len(near), 1))
+        ends = np.tile(both, (len(near), 1))
         slopes = np.stack([e, (along - 1.0) * e, -along * e], axis=1)
         return Branches.of(np.column_stack([order[near], ends]), slopes, surface.n)
 

@@ -139,7 +139,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         pull = float(pull_along(surface, cable, cable.edges.ravel()).max())
         add(cable.name, "cable", {"force": pull, "length": length})
         with suppress(OptionError):  # a closed cable has no sag
-            out = chord(surface, cable.name)[2]
+            out = chord(surface, cable.name).out
             add(cable.name, "cable", {"sag": float(np.linalg.norm(out, axis=1).max())})
     for room in surface.rooms:
         add(room.name, "room", {"volume": room.volume})

@@ -48,14 +48,11 @@ class Cutting:
         """The pattern of a project with these values."""
         values: dict[str, Any] = {} if own is None else dict(vars(own))
         given = {name: value for name, value in vars(self).items() if value not in (None, [])}
-        for one, other in (("width", "strips"), ("strips", "width")):
-            if one in given and other not in given:
-                values.pop(other, None)
-        for one, other in (("compensation", "stiffness"), ("stiffness", "compensation")):
-            if one in given:
-                given[one] = arguments.numbers(given[one], f"--{one}")
-                if other not in given:
-                    values.pop(other, None)
+        for pair in ({"width", "strips"}, {"compensation", "stiffness"}):  # one or the other
+            if len(pair & given.keys()) == 1:
+                values = {name: value for name, value in values.items() if name not in pair}
+        for name in {"compensation", "stiffness"} & given.keys():
+            given[name] = arguments.numbers(given[name], f"--{name}")
         if "seam" in given:
             lines = [arguments.numbers(text, "--seam") for text in given.pop("seam")]
             for line in lines:

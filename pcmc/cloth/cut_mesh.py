@@ -7,6 +7,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
@@ -168,31 +169,22 @@ class CutMesh:
 
         An inner vertex that the path passes closely is moved onto it, which spares triangles without width.
         """
-        X = self.X.copy()
-        fixed = np.zeros(len(X), dtype=bool)
-        fixed[self.topology.edges[self.cut_edge]] = True
-        nodes: list[int] = []
-        new: list[list[int]] = []
-        points: list[Floats] = []
+        X, fixed = self.X.copy(), self.topology.edges[self.cut_edge]
         nearest = np.where(share > 0.5, place[:, 1], place[:, 0])
         gap = np.minimum(share, 1.0 - share)
         met = np.unique(nearest[gap <= SNAP])  # both ends are among these
-        through = gap <= np.where(np.isin(nearest, met), BESIDE, SNAP)
-        for pair, vertex, meets, point in zip(place.tolist(), nearest.tolist(), through, path, strict=True):
-            if meets:
-                if not fixed[vertex]:
-                    X[vertex], fixed[vertex] = point, True
-            elif pair in new:
-                vertex = len(X) + new.index(pair)
-            else:
-                vertex = len(X) + len(new)
-                new.append(pair)
-                points.append(point)
-            if not nodes or nodes[-1] != vertex:
-                nodes.append(vertex)
+        crossed = gap > np.where(np.isin(nearest, met), BESIDE, SNAP)
+        passed, first = np.unique(nearest[~crossed], return_index=True)
+        loose = ~np.isin(passed, fixed)
+        X[passed[loose]] = path[~crossed][first[loose]]
+        new = pd.factorize(place[crossed] @ np.array([len(X), 1]))[0]  # edges by number, as they come
+        first = np.unique(new, return_index=True)[1]
+        nodes = nearest.copy()
+        nodes[crossed] = len(X) + new
+        nodes = nodes[np.append(True, np.diff(nodes) != 0)]
         mesh = replace(self, X=X)
-        if new:
-            mesh = mesh.with_points(np.array(new), np.array(points))
+        if len(first):
+            mesh = mesh.with_points(place[crossed][first], path[crossed][first])
         pairs = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1), axis=1)
         numbers = mesh.topology.edge_numbers(pairs)
         if (numbers < 0).any():

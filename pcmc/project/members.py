@@ -45,11 +45,8 @@ def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:
     """LostWarning that files leave out the members of the structural model; files that could have ``held``
     them, where they cannot be on what is shown."""
     if has_members(outcome) and not (held and members_drawn(outcome)):
-        why = (
-            "they are known for a part of the roof alone"
-            if held
-            else "a wall in whose place one stands is drawn"
-        )
+        why = "they are known for a part of the roof alone"
+        why = why if held else "a wall in whose place one stands is drawn"
         warnings.warn(f"{what}: members are left out; {why}", LostWarning, stacklevel=3)
 
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
-EXTENSIVE = ("area", "volume")  # targets of a part that are not those of the whole
+EXTENSIVE = ("area", "volume", "length")  # targets of a part that are not those of the whole
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 Finding = TypeVar("Finding")
 

@@ -193,7 +193,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     if project.drawing is not None or start.data is not None:
         notes += metres_note(project.output.files, start.units.length)
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
-        notes.append("targets of areas and volumes are those of the part between the mirror planes")
+        notes.append("targets of areas, volumes and lengths are those of the part between the mirror planes")
     about: dict[str, Any] = {"units": start.units, "unfold": start.unfold, "data": start.data}
     outcome = replace(solved, notes=notes, **about)
     if outcome.good:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.distance import pdist
 
 from ..base.arrays import Floats, Ints, cached_array, kept_with_owner
 from ..base.units import Units
@@ -48,10 +49,7 @@ class MemberForces:
     @property
     def span(self) -> float:
         """The distance of its ends, or of the two points farthest apart if it is closed."""
-        P = self.points
-        if not self.line.closed:
-            return float(np.linalg.norm(P[-1] - P[0]))
-        return float(max(np.linalg.norm(P - one, axis=1).max() for one in P))
+        return float(pdist(self.points if self.line.closed else self.points[[0, -1]]).max())
 
     @property
     def deflection(self) -> float:
@@ -143,28 +141,27 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
 
 def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
     """The beams of a model as a frame at X (n,3), and the vertices (k,) that its points are."""
-    pairs, vertices = np.concatenate([line.pairs for line in model.beams]), model.beam_vertices
+    pairs, vertices = [line.pairs for line in model.beams], model.beam_vertices
     place = np.full(len(X), -1)
     place[vertices] = np.arange(len(vertices))
-    stiffness = list[Floats]()
+    stiffness = list[list[float]]()
     for line in model.beams:
         material, profile = line.member.material, line.member.profile
-        up, across = profile.moments
-        E, G = material.young, material.young / (2.0 + 2.0 * material.poisson)
-        one = np.array([E * profile.area, E * up, E * across, G * profile.torsion])
-        stiffness.append(np.tile(one, (len(line.pairs), 1)))
+        E, (up, across) = material.young, profile.moments
+        G = E / (2.0 + 2.0 * material.poisson)
+        stiffness.append([E * profile.area, E * up, E * across, G * profile.torsion])
+    of_bars = np.repeat(np.array(stiffness), list(map(len, pairs)), axis=0)
     rows, turns = list[Floats](), held_turns(model, X)
     for v in vertices[model.held[vertices]].tolist():
-        freedom, axes = int(model.freedom[v]), model.axes[v]
-        stops = (axes, axes[1:], axes[:1])[freedom]
-        for shift, stopped in ((0, stops), (3, turns.get(v, ()))):
+        axes = model.axes[v]
+        for kind, stopped in enumerate(((axes, axes[1:], axes[:1])[model.freedom[v]], turns.get(v, ()))):
             for direction in stopped:
-                row = np.zeros(6 * len(vertices))
-                row[6 * place[v] + shift : 6 * place[v] + shift + 3] = direction
-                rows.append(row)
+                row = np.zeros((len(vertices), 2, 3))  # the displacement and the turn of each
+                row[place[v], kind] = direction
+                rows.append(row.ravel())
     holds = np.array(rows).reshape(-1, 6 * len(vertices))
     normal = np.array(model.surface.plane.normal)
-    return BarFrame(X[vertices], place[pairs], np.vstack(stiffness), holds, normal), vertices
+    return BarFrame(X[vertices], place[np.concatenate(pairs)], of_bars, holds, normal), vertices
 
 
 def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:

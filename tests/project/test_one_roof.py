@@ -134,7 +134,7 @@ def test_targets_of_a_half_say_that_they_are_the_half_s(folder):
     text = HALF + '[targets]\nmeet = [{quantity = "area", value = 27.0}]\nvary = ["roof"]\n'
     Path("half.toml").write_text(text + "[output]\nwhole = true\n", encoding="utf-8")
     notes = project.designed("half.toml").notes
-    assert "targets of areas and volumes are those of the part between the mirror planes" in notes
+    assert "targets of areas, volumes and lengths are those of the part between the mirror planes" in notes
 
 
 def test_no_command_writes_over_what_it_reads(folder, capsys):
