@@ -100,11 +100,14 @@ def panels_(
       pcmc panels roof.toml --pattern planar-quads --size 1.2 -o panels.csv -o panels.obj
     """
     seen, files = arguments.parsed_view(view), output or []
-    if pattern is not None or size is not None:
-        triangles = {"tolerance": tolerance, "change": change, "cost": cost, "walls": walls or None}
-        for name in (name for name, value in triangles.items() if value is not None):
-            text = f"--{name}: belongs to panels of triangles; leave it out, or --pattern and --size"
-            raise OptionError(text, what=f"--{name}")
+    triangles = {"tolerance": tolerance, "change": change, "cost": cost, "walls": walls or None}
+    triangles["mirror-images"] = mirror_images if mirror_images != "alike" else None
+    nets = {"units": units or None, "direction": direction or None, "sheet": sheet}
+    net = pattern is not None or size is not None
+    for name in (name for name, value in (triangles if net else nets).items() if value is not None):
+        mend = "triangles; leave it out, or" if net else "quads and hexagons; leave it out, or give"
+        raise OptionError(f"--{name}: belongs to panels of {mend} --pattern and --size", what=f"--{name}")
+    if net:
         if pattern is None or size is None:
             text = "--pattern: needs a --size, and --size a --pattern: planar-quads, quads or hexagons"
             raise OptionError(text, what="--size", expected="a length")

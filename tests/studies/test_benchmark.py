@@ -39,7 +39,7 @@ def small(monkeypatch):
     monkeypatch.setattr(solver, "QUICK", 4)
     monkeypatch.setattr(solver, "DESIGN", 3)
     monkeypatch.setattr(solver, "SCRIPT_STEPS", 1)
-    monkeypatch.setattr(scaling, "FEW", (3, 4, 6))
+    monkeypatch.setattr(scaling, "FEW", (4, 6, 8))
     monkeypatch.setattr(sweep, "FEW", (4.0,))
     monkeypatch.setattr(sweep, "SHORT", 2)
     monkeypatch.setattr(explore, "STEPS", 3)
