@@ -81,19 +81,30 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
     a unit is in ``mesh.units``, or the project's."""
     surface, data = read_bare(path.parent / mesh.file, units.length, mesh.units)
     changes: dict[str, Any] = {}
-    if mesh.patches or mesh.tension is not None:
-        for name in mesh.patches:
-            surface.patch_index(name)  # refuses one that is not there
-        common = {} if mesh.tension is None else {"tension": mesh.tension}
-        changes["patches"] = [
-            replace(p, **({} if p.auxiliary else common) | dict(mesh.patches.get(p.name, {})))
-            for p in surface.patches
-        ]
+    values: dict[str, dict[str, float]] = {kind: {} for kind in ("tensions", "pressures", "weights", "snows")}
+    if mesh.tension is not None:
+        values["tensions"] |= dict.fromkeys(
+            (p.name for p in surface.patches if not p.auxiliary), mesh.tension
+        )
+    for name, own in mesh.patches.items():
+        patch = surface.patches[surface.patch_index(name)]  # refuses one that is not there
+        for key, value in own.items():
+            if key != "wall":
+                values[f"{key}s"][name] = value
+        if "wall" in own:
+            bare = own["wall"] and name in data.bare  # its pressure follows from those beside it
+            walled = replace(patch, wall=own["wall"], **({"pressure": 0.0} if bare else {}))
+            patches = changes.get("patches", surface.patches)
+            changes["patches"] = [walled if p.name == name else p for p in patches]
     if len(mesh.supports):
         changes |= {"fixed": _supported(surface, mesh.supports)}
         changes |= dict.fromkeys(("on_plane", "on_line"), ())
         changes["on_planes"] = tuple((plane, on) for plane, on in surface.on_planes if plane.mirror)
-    return (surface.rebuilt(**changes).with_held_snow() if changes else surface), data
+    if changes:
+        surface = surface.rebuilt(**changes)
+    if any(values.values()):
+        surface = surface.retensioned(**values)
+    return (surface.with_held_snow() if changes else surface), data
 
 
 def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
