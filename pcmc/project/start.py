@@ -92,8 +92,9 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
             if key != "wall":
                 values[f"{key}s"][name] = value
         if "wall" in own:
-            bare = own["wall"] and name in data.bare  # its pressure follows from those beside it
-            walled = replace(patch, wall=own["wall"], **({"pressure": 0.0} if bare else {}))
+            walled = replace(patch, wall=own["wall"])
+            if own["wall"] and name in data.bare:  # its pressure follows from those beside it
+                walled = replace(walled, pressure=0.0)
             patches = changes.get("patches", surface.patches)
             changes["patches"] = [walled if p.name == name else p for p in patches]
     if len(mesh.supports):
