@@ -22,6 +22,7 @@ from ..io.mesh_data import MeshData
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.pieces import point_text
+from ..surface.values import sheets_below
 from .checking import in_file
 from .file import Project, load
 from .outcome import Outcome
@@ -83,9 +84,8 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
     changes: dict[str, Any] = {}
     values: dict[str, dict[str, float]] = {kind: {} for kind in ("tensions", "pressures", "weights", "snows")}
     if mesh.tension is not None:
-        values["tensions"] |= dict.fromkeys(
-            (p.name for p in surface.patches if not p.auxiliary), mesh.tension
-        )
+        loaded = {p.name for p in surface.patches if not p.auxiliary} - {*sheets_below(surface).values()}
+        values["tensions"] |= dict.fromkeys(loaded, mesh.tension)
     for name, own in mesh.patches.items():
         patch = surface.patches[surface.patch_index(name)]  # refuses one that is not there
         for key, value in own.items():
@@ -157,15 +157,18 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 
     if not mesh.rises:
         return surface, [], []
-    held = surface.topology.edges[surface.topology.boundary_edge]
+    edges, outer = surface.topology.edges, surface.topology.boundary_edge
+    held = edges[outer if outer.any() else surface.held[edges].all(axis=1)]  # the rim of a cushion
     heights = surface.plane.height(surface.vertices[held[surface.held[held].all(axis=1)]])
     level = float(heights.mean()) if heights.size else 0.0
     normal = np.array(surface.plane.normal)
-    roof = surface.roof[surface.patch_of_face]
+    below = sheets_below(surface).values()  # which keep their factor
+    roof = np.array([r and p.name not in below for p, r in zip(surface.patches, surface.roof, strict=True)])
+    roof = roof[surface.patch_of_face]
     plan = abs(float((area_vectors(surface.vertices[surface.faces[roof]]) @ normal).sum()))
     least = plan / float(segment_lengths(surface.vertices, held).sum())
     pressed = [p for p, loaded in zip(surface.patches, surface.roof, strict=True) if loaded]
-    names, targets, vary = [p.name for p in pressed], [], []
+    names, targets, vary = [p.name for p in pressed if p.name not in below], [], []
     for rise in mesh.rises:
         if rise.kind == "rise" and heights.size and np.ptp(heights) > NEAR * surface.size:
             text = f"{rise.kind}: the supports are not level, so a rise over them is not defined; give apex"
