@@ -22,6 +22,7 @@ from ..io.mesh_data import MeshData
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.pieces import point_text
+from ..surface.values import sheets_below
 from .checking import in_file
 from .file import Project, load
 from .outcome import Outcome
@@ -81,19 +82,30 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
     a unit is in ``mesh.units``, or the project's."""
     surface, data = read_bare(path.parent / mesh.file, units.length, mesh.units)
     changes: dict[str, Any] = {}
-    if mesh.patches or mesh.tension is not None:
-        for name in mesh.patches:
-            surface.patch_index(name)  # refuses one that is not there
-        common = {} if mesh.tension is None else {"tension": mesh.tension}
-        changes["patches"] = [
-            replace(p, **({} if p.auxiliary else common) | dict(mesh.patches.get(p.name, {})))
-            for p in surface.patches
-        ]
+    values: dict[str, dict[str, float]] = {kind: {} for kind in ("tensions", "pressures", "weights", "snows")}
+    if mesh.tension is not None:
+        loaded = {p.name for p in surface.patches if not p.auxiliary} - {*sheets_below(surface).values()}
+        values["tensions"] |= dict.fromkeys(loaded, mesh.tension)
+    for name, own in mesh.patches.items():
+        patch = surface.patches[surface.patch_index(name)]  # refuses one that is not there
+        for key, value in own.items():
+            if key != "wall":
+                values[f"{key}s"][name] = value
+        if "wall" in own:
+            walled = replace(patch, wall=own["wall"])
+            if own["wall"] and name in data.bare:  # its pressure follows from those beside it
+                walled = replace(walled, pressure=0.0)
+            patches = changes.get("patches", surface.patches)
+            changes["patches"] = [walled if p.name == name else p for p in patches]
     if len(mesh.supports):
         changes |= {"fixed": _supported(surface, mesh.supports)}
         changes |= dict.fromkeys(("on_plane", "on_line"), ())
         changes["on_planes"] = tuple((plane, on) for plane, on in surface.on_planes if plane.mirror)
-    return (surface.rebuilt(**changes).with_held_snow() if changes else surface), data
+    if changes:
+        surface = surface.rebuilt(**changes)
+    if any(values.values()):
+        surface = surface.retensioned(**values)
+    return (surface.with_held_snow() if changes else surface), data
 
 
 def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
@@ -145,15 +157,18 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 
     if not mesh.rises:
         return surface, [], []
-    held = surface.topology.edges[surface.topology.boundary_edge]
+    edges, outer = surface.topology.edges, surface.topology.boundary_edge
+    held = edges[outer if outer.any() else surface.held[edges].all(axis=1)]  # the rim of a cushion
     heights = surface.plane.height(surface.vertices[held[surface.held[held].all(axis=1)]])
     level = float(heights.mean()) if heights.size else 0.0
     normal = np.array(surface.plane.normal)
-    roof = surface.roof[surface.patch_of_face]
+    below = sheets_below(surface).values()  # which keep their factor
+    roof = np.array([r and p.name not in below for p, r in zip(surface.patches, surface.roof, strict=True)])
+    roof = roof[surface.patch_of_face]
     plan = abs(float((area_vectors(surface.vertices[surface.faces[roof]]) @ normal).sum()))
     least = plan / float(segment_lengths(surface.vertices, held).sum())
     pressed = [p for p, loaded in zip(surface.patches, surface.roof, strict=True) if loaded]
-    names, targets, vary = [p.name for p in pressed], [], []
+    names, targets, vary = [p.name for p in pressed if p.name not in below], [], []
     for rise in mesh.rises:
         if rise.kind == "rise" and heights.size and np.ptp(heights) > NEAR * surface.size:
             text = f"{rise.kind}: the supports are not level, so a rise over them is not defined; give apex"

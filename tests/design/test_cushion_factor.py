@@ -73,3 +73,14 @@ def test_a_project_holds_the_tensions_of_both_sheets_as_a_factor(tmp_path):
         assert (plan["tension"], plan["cushion"]) == (4.0, cushion)
     with refused(OptionError, what="values"):  # the project has one weight for both
         data_with_values(path, data, start.retensioned(weights={"patch 1 below": 0.1}))
+
+
+@pytest.mark.parametrize("key", ["rise = 0.5", "tension = 4.0"])
+def test_a_mesh_of_a_project_keeps_the_factor(cushion, tmp_path, key):
+    pcmc.write(tmp_path / "cushion.pcmc", cushion)
+    path = tmp_path / "roof.toml"
+    path.write_text(f'[mesh]\nfile = "cushion.pcmc"\n{key}\n')
+    designed = pcmc.project.designed(path, use_cache=False)
+    above, below = designed.surface.tensions
+    assert designed.good
+    assert below == pytest.approx(1.5 * above, rel=1e-12)

@@ -18,6 +18,8 @@ from pcmc.forces.rooms import room_volumes
 from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.project import run, varied
 from pcmc.project.members import members_drawn
+from pcmc.sweep import run as run_sweep
+from pcmc.sweep.projects import project_sweep
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 SAIL_TOML = """
@@ -199,8 +201,8 @@ def test_sweeps_name_cables_weights_and_rooms(folder):
         _, surface = varied("sail.toml", {name: 5.0, "patch 1.weight": 0.1})
         assert [cable.tension for cable in surface.cables] == [9.0, 5.0, 9.0, 9.0]
         assert surface.weights.tolist() == [0.1]
-    sweep = pcmc.sweep.projects.project_sweep("sail.toml", {"cable 2.tension": [8.0, 10.0]})
-    table = pcmc.sweep.run(sweep, workers=1)
+    sweep = project_sweep("sail.toml", {"cable 2.tension": [8.0, 10.0]})
+    table = run_sweep(sweep, workers=1)
     assert set(table["verdict"]) == {"stable"}
     assert table["cable 2.length"].is_monotonic_decreasing
     (folder / "bubble.toml").write_text(BUBBLE_TOML, encoding="utf-8")

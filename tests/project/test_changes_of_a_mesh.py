@@ -1,0 +1,63 @@
+"""What a project changes of its mesh: supports leave mirror planes, walls follow pressures."""
+
+import pytest
+
+import pcmc
+from pcmc.base.errors import FileWarning
+from pcmc.plan import Plan
+from pcmc.project import build, designed
+
+SIDES = "[[[6, 0, 0], [0, 0, 0], [0, 9, 0], [6, 9, 0]]]"
+
+
+@pytest.mark.parametrize("supports", ['"boundary"', '"ground"', SIDES])
+def test_supports_of_a_project_leave_the_mirror_plane_of_its_mesh(tmp_path, supports):
+    outline = [[0, 0], [6, 0], [6, 9], [0, 9]]
+    half = Plan(outline, edge_length=1.5, tension=3.0, pressure=0.4, mirrors=[[[6, 0], [6, 9]]]).surface()
+    pcmc.write(tmp_path / "half.obj", half)
+    path = tmp_path / "roof.toml"
+    path.write_text(f'[mesh]\nfile = "half.obj"\nsupports = {supports}\n')
+    roof, plain = designed(path, use_cache=False), pcmc.solve(half)
+    assert roof.good
+    assert len(roof.surface.on_planes) == 1
+    assert roof.surface.vertices[:, 2].max() == pytest.approx(plain.surface.vertices[:, 2].max(), rel=1e-6)
+
+
+def test_a_point_beside_the_nearest_vertex_is_told(tmp_path):
+    pcmc.write(
+        tmp_path / "sail.obj", Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=3.0, pressure=0.0).surface()
+    )
+    path = tmp_path / "roof.toml"
+    path.write_text('[mesh]\nfile = "sail.obj"\nsupports = [[0.2, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]]\n')
+    with pytest.warns(
+        FileWarning, match="number 1 is 0.2 from the nearest vertex, at .*, which is fixed"
+    ) as told:
+        assert build(path).fixed.sum() == 4
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("suffix", [".pcmc", ".obj"])
+def test_walls_of_a_mesh_follow_the_pressures_that_the_project_gives(tmp_path, suffix):
+    patches = {
+        "west": {"tension": 3.0, "pressure": 0.4},
+        "east": {"tension": 3.0, "pressure": 0.3, "snow": 0.05},
+    }
+    start = Plan(
+        [[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], edge_length=1.0, patches=patches
+    ).surface()
+    wall = start.patches[2].tension
+    pcmc.write(tmp_path / f"hall{suffix}", start.retensioned(pressures={"west": 0.9}))
+    path, text = tmp_path / "roof.toml", f'[mesh]\nfile = "hall{suffix}"\npatches.west.pressure = 0.4\n'
+    path.write_text(text)
+    found = build(path)
+    assert found.pressures == pytest.approx(start.pressures)
+    lines = (tmp_path / f"hall{suffix}").read_bytes().splitlines()
+    if suffix == ".obj":  # as from a program that knows no pressures
+        (tmp_path / "hall.obj").write_bytes(b"\n".join(line for line in lines if not line.startswith(b"#")))
+        given = "[mesh.patches]\nwest = {tension = 3, pressure = 0.4}\n"
+        given += "east = {tension = 3, pressure = 0.3, snow = 0.05}\n"
+        given += f'"wall 1" = {{tension = {wall}, wall = true}}\n'
+        path.write_text(f'[mesh]\nfile = "hall.obj"\nsupports = "boundary"\n{given}')
+        with pytest.warns(FileWarning, match="tensions and pressures are 1 unless given"):
+            bare = build(path)
+        assert (bare.pressures, bare.snows) == (pytest.approx(start.pressures), pytest.approx(start.snows))
