@@ -158,7 +158,7 @@ BENCH = """\
 The study `bench` takes the same surfaces from the same start to rest through other programs, each asked in
 its own way (see the first lines of `studies/questions/bench.py`). A program that left more than {near:g} of
 the forces, or took more than {limit:.0f} s, was not asked for finer meshes; at rest is {rest:g}. The column,
-the catenoid, the drop at 170°, inflation and evaporation are of the stress suite of pySurfaceEvolver
+the catenoid, the drop, inflation and evaporation are of the stress suite of pySurfaceEvolver
 (<https://github.com/gautelinga/pySurfaceEvolver>, `docs/stress_cases.md`), on our meshes. Its bridge
 between spheres, drop on a fibre, puddle and drained slit are left out: pcmc has no supports on spheres and
 cylinders and no weight of a liquid, and does not remesh on its way. `bench/bench.png` shows the times; they
