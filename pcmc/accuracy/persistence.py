@@ -80,9 +80,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             becomes = "stable" if certificate.index == 0 else f"a saddle of index {certificate.index}"
             was = "stable" if first.index == 0 else f"of index {first.index}"
             reason = f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest"
-            return _at(
-                MeshVerdict.CHANGES, surface, f"{reason} near {point_text(place, surface.size)}", place
-            )
+            reason += f" near {point_text(place, surface.size)}"
+            return _at(MeshVerdict.CHANGES, surface, reason, place)
     size = max(float(np.ptp(surfaces[0].plane.height(surfaces[0].vertices))), FLAT * surfaces[0].size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
@@ -91,8 +90,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
         far, place = float(move.max()), surface.vertices[int(move.argmax())]
         if far > FAR * size:
             reason = f"on {fine.m} triangles it is another shape, {far:.3g} away near"
-            text = f"{reason} {point_text(place, surface.size)}"
-            return _at(MeshVerdict.CHANGES, surface, text, place)
+            reason += f" {point_text(place, surface.size)}"
+            return _at(MeshVerdict.CHANGES, surface, reason, place)
     if _order(surfaces, moves) < 0.0:
         before, last = (_mean(move) for move in moves[-2:])
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
@@ -199,10 +198,8 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> F
             nearest, end = distance, X[min(ends, key=lambda v: np.linalg.norm(X[v] - place))]
             names = names_of(surface, curve.sheets)
             wall = next(surface.patches[k].name for k in curve.sheets if sliding[k])
-            ending = (
-                f"; the junction {names} there ends at {point_text(end, surface.size)}, where only the mesh"
-            )
-            ending += " holds it"
+            ending = f"; the junction {names} there ends at {point_text(end, surface.size)}"
+            ending += ", where only the mesh holds it"
             advice = (
                 f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'
                 " vertices to fixed="

@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
+from ..meshing.films import film_of
 from ..meshing.quality import edge_lengths, triangle_quality
-from ..meshing.strips import strip_of
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
 from ..surface.pieces import point_text
@@ -160,9 +160,9 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
         f" {point_text(place, surface.size)}, quality {quality:.1e}"
     )
     if films := vanished_films(surface):
-        strip = strip_of(surface, surface.patch_index(films[0]))
+        film = film_of(surface, surface.patch_index(films[0]))
         others = f" and {len(films) - 1} more" if len(films) > 1 else ""
-        meeting = strip.meeting(surface, "then") if strip else ""
+        meeting = film.meeting(surface, "then") if film else ""
         return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; try pcmc.swap_neighbours(surface)"
     if held_wall_down(surface, pinchable):
         return worst + (
@@ -185,12 +185,8 @@ def vanished_films(surface: Surface) -> list[str]:
     )
     names = []
     for patch in np.flatnonzero(area < NARROW * area.max()):
-        strip = strip_of(surface, int(patch))
-        if (
-            strip
-            and area[patch] < NARROW * area[list(strip.sheets)].min()
-            and strip.width < 2.0 * strip.height
-        ):
+        film = film_of(surface, int(patch))
+        if film and area[patch] < NARROW * area[list(film.sheets)].min() and film.width < 2.0 * film.height:
             names.append(surface.patches[patch].name)
     return names
 

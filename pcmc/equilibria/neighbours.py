@@ -9,8 +9,8 @@ from typing import Any
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import vanished_films
 from ..forces.functional import energy
+from ..meshing.films import film_of
 from ..meshing.neighbour_swap import swap
-from ..meshing.strips import strip_of
 from ..solvers import solve
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
@@ -86,12 +86,12 @@ def swap_neighbours(
         raise SurfaceError(text, what="patches")
     changed, sentences = surface, []
     for name in names:
-        before, strip = changed, strip_of(changed, changed.patch_index(name))
+        before, film = changed, film_of(changed, changed.patch_index(name))
         changed = swap(before, name)
         if len(changed.patches) < len(before.patches):
             sentences.append(f"patch {name!r} is gone, and the four beside it meet at one junction")
-        elif strip:
-            sentences.append(strip.meeting(before, "now"))
+        elif film:
+            sentences.append(film.meeting(before, "now"))
     result = solve(changed, **options)
     if result.converged:
         sentences.append(f"E = {result.energy:.7g}, {energy(surface):.7g} before")

@@ -26,8 +26,8 @@ from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.supports import apply_supports
 from ..surface.topology import joined
+from .films import Film, film_of, lattice_steps
 from .quality import turns_over
-from .strips import Strip, lattice_steps, strip_of
 
 EDGE = 1.5  # of an equilateral triangle, over the square root of its area
 WIDTH = 0.5  # of the edges of the triangles beside: how wide the new film is at first
@@ -55,37 +55,37 @@ def swap(surface: Surface, patch: str) -> Surface:
         on it.
     """
     expect_flat(surface.cell, "swap")
-    strip = strip_of(surface, surface.patch_index(patch))
-    if strip is None:
-        text = f"patch {patch!r} is no strip between two junctions with two other patches each, four in all;"
-        raise SurfaceError(f"{text} only the neighbours of a strip can be swapped", what="patch", where=patch)
-    own = surface.faces[surface.patch_of_face == strip.patch]
+    film = film_of(surface, surface.patch_index(patch))
+    if film is None:
+        text = f"patch {patch!r} is no film between two junctions with two other patches each, four in all;"
+        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=patch)
+    own = surface.faces[surface.patch_of_face == film.patch]
     if cables := [cable.name for cable in surface.cables if np.isin(cable.edges, own).any()]:
         text = f"cable {cables[0]!r} runs on or to patch {patch!r}, whose neighbours are to be swapped"
         raise SurfaceError(f"{text}; leave the cable out", what="cables", where=cables[0])
-    mesh, target = _collapsed(surface, strip)
-    curve = target[strip.pairs[:, 0]]
+    mesh, target = _collapsed(surface, film)
+    curve = target[film.pairs[:, 0]]
     curve = curve[np.sort(np.unique(curve, return_index=True)[1])]
-    edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if strip.closed else -1]
-    edge = EDGE * float(np.sqrt(face_areas(mesh.corners(surface)[mesh.beside(strip, edges)]).mean()))
-    way = _opening(surface, strip, mesh, edges)
+    edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if film.closed else -1]
+    edge = EDGE * float(np.sqrt(face_areas(mesh.corners(surface)[mesh.beside(film, edges)]).mean()))
+    way = _opening(surface, film, mesh, edges)
     patches = list(surface.patches)
     if way is None:
-        del patches[strip.patch]
-        mesh = replace(mesh, patch=mesh.patch - (mesh.patch > strip.patch))
+        del patches[film.patch]
+        mesh = replace(mesh, patch=mesh.patch - (mesh.patch > film.patch))
         return _rebuilt(
             surface, mesh, target, patches, [_with_sign(room, patch, 0) for room in surface.rooms]
         )[0]
     # along an edge the values of A, C and the new film cancel, each with the sense in which it runs there
-    sense = [mesh.sense(mesh.at_edge(k, *edges[0]), *edges[0]) for k in strip.one_side]
-    values = np.array([surface.pressures, surface.snows, *surface.room_signs])[:, list(strip.one_side)]
+    sense = [mesh.sense(mesh.at_edge(k, *edges[0]), *edges[0]) for k in film.one_side]
+    values = np.array([surface.pressures, surface.snows, *surface.room_signs])[:, list(film.one_side)]
     pressure, snow, *signs = (0.0 - values @ sense).tolist()
-    wall = bool(surface.walls[strip.patch])
-    patches[strip.patch] = replace(patches[strip.patch], pressure=pressure, snow=snow, wall=wall)
+    wall = bool(surface.walls[film.patch])
+    patches[film.patch] = replace(patches[film.patch], pressure=pressure, snow=snow, wall=wall)
     rooms = [_with_sign(room, patch, int(sign)) for room, sign in zip(surface.rooms, signs, strict=True)]
     half, columns, wide = 0.5 * WIDTH * edge * way, 1, 0.0
     for _ in range(2):  # once more with as many columns of triangles as its width has room for
-        opened, parting = _opened(strip, mesh, edges, half, columns)
+        opened, parting = _opened(film, mesh, edges, half, columns)
         changed, vertex = _rebuilt(surface, opened, target, patches, rooms)
         changed, wide = _widened(changed, parting[vertex])
         columns = round(wide * WIDTH)
@@ -108,9 +108,9 @@ class _Mesh:
         """(m,3,3)"""
         return np.asarray(self.X[self.vertices] + self.steps @ lattice_of(surface))
 
-    def beside(self, strip: Strip, edges: Ints) -> Bools:
+    def beside(self, film: Film, edges: Ints) -> Bools:
         """(m,) the triangles of the four sheets that touch the edges (k,2)."""
-        return np.isin(self.patch, strip.sheets) & np.isin(self.vertices, edges).any(axis=1)
+        return np.isin(self.patch, film.sheets) & np.isin(self.vertices, edges).any(axis=1)
 
     def at_edge(self, sheet: int, a: int, b: int) -> int:
         """The first triangle of a sheet that has the edge from a to b."""
@@ -123,7 +123,7 @@ class _Mesh:
         return 1 if corners[corners.index(a) - 2] == b else -1
 
 
-def _collapsed(surface: Surface, strip: Strip) -> tuple[_Mesh, Ints]:
+def _collapsed(surface: Surface, film: Film) -> tuple[_Mesh, Ints]:
     """The mesh once the film has vanished, and the vertex (n,) that each one is then."""
     target, X, supports = surface.original.copy(), surface.vertices.copy(), surface.support_columns.copy()
     lattice, freedom = lattice_of(surface), surface.admissible.freedom
@@ -132,32 +132,32 @@ def _collapsed(surface: Surface, strip: Strip) -> tuple[_Mesh, Ints]:
         step = surface.vertices[others] - surface.vertices[vertex]
         return np.asarray(step - lattice_steps(lattice, step) @ lattice)
 
-    fewer = int(np.argmin([len(np.unique(column)) for column in strip.pairs.T]))
-    for vertex in np.unique(strip.pairs[:, fewer]):
-        both = np.append(vertex, strip.pairs[strip.pairs[:, fewer] == vertex, 1 - fewer])
+    fewer = int(np.argmin([len(np.unique(column)) for column in film.pairs.T]))
+    for vertex in np.unique(film.pairs[:, fewer]):
+        both = np.append(vertex, film.pairs[film.pairs[:, fewer] == vertex, 1 - fewer])
         most_held = freedom[both] == freedom[both].min()
         steps = near(vertex, both[most_held])
         if freedom[both].min() == 0 and np.ptp(steps, axis=0).max() > ON * surface.size:
-            name = surface.patches[strip.patch].name
+            name = surface.patches[film.patch].name
             text = f"the junctions of patch {name!r} are held at different places, so it cannot vanish;"
             raise SurfaceError(f"{text} let their ends slide", what="patch", where=name)
         X[vertex], supports[vertex] = X[vertex] + steps.mean(axis=0), supports[both].any(axis=0)
         target[both] = vertex
-    ends = strip.pairs[[0, -1], fewer]
-    own = surface.original[surface.faces[surface.patch_of_face == strip.patch]]
-    for vertex in np.setdiff1d(own, strip.pairs):  # of its short sides, where a roof goes on
+    ends = film.pairs[[0, -1], fewer]
+    own = surface.original[surface.faces[surface.patch_of_face == film.patch]]
+    for vertex in np.setdiff1d(own, film.pairs):  # of its short sides, where a roof goes on
         target[vertex] = ends[np.linalg.norm(near(vertex, ends), axis=1).argmin()]
     target = target[surface.original]
     F, Y = surface.original[surface.faces], surface.vertices
     counts = lattice_steps(lattice, Y[surface.faces] - Y[F]) + lattice_steps(lattice, Y - Y[target])[F]
-    V, left = target[F], surface.patch_of_face != strip.patch
+    V, left = target[F], surface.patch_of_face != film.patch
     left &= (V[:, [1, 2, 0]] != V).all(axis=1)
     return _Mesh(X, supports, V[left], counts[left], surface.patch_of_face[left]), target
 
 
-def _opening(surface: Surface, strip: Strip, mesh: _Mesh, edges: Ints) -> Floats | None:
+def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats | None:
     """(n,3) the unit vectors along which the curve opens towards A and C; None where it stays closed."""
-    at, lattice, beside = np.zeros(len(mesh.X), dtype=bool), lattice_of(surface), mesh.beside(strip, edges)
+    at, lattice, beside = np.zeros(len(mesh.X), dtype=bool), lattice_of(surface), mesh.beside(film, edges)
     at[edges] = True
     P, patch = mesh.corners(surface)[beside], mesh.patch[beside]
     normal, area = area_vectors(P), face_areas(P)
@@ -165,7 +165,7 @@ def _opening(surface: Surface, strip: Strip, mesh: _Mesh, edges: Ints) -> Floats
     pull = np.zeros((len(surface.patches), *mesh.X.shape))  # of each sheet, - α ∂A/∂x, (15a)
     corner_pull = weight[:, None, None] * np.cross(edge_vectors(P), normal[:, None])
     np.add.at(pull, (patch[:, None], mesh.vertices[beside]), corner_pull)
-    (a, c), (b, d) = strip.one_side, strip.other_side
+    (a, c), (b, d) = film.one_side, film.other_side
     new, old = 0.5 * (pull[a] + pull[c] - pull[b] - pull[d]), 0.5 * (pull[a] + pull[b] - pull[c] - pull[d])
     guided = mesh.supports[:, 2 + len(surface.on_planes) :].any(axis=1)
     at &= ~mesh.supports[:, 0] | guided  # a fixed end stays one
@@ -174,13 +174,13 @@ def _opening(surface: Surface, strip: Strip, mesh: _Mesh, edges: Ints) -> Floats
     lengths = np.bincount(edges.ravel(), np.repeat(0.5 * np.linalg.norm(span, axis=1), 2), len(at))
     strength = np.linalg.norm(new, axis=1)
     most = max(strength[at].sum(), np.linalg.norm(old, axis=1)[at].sum())
-    if most <= surface.tensions[strip.patch] * lengths[at].sum():
+    if most <= surface.tensions[film.patch] * lengths[at].sum():
         return None
     at &= strength > 0.0
     return np.where(at[:, None], new / np.where(at, strength, 1.0)[:, None], 0.0)
 
 
-def _opened(strip: Strip, mesh: _Mesh, edges: Ints, half: Floats, columns: int) -> tuple[_Mesh, Floats]:
+def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) -> tuple[_Mesh, Floats]:
     """The mesh with a new film, of so many columns of triangles; how far its vertices are from its middle.
 
     ``half`` (n,3) leads from the curve to the film's junction with A and C, and back to that with B and D.
@@ -189,17 +189,17 @@ def _opened(strip: Strip, mesh: _Mesh, edges: Ints, half: Floats, columns: int) 
     across = np.repeat(np.arange(count)[:, None], columns + 1, axis=1)  # from A and C to B and D
     across[split, 1:] = count + np.arange(len(split) * columns).reshape(-1, columns)
     V, new = mesh.vertices.copy(), list[Triangle]()
-    far = np.isin(mesh.patch, strip.other_side)
+    far = np.isin(mesh.patch, film.other_side)
     V[far] = across[V[far], -1]
     for vertex in np.intersect1d(edges, split):
-        new += _parted(strip, mesh, int(vertex), across[vertex].tolist(), edges, V)
+        new += _parted(film, mesh, int(vertex), across[vertex].tolist(), edges, V)
     for edge in edges.tolist():
-        f = mesh.at_edge(strip.one_side[0], *edge)
+        f = mesh.at_edge(film.one_side[0], *edge)
         s, t = (mesh.steps[f, mesh.vertices[f] == v][0] for v in edge)
         for k in range(columns):
             (a, c), (b, d) = across[edge, k : k + 2].tolist()
-            new += [((a, b, d), (s, t, t), strip.patch)] if d != b else []
-            new += [((a, d, c), (s, t, s), strip.patch)] if c != a else []
+            new += [((a, b, d), (s, t, t), film.patch)] if d != b else []
+            new += [((a, d, c), (s, t, s), film.patch)] if c != a else []
     vertices, steps, patch = (np.array(part) for part in zip(*new, strict=True))
     shares = 1.0 - 2.0 * np.arange(1, columns + 1) / columns
     parting = np.concatenate([half, (half[split, None] * shares[:, None]).reshape(-1, 3)])
@@ -214,7 +214,7 @@ def _opened(strip: Strip, mesh: _Mesh, edges: Ints, half: Floats, columns: int) 
 
 
 def _parted(
-    strip: Strip, mesh: _Mesh, vertex: int, across: Sequence[int], edges: Ints, V: Ints
+    film: Film, mesh: _Mesh, vertex: int, across: Sequence[int], edges: Ints, V: Ints
 ) -> list[Triangle]:
     """Gives the last vertex ``across`` to the other patches on the side of B and D, in V (m,3).
 
@@ -224,9 +224,9 @@ def _parted(
     sheet = mesh.patch[rows]
     near, far = (
         np.setdiff1d(mesh.vertices[rows[np.isin(sheet, side)]], edges)
-        for side in (strip.one_side, strip.other_side)
+        for side in (film.one_side, film.other_side)
     )
-    others = rows[~np.isin(sheet, strip.sheets)]
+    others = rows[~np.isin(sheet, film.sheets)]
     corner = np.argmax(mesh.vertices[others] == vertex, axis=1)
     arcs = np.stack([mesh.vertices[others, (corner + k) % 3] for k in (1, 2)], axis=1)
     stop = np.bincount(arcs.ravel(), minlength=len(mesh.X)) != 2

@@ -198,8 +198,8 @@ def to_space(local: Floats, plane: Plane) -> Floats:
 def point_text(point: Floats, size: float | None = None) -> str:
     """A point (2,) or (3,), for messages; its height where that is not 0.
 
-    It has six digits of its largest coordinate; of a place on a surface of some ``size``, what can be found
-    there: steps of a hundredth of a thousandth to a ten thousandth of it.
+    It has six digits of its largest coordinate; a place on a surface of some ``size`` is rounded to a ten
+    thousandth of that, or finer.
 
     >>> point_text(np.array([9.5096189432, 0.0])), point_text(np.array([2.5, 3.25, 4e-16]))
     ('(9.50962, 0)', '(2.5, 3.25)')

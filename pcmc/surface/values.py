@@ -119,10 +119,12 @@ def rates_of(surface: Any, kind: str, by_name: Mapping[str, float]) -> Floats:
 
 
 def sheets_below(surface: Any) -> dict[str, str]:
-    """The lower sheet of each cushion by the name of the upper one, which has the same pressure."""
+    """The lower sheet of each cushion by the name of the upper one: both have one pressure and one rim, so
+    the surface has no open edge but at mirrors."""
     patches = {patch.name: patch for patch in surface.patches}
     pairs = ((patch, patches.get(f"{patch.name}{BELOW}")) for patch in surface.patches)
-    return {p.name: q.name for p, q in pairs if q is not None and p.pressure == q.pressure != 0.0}
+    sheets = {p.name: q.name for p, q in pairs if q is not None and p.pressure == q.pressure}
+    return {} if sheets and (surface.topology.boundary_edge & ~surface.mirror_edge).any() else sheets
 
 
 def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, float]:

@@ -196,7 +196,7 @@ def test_what_cannot_be_swapped_is_refused_in_a_line() -> None:
     films = steiner_films(1.0, 1.0)
     for given, name, sentence in (
         (films, "midle", "unknown patch 'midle'; did you mean 'middle'?"),
-        (films, "south-west", "patch 'south-west' is no strip between two junctions"),
+        (films, "south-west", "patch 'south-west' is no film between two junctions"),
         (films.rebuilt(fixed=np.ones(films.n, dtype=bool)), "middle", "held at different places"),
         (films, None, "no film between two junctions has vanished; name the one to swap"),
         (elevate(between_plates(films), 2), "middle", "order"),

@@ -1,4 +1,4 @@
-"""What is told of members: chapter, picture, sentences, what is too weak, what is refused."""
+"""What pcmc says of members: in the report, in a picture and in sentences, and where one is too weak."""
 
 from dataclasses import replace
 

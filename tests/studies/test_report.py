@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from numbers_in_text import numbers_in
 
-from studies import report
+from studies import report, report_tables
 from studies.folder import Folder
 from studies.paper import compare, paper, read_measured
 from studies.words import FIELD, MISSING, fill, keys
@@ -76,16 +76,16 @@ def test_the_headline_counts_what_holds_by_our_choice():
 
 def test_a_number_that_holds_by_choice_says_so_and_a_threshold_of_ours_too():
     comparison, _ = compare(MEASURED)
-    numbers = report.comparison_cells(comparison, "number")
+    numbers = report_tables.comparison_cells(comparison, "number")
     chosen = [row[-1] for row in numbers if "chosen so" in row[-1]]
     assert chosen == [
         "reproduced; the mesh is chosen so",
         "reproduced; the iteration is chosen so",
     ]
-    cells = report.comparison_cells(comparison, "sentence")
+    cells = report_tables.comparison_cells(comparison, "sentence")
     assert sum("(ours)" in row[2] for row in cells) == (comparison.threshold == "ours").sum()
     missed = comparison.assign(verdict="differs")
-    assert not any("chosen" in row[-1] for row in report.comparison_cells(missed, "number"))
+    assert not any("chosen" in row[-1] for row in report_tables.comparison_cells(missed, "number"))
 
 
 def test_the_step_of_the_energy_in_example_1_is_the_meshs():

@@ -15,7 +15,7 @@ from ..surface.topology import EdgeCurve
 
 
 @dataclass(frozen=True, eq=False)
-class Strip:
+class Film:
     """A film between two junctions, with the patches A and B beside the one and C and D beside the other."""
 
     patch: int
@@ -37,7 +37,7 @@ class Strip:
         >>> import numpy as np
         >>> from pcmc import Patch
         >>> floor = Surface(np.eye(3), [[0, 1, 2]], [0], [Patch("floor", 1.0)], fixed=range(3))
-        >>> Strip(0, np.empty((0, 2)), False, (0, 0), (0, 0), 0.0, 1.0).meeting(floor, "then")
+        >>> Film(0, np.empty((0, 2)), False, (0, 0), (0, 0), 0.0, 1.0).meeting(floor, "then")
         "'floor' and 'floor' then meet, and 'floor' and 'floor'"
         """
         name = [repr(patch.name) for patch in surface.patches]
@@ -53,7 +53,7 @@ class Strip:
         return f"{name[a]} and {name[c]} {when} meet, and {name[b]} and {name[d]}"
 
 
-def strip_of(surface: Surface, patch: int) -> Strip | None:
+def film_of(surface: Surface, patch: int) -> Film | None:
     """The strip that a patch is; None for one of another shape, or without four different patches beside it.
 
     A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones.
@@ -84,7 +84,7 @@ def strip_of(surface: Surface, patch: int) -> Strip | None:
     (a, b), (c, d) = ([k for k in curve.sheets if k != patch] for curve in (one, other))
     apart = _apart(surface, one, a, b)[pairs[:, 0]] * _apart(surface, other, c, d)[pairs[:, 1]]
     c, d = (c, d) if apart.sum() > 0.0 else (d, c)
-    return Strip(patch, pairs, one.closed, (a, c), (b, d), width, min(lengths[i], lengths[j]))
+    return Film(patch, pairs, one.closed, (a, c), (b, d), width, min(lengths[i], lengths[j]))
 
 
 def lattice_steps(lattice: Floats, vectors: Floats) -> Ints:
