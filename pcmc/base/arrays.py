@@ -76,6 +76,17 @@ def block_rows(blocks: Floats, corners: Ints, count: int) -> csr_array:
     return bsr_array(entries, shape=(c * r, d * count)).tocsr()
 
 
+def distinct(numbers: Ints, count: int) -> Ints:
+    """The numbers 0 to count - 1 that occur, ascending: ``numpy.unique`` in linear time.
+
+    >>> distinct(np.array([[4, 1], [1, 4]]), 5).tolist()
+    [1, 4]
+    """
+    occurs = np.zeros(count, dtype=bool)
+    occurs[numbers] = True
+    return np.flatnonzero(occurs)
+
+
 def format_rows(template: str, *columns: npt.NDArray[Any]) -> str:
     """The template filled with each row of the columns; ``%r`` writes a float exactly.
 

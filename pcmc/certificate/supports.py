@@ -238,7 +238,7 @@ def _on_plane(acting: Forces, mask: Bools, inside: Bools, kind: str, where: str)
     done = np.zeros_like(inside)
     for wall in np.unique(surface.patch_of_face[flat]).tolist():
         faces = flat & (surface.patch_of_face == wall)
-        edges = np.unique(topo.edge_of_face[faces])
+        edges = topo.edges_of(faces)
         groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), edges[held[edges]]))
         done[surface.faces[faces]] = True
     for curve in topo.curves_among(held & (mask & inside & ~done)[topo.edges].any(axis=1)):

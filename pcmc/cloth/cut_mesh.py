@@ -154,7 +154,7 @@ class CutMesh:
 
     def _on_edges(self, path: Floats, piece: int) -> tuple[Ints, Floats]:
         """(k,2) the edge of the piece that each point of a path is on, and (k,) where: 0 to 1."""
-        sides = np.unique(self.topology.edge_of_face[self.pieces.piece == piece])
+        sides = self.topology.edges_of(self.pieces.piece == piece)
         edges = self.topology.edges[sides]
         middle, length = self.X[edges].mean(axis=1), segment_lengths(self.X, edges)
         near = cKDTree(path).query(middle)[0] <= 0.5 * length + ON * self.size

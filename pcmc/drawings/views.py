@@ -108,7 +108,7 @@ def cut_lines(
 
 def _seen(title: str, surface: Surface, curves: Lines, axes: Floats, faces: Bools) -> DrawnView:
     """The edges of faces and the curves on two axes (2,3)."""
-    edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[faces])]
+    edges = surface.topology.edges[surface.topology.edges_of(faces)]
     lines = [SheetLine(pair, "PCMC-PANEL") for pair in surface.vertices[edges] @ axes.T]
     return DrawnView(title, lines + [curve._replace(points=curve.points @ axes.T) for curve in curves])
 

@@ -18,7 +18,7 @@ from .motion_space import VertexClasses, force_scale, squared_forces
 def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: Floats) -> float:
     """The norm of the forces left (n,3) over that of the triangles' own, in the worst connected part."""
     parts = surface.topology.components
-    if not parts.any():
+    if not surface.topology.in_parts:
         return float(np.linalg.norm(left)) / force_scale(surface, classes, X)
     own, part_of = squared_forces(surface, classes, X), parts[classes.faces[:, 0]]
     if surface.cables:

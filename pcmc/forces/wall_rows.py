@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, distinct
 from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.checks import lying
@@ -80,7 +80,7 @@ def wall_rows(
     Where the top edge lies on the bottom its height shows nothing. There ρ is that of the vertex's row: steps
     along ``wall_edges`` from the foot, over those from foot to top.
     """
-    vertices = np.unique(wall_edges)
+    vertices = distinct(wall_edges, surface.n)
     vertices = vertices[~roof_vertex[vertices]]
     X, height = surface.vertices, surface.plane.height(surface.vertices)
     flat = X - height[:, None] * np.array(surface.plane.normal)
@@ -170,8 +170,8 @@ def held_walls(
     walls = list[tuple[int, Ints, Ints, Ints]]()
     bottom = topo.boundary_edge & (surface.fixed & low)[topo.edges].all(axis=1)
     for index in np.flatnonzero(surface.auxiliary).tolist():
-        of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
-        vertices = np.unique(topo.edges[of_wall])
+        of_wall = topo.edges_of(surface.patch_of_face == index)
+        vertices = distinct(topo.edges[of_wall], surface.n)
         if not bottom[of_wall].any() or surface.on_plane[vertices].any():
             continue
         top = topo.edges[of_wall[roof_edge[of_wall]]]
@@ -266,7 +266,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     low, foot = lying(height, X), np.full(n, -1, dtype=np.int64)
     every = list[tuple[int, Ints, Ints, Ints | None]]()
     for index in np.flatnonzero(surface.auxiliary).tolist():
-        of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
+        of_wall = topo.edges_of(surface.patch_of_face == index)
         edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
         if surface.on_ground[edges].any() and len(top):
             every.append((index, edges, top, None))

@@ -13,6 +13,7 @@ from ..base.errors import OptionError
 from ..base.tolerances import ON
 from ..forces.pinching import standing_part, under_low
 from ..surface import Surface, expect_surface
+from ..surface.held_curve import HeldCurve
 from ..surface.images import expect_no_images
 from ..surface.lagrange import middles_of_sides
 
@@ -208,14 +209,17 @@ def with_vertices_on(
     at, points = on[cut].between()
     new[drawn] = points[drawn]
     number = surface.n + np.arange(len(new))
-    halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
+    curves: tuple[HeldCurve, ...] = ()
+    if surface.held_curves:
+        halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
+        curves = on.cut(cut, at).joined(np.concatenate([surface.topology.edges[~cut], *halves]))
     return surface.with_mesh(
         np.concatenate([surface.support_columns, support]),
         vertices=np.concatenate([surface.vertices, new]),
         faces=F,
         patch_of_face=patch,
         cables=tuple(cable.cut(ends, number) for cable in surface.cables),
-        curves=on.cut(cut, at).joined(np.concatenate([surface.topology.edges[~cut], *halves])),
+        curves=curves,
     )
 
 

@@ -208,7 +208,7 @@ class Equilibrium:
     @cached_property
     def norm(self) -> float:
         """‖r‖, with the volumes' defects in units of force; of loose parts the worst counts as if all."""
-        if self.surface.topology.components.any():
+        if self.surface.topology.in_parts:
             left = relative_forces(self.surface, self.classes, self.X, self.unbalanced)
             return self._with_volumes(self.scale * left)
         return self._with_volumes(float(np.linalg.norm(self.forces)))

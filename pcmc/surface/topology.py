@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Ints, cached_array, read_only
+from ..base.arrays import Bools, Ints, cached_array, distinct, read_only
 from ..base.compiled import compiled
 
 SHEET, CURVE, POINT = 0, 1, 2
@@ -161,6 +161,10 @@ class Topology:
         """The curves of the chosen edges (e,), cut where other than two of them meet."""
         return self._curves(chosen, vertex_kind(self.edges[chosen], self.vertex_count) == POINT)
 
+    def edges_of(self, faces: Bools | Ints) -> Ints:
+        """The numbers of the edges of some faces, ascending."""
+        return distinct(self.edge_of_face[faces], len(self.edges))
+
     def edge_numbers(self, ends: Ints) -> Ints:
         """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
         return edge_places(ends, self.edges)
@@ -178,6 +182,12 @@ class Topology:
         if self.placed is not None:
             label[self.placed] = label[self.faces]
         return label
+
+    @cached_property
+    def in_parts(self) -> bool:
+        """Whether its faces form several connected parts."""
+        label = self.components[self.edges[:, 0]]
+        return bool((label != label[:1]).any())
 
     def _curves(self, mask: Bools, stop: Bools) -> tuple[EdgeCurve, ...]:
         sides = np.flatnonzero(mask[self.edge_of_face.ravel()])
