@@ -45,6 +45,7 @@ def test_refined_cells_have_the_same_topology_and_lattice():
     vault = refine(bay(3))
     assert vault.fixed.sum() == 14
     assert np.array_equal(*vault.fixed[vault.images].T)
+    assert refine(tube(3.0)).rooms == tube(3.0).rooms != ()
 
 
 def test_a_lattice_is_found_from_any_of_its_translations():
