@@ -48,6 +48,20 @@ def test_volumes_are_those_enclosed():
     assert room_volumes(bubbles).sum() == pytest.approx(pcmc.certify(bubbles).volume)
 
 
+def test_a_rim_closes_alike_however_its_straight_edges_are_divided():
+    corners = np.array([[0, 0, 1], [0.5, 0, 2], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])  # a gable on one side
+    volumes = []
+    for n in (1, 4):
+        sides = [a + (b - a) * np.arange(k)[:, None] / k for a, b, k in zip(corners, np.roll(corners, -1, 0),
+                 (n, n, 1, 1, 1), strict=True)]  # fmt: skip
+        X = np.concatenate([*sides, [[0.5, 0.5, 2.5]]])
+        rim = np.arange(len(X) - 1)
+        F = np.stack([rim, np.roll(rim, -1), np.full(len(rim), len(rim))], axis=1)
+        tent = Surface(X, F, [0] * len(F), [Patch("tent", 1.0)], rim, rooms=[Room("r", {"tent": 1}, 1.0)])
+        volumes.append(room_volumes(tent)[0])
+    assert volumes[1] == pytest.approx(volumes[0])
+
+
 def test_volumes_do_not_depend_on_where_the_surface_is():
     far = Plane((1e6, 2e6, 0.0))
     for surface in (raised(), arch(), cap(1.0)):
