@@ -86,7 +86,7 @@ def _far_volume(start: Surface) -> str:
     """What to do where a room is asked for many times its volume at the start, or a small part of it."""
     for room, volume in zip(start.rooms, room_volumes(start).tolist(), strict=True):
         if volume and room.volume and not 1.0 / FAR < abs(volume / room.volume) < FAR:
-            text = f"room {room.name!r} is to have the volume {room.volume:.4g} and has {volume:.4g} at the start:"
+            text = f"room {room.name!r} is to have {room.volume:.4g} and has {volume:.4g} at the start:"
             return f"{text} go there in steps of 3 times the volume or so, each from the surface before"
     return ""
 
