@@ -13,11 +13,11 @@ from math import inf
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints, Vector
-from ..base.compiled import compiled, inlined
+from ..base.arrays import Floats, Ints
+from ..base.compiled import compiled
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
-from ..surface.geometry import add, dot, edge_vectors, norm, point, scaled, sub, vertex_area_vectors
+from ..surface.geometry import edge_vectors, point, to_triangle, vertex_area_vectors
 
 SAME = 0.25  # of the mean edge: two shapes nowhere farther apart are one, as far as the mesh can tell
 # Caps of three rings and Enneper's surface of five, at rest with other triangles after other ways, are up to
@@ -101,27 +101,6 @@ def _distances(points: Floats, nearest: Ints, X: Floats, F: Ints, around: Ints, 
         p, best = point(points, i), inf
         for k in range(starts[nearest[i]], starts[nearest[i] + 1]):
             f = around[k]
-            best = min(best, _to_triangle(p, point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])))
+            best = min(best, to_triangle(p, point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])))
         out[i] = best
     return out
-
-
-@inlined
-def _to_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """Distance of p from a triangle: from its inside or, if the foot lies outside, from its edges."""
-    u, v, w = sub(b, a), sub(c, a), sub(p, a)
-    uu, uv, vv, wu, wv = dot(u, u), dot(u, v), dot(v, v), dot(w, u), dot(w, v)
-    det = uu * vv - uv * uv
-    if det > 0.0:
-        s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
-        if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
-            return norm(sub(w, add(scaled(s, u), scaled(t, v))))
-    return min(_to_segment(p, a, b), min(_to_segment(p, b, c), _to_segment(p, c, a)))
-
-
-@inlined
-def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
-    u, w = sub(b, a), sub(p, a)
-    uu = dot(u, u)
-    t = min(1.0, max(0.0, dot(w, u) / uu)) if uu > 0.0 else 0.0
-    return norm(sub(w, scaled(t, u)))

@@ -2,8 +2,8 @@
 
 The volume V of a room is that of the cones from ``Surface.origin`` to its patches, each with the sign of its
 normal, and of what closes their boundary. Along edges on Π the cones' sides lie in Π; along edges on other
-sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed; a flat fan about its
-middle closes it, and adds a constant.
+sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed; a flat fan about the
+middle of its length, which is the same on every mesh, closes it, and adds a constant.
 
 A pressure δ in all of the room adds -δ V to E. At rest the pressures δ are those at which V is as prescribed:
 δ is the multiplier of the condition V = V̄ in
@@ -22,7 +22,7 @@ from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
@@ -236,7 +236,7 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     for k in np.unique(piece):
         a, b = ends[piece == k].T
         n = count[piece == k]
-        middle = X[np.unique([a, b])].mean(axis=0)
+        middle = np.average(0.5 * (X[a] + X[b]), axis=0, weights=segment_lengths(X, ends[piece == k]))
         yield float((n * _cones(middle, X[b], X[a])).sum())
         net = np.zeros(surface.n)
         np.add.at(net, b, n)

@@ -86,7 +86,8 @@ def _refined_cell(surface: Surface, project: Projection | None) -> Surface:
     vertex = np.unique(number, return_index=True)[1][number]
     midpoints = surface.n + np.stack([k, vertex], axis=1)[vertex != k]
     fine = refine(surface.cell, 1, project)
-    return fine.with_mesh(columns, images=np.concatenate([surface.images, midpoints]))
+    images = np.concatenate([surface.images, midpoints])
+    return fine.with_mesh(columns, images=images, rooms=surface.rooms)
 
 
 def refinable(name: str, levels: object, triangles: int) -> int:

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled, inlined
+from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import Vector, add, area_vectors, cross, dot, norm, point, scaled, sub, vertex_sums
+from ..surface.geometry import area_vectors, point, to_triangle, vertex_sums
 
 
 def distances(points: Floats, X: Floats, F: Ints) -> Floats:
@@ -68,25 +68,5 @@ def _nearest(points: Floats, X: Floats, F: Ints, start: Ints, candidates: Ints) 
         p = point(points, i)
         for f in candidates[start[i] : start[i + 1]]:
             a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
-            out[i] = min(out[i], _distance(p, a, b, c))
+            out[i] = min(out[i], to_triangle(p, a, b, c))
     return out
-
-
-@inlined
-def _distance(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """From the triangle's plane if the point is above the triangle, else from its nearest side."""
-    normal = cross(sub(b, a), sub(c, a))
-    first = dot(cross(sub(b, a), sub(p, a)), normal)
-    second = dot(cross(sub(c, b), sub(p, b)), normal)
-    third = dot(cross(sub(a, c), sub(p, c)), normal)
-    if first >= 0.0 and second >= 0.0 and third >= 0.0 and norm(normal) > 0.0:
-        return abs(dot(sub(p, a), normal)) / norm(normal)
-    return min(_from_side(p, a, b), min(_from_side(p, b, c), _from_side(p, c, a)))
-
-
-@inlined
-def _from_side(p: Vector, a: Vector, b: Vector) -> float:
-    side, to = sub(b, a), sub(p, a)
-    squared = dot(side, side)
-    share = min(max(dot(to, side) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
-    return norm(sub(p, add(a, scaled(share, side))))

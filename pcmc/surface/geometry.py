@@ -206,3 +206,23 @@ def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
 def cross_2d(u: Floats, v: Floats) -> Floats:
     """(…) u × v of plane vectors (…,2): the area of their parallelogram, positive counter-clockwise."""
     return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+
+@inlined
+def to_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
+    """The distance of p from a triangle: from its plane where p is above it, else from its nearest side."""
+    normal = cross(sub(b, a), sub(c, a))
+    first = dot(cross(sub(b, a), sub(p, a)), normal)
+    second = dot(cross(sub(c, b), sub(p, b)), normal)
+    third = dot(cross(sub(a, c), sub(p, c)), normal)
+    if first >= 0.0 and second >= 0.0 and third >= 0.0 and norm(normal) > 0.0:
+        return abs(dot(sub(p, a), normal)) / norm(normal)
+    return min(_to_side(p, a, b), min(_to_side(p, b, c), _to_side(p, c, a)))
+
+
+@inlined
+def _to_side(p: Vector, a: Vector, b: Vector) -> float:
+    side, to = sub(b, a), sub(p, a)
+    squared = dot(side, side)
+    share = min(max(dot(to, side) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
+    return norm(sub(p, add(a, scaled(share, side))))

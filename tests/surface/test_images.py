@@ -45,6 +45,7 @@ def test_refined_cells_have_the_same_topology_and_lattice():
     vault = refine(bay(3))
     assert vault.fixed.sum() == 14
     assert np.array_equal(*vault.fixed[vault.images].T)
+    assert refine(tube(3.0)).rooms == tube(3.0).rooms != ()
 
 
 def test_a_lattice_is_found_from_any_of_its_translations():
@@ -158,7 +159,8 @@ def test_pressure_at_a_free_edge_is_refused():
 
 
 def test_a_lattice_needs_independent_translations():
-    for lattice in ([], [[0, 0, 0]], [[1, 0, 0], [2, 0, 0]], np.ones((4, 3))):
+    wrong = ([], [[0, 0, 0]], [[1, 0, 0], [2, 0, 0]], np.ones((4, 3)), np.ones((3, 2)), [[np.nan, 0, 0]], "a")
+    for lattice in wrong:
         with refused(SurfaceError, what="lattice"):
             images_in(SQUARE, lattice)
 
