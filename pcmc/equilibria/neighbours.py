@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..base import validate
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import vanished_films
 from ..forces.functional import energy
@@ -79,6 +80,8 @@ def swap_neighbours(
     'SW' and 'SE' now meet, and 'NW' and 'NE'; E = 1.866025, 2.236... before
     """
     expect_surface(surface)
+    if not isinstance(patches, str | Sequence | None):
+        validate.refuse("patches", patches, "the name of a film, or a list of names")
     names = [patches] if isinstance(patches, str) else patches or vanished_films(surface)
     if not names:
         known = listed([patch.name for patch in surface.patches])

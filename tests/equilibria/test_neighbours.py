@@ -198,6 +198,7 @@ def test_what_cannot_be_swapped_is_refused_in_a_line() -> None:
         (films, "midle", "unknown patch 'midle'; did you mean 'middle'?"),
         (films, "south-west", "patch 'south-west' is no film between two junctions"),
         (films.rebuilt(fixed=np.ones(films.n, dtype=bool)), "middle", "held at different places"),
+        (films, 5, "patches: expected the name of a film, or a list of names, found 5"),
         (films, None, "no film between two junctions has vanished; name the one to swap"),
         (elevate(between_plates(films), 2), "middle", "order"),
     ):

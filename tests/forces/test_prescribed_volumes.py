@@ -244,6 +244,24 @@ def test_the_volume_is_reached_from_far_away():
     assert room_volumes(result.surface) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("times", [1e-3, 1e3])
+def test_bubbles_that_nothing_holds_come_to_rest_from_any_size(times):
+    one = generators.double_bubble(volumes=(1.0, 1.0))
+    other = one.retensioned(volumes={"left": times, "right": times})
+    energy = pcmc.solve(one).energy
+    assert pcmc.solve(other).energy / times ** (2 / 3) == pytest.approx(energy, rel=1e-3)
+
+
+def test_a_volume_too_far_from_that_of_the_start_is_reached_in_steps():
+    start = cap(0.5)
+    far = pcmc.solve(start.retensioned(volumes={"room": 300.0}))
+    assert "go there in steps of 3 times the volume or so, each from the surface before" in str(far)
+    for volume in (1.5, 4.5, 13.5, 40.5, 120.0, 300.0):
+        result = pcmc.solve(start.retensioned(volumes={"room": volume}))
+        start = result.surface
+    assert result.converged
+
+
 def test_the_result_shows_its_rooms():
     result = pcmc.solve(cap(1.0).retensioned(pressures={"cap": 0.2}))
     row = result.rooms.iloc[0]
