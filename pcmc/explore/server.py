@@ -147,14 +147,15 @@ class Explorer:
         about, arrays = page_data.outline(state.surface, origin)
         header, fields = self._shown(state)
         left_out = LEFT_OUT if has_members(roof.outcome) and "member_ends" not in fields else ""
+        untouched = state.surface is self.start.surface  # which the note tells of
         once = {
             "session": name,
             "formats": list(FORMATS),
             "title": roof.title,
             "name": roof.name,
             "units": page_data.unit_texts(roof.outcome.units),
-            "note": "; ".join(filter(None, (roof.note, left_out))),
-            "note_met": roof.outcome.result is not None and roof.outcome.good,
+            "note": "; ".join(filter(None, (roof.note if untouched else "", left_out))),
+            "note_met": untouched and roof.outcome.result is not None and roof.outcome.good,
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",
             "quantities": page_data.target_choices(state.surface),

@@ -33,14 +33,15 @@ Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
     """The values of a surface that can be changed, by kind and name; points are [x, y, z].
 
-    Not those that follow from others: pressures around rooms of given volume, of walls and of the lower
-    sheets of cushions, snow of walls.
+    Not those that follow from others: tension and pressure of the lower sheets of cushions, pressures around
+    rooms of given volume and of walls, snow of walls.
     """
-    computed = _names(surface, surface.room_signs.any(axis=0) | surface.walls)
-    computed |= {*sheets_below(surface).values()}
+    values, lower = all_values(surface), {*sheets_below(surface).values()}
+    computed = lower | _names(surface, surface.room_signs.any(axis=0) | surface.walls)
     points = surface.vertices[single_points(surface)].tolist()
     return {
-        **(values := all_values(surface)),
+        **values,
+        "tensions": {name: alpha for name, alpha in values["tensions"].items() if name not in lower},
         "pressures": {name: p for name, p in values["pressures"].items() if name not in computed},
         "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
         **{kind: {name: w for name, w in values[kind].items() if w} for kind in ("weights", "cable_weights")},

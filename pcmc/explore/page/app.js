@@ -190,8 +190,8 @@ class Page {
 
   /** Show an answer; with `values` set the sliders too, which must not happen while one moves. */
   async show({ header, arrays }, values) {
-    if (header.mesh !== this.mesh) {
-      await this.reopen(false); // the file behind the page is the same
+    if (header.mesh !== this.mesh || !this.panel.covers(header.values.shown)) {
+      await this.reopen(false); // same file: other triangles or sliders
       return;
     }
     this.header = header;

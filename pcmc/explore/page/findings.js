@@ -2,6 +2,7 @@
 
 import { colourOf, diverging, familyField, sequential } from "./colours.js";
 import { capital, digits, element, tableOf, tableRow } from "./elements.js";
+import { QUANTITIES } from "./panel.js";
 
 const SIGNS = {
   stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", ran_away: "↗",
@@ -33,9 +34,12 @@ export function showVerdict(root, header) {
 /** Which surface the page shows if there is none for the values asked for. */
 function drawn({ values: { asked, shown } }) {
   const near = (a, b) => Math.abs(a - b) <= 1e-9 * Math.abs(b);
-  const values = Object.keys(shown.tensions).flatMap((name) => [["tensions", "α"], ["pressures", "p"]]
-    .filter(([kind]) => name in shown[kind] && !near(shown[kind][name], asked[kind][name]))
-    .map(([kind, sign]) => `${name} ${sign} = ${digits(shown[kind][name])}`));
+  const values = Object.entries(QUANTITIES).flatMap(([kind, { label }]) => Object.entries(shown[kind])
+    .filter(([name, has]) => !near(has, asked[kind][name] ?? 0))
+    .map(([name, has]) => `${name} ${label.split(" ").pop()} = ${digits(has)}`));
+  values.push(...Object.entries(shown.points)
+    .filter(([name, at]) => at.some((x, k) => !near(x, asked.points[name][k])))
+    .map(([name, at]) => `${name} at (${at.map((x) => digits(x)).join(", ")})`));
   if (!values.length) return "Shown: the surface as given";
   const listed = values.slice(0, 3).join(", ") + (values.length > 3 ? ", …" : "");
   return `Shown: the last surface at rest, ${listed}`;

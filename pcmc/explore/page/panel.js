@@ -5,7 +5,7 @@ import { digits, element, input } from "./elements.js";
 const STEPS = 1000;
 const ROOM = 2; // times a value beyond the slider's end: where it ends then
 const AXES = ["x", "y", "z"];
-const QUANTITIES = {
+export const QUANTITIES = {
   tensions: { label: "Tension α", unit: "tension" },
   pressures: { label: "Pressure p", unit: "pressure" },
   snows: { label: "Snow s", unit: "pressure" },
@@ -65,7 +65,8 @@ export class Panel {
   }
 
   card(group, index, patches, asked) {
-    const target = element("span.target");
+    const follows = group.patch !== null && !group.kinds.includes("tensions");
+    const target = element("span.target", follows ? "follows the sheet above" : "");
     const head = element("span.head", element("span.name", group.name), target);
     if (group.patch !== null) {
       const swatch = element("span.swatch");
@@ -73,7 +74,7 @@ export class Panel {
       head.prepend(swatch);
     }
     return element("fieldset", element("legend", head), ...group.kinds.map((kind) => (kind === "points"
-      ? this.point(group, asked) : this.row(group, index, kind, asked[kind][group.name], target))));
+      ? this.point(group, asked) : this.row(group, index, kind, asked[kind][group.name] ?? 0, target))));
   }
 
   /** A single held point: three numbers, which dragging it in the picture changes, too. */
@@ -143,7 +144,8 @@ export class Panel {
     const mine = this.rows.filter((r) => r.index === entry.index);
     const [alpha, p, s, w] = ["tensions", "pressures", "snows", "weights"]
       .map((k) => mine.find((r) => r.kind === k)?.value);
-    const curved = alpha !== undefined && p !== undefined && w === undefined;
+    if (alpha === undefined) return;
+    const curved = p !== undefined && w === undefined;
     const net = s ? `p − s = ${digits(p - s)}, H̄ =` : "H̄ = p / 2α =";
     entry.target.textContent = entry.group.wall ? "wall"
       : curved ? `${net} ${digits((p - (s ?? 0)) / (2 * alpha), 3)}` : "";
@@ -152,9 +154,7 @@ export class Panel {
   /** Show the values asked for; where the surface shown has others, mark them. */
   show({ asked, shown }, all) {
     for (const entry of this.rows) {
-      const wanted = asked[entry.kind][entry.group.name];
-      const has = shown[entry.kind][entry.group.name];
-      if (wanted === undefined || has === undefined) continue; // a patch without pressure has become a wall
+      const [wanted, has] = [asked, shown].map((values) => values[entry.kind][entry.group.name] ?? 0);
       if (all) this.put(entry, wanted);
       if (entry.numbers) continue;
       const part = entry.range.place(has) / STEPS;
@@ -162,6 +162,12 @@ export class Panel {
       entry.shown.style.left = `calc(8px + ${part} * (100% - 16px) - 1px)`;
       entry.shown.title = `the surface shown has ${digits(has)}`;
     }
+  }
+
+  /** Whether each of these values has its row: a snow or weight of zero has none. */
+  covers(values) {
+    return Object.entries(values).every(([kind, named]) => Object.keys(named).every(
+      (name) => this.rows.some((row) => row.kind === kind && row.group.name === name)));
   }
 
   /** The values for the server. */

@@ -1,0 +1,68 @@
+"""Explore: the values beside the sliders are those of the surface, whatever came before."""
+
+from __future__ import annotations
+
+from asking import Client
+from browsing import Explored, needs_browser
+
+import pcmc
+from pcmc import explore
+from pcmc.plan import Plan
+
+SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
+
+
+def test_the_lower_sheet_of_a_cushion_follows_the_slider_of_the_upper_one():
+    running = explore.start(Plan(SQUARE, edge_length=1.0, tension=2.0, cushion=1.5).surface())
+    try:
+        client = Client(running)
+        header, _ = client.ask("/api/open")
+        values = header["values"]["asked"]
+        assert [group["kinds"] for group in header["controls"]] == [["tensions", "pressures"], []]
+        values["tensions"]["patch 1"] = 4.0
+        client.ask(
+            f"/api/{header['session']}/settle", {key: values[key] for key in ("tensions", "pressures")}
+        )
+        surface = running.session(header["session"]).surface
+        assert [patch.tension for patch in surface.patches] == [4.0, 6.0]
+    finally:
+        running.close()
+
+
+def test_a_page_that_is_opened_again_says_nothing_of_targets_that_its_roof_no_longer_meets(hall_roof):
+    running = explore.start(hall_roof)
+    try:
+        client = Client(running)
+        header, _ = client.ask("/api/open")
+        name = {"session": header["session"]}
+        assert client.ask("/api/open", name)[0]["note"] == "met: every target is reached"
+        client.ask(f"/api/{name['session']}/settle", {"tensions": {"west": 9.0}})
+        again, _ = client.ask("/api/open", name)
+        assert (again["note"], again["note_met"]) == ("", False)
+    finally:
+        running.close()
+
+
+@needs_browser
+def test_a_snow_of_zero_is_one_value_among_others(driver):
+    """Undo brings it back, its slider comes back with it, and the card names it where it is the last."""
+    snowy = pcmc.solve(Plan(SQUARE, edge_length=1.0, tension=2.0, snow=0.25).surface()).surface
+    running = explore.start(snowy)
+    try:
+        page = Explored(driver, running.url)
+        label = "Snow s of patch 1"
+        for value in (0, 0.5):
+            page.enter(label, value)
+        page.find("#undo").click()
+        page.idle()
+        assert page.number(label).get_attribute("value") == "0"
+        driver.refresh()
+        page.idle()
+        assert label not in page.find("#patches").get_attribute("innerHTML")
+        page.find("#reset").click()
+        page.idle()
+        assert page.number(label).get_attribute("value") == "0.25"
+        page.enter(label, -30)
+        assert "the last surface at rest, patch 1 s = -" in page.text("#verdict .detail")
+    finally:
+        running.close()
