@@ -9,7 +9,7 @@ from typing import Any
 from ..base import validate
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import vanished_films
-from ..forces.functional import energy
+from ..forces.rooms import energy_at_volumes
 from ..meshing.films import film_of
 from ..meshing.neighbour_swap import swap
 from ..solvers import solve
@@ -97,7 +97,8 @@ def swap_neighbours(
             sentences.append(film.meeting(before, "now"))
     result = solve(changed, **options)
     if result.converged:
-        sentences.append(f"E = {result.energy:.7g}, {energy(surface):.7g} before")
+        now, then = energy_at_volumes(result.surface), energy_at_volumes(surface)
+        sentences.append(f"E = {now:.7g}, {then:.7g} before")
         return NeighbourSwap(result.surface, True, "; ".join(sentences), result)
     again = [name for name in vanished_films(result.surface) if name in names]
     why = f"patch {again[0]!r} vanishes again" if again else result.message

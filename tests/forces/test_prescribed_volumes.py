@@ -23,6 +23,7 @@ from pcmc.forces.rooms import (
     room_volumes,
     with_room_pressures,
 )
+from pcmc.plan import Divider, Plan
 from pcmc.stability.equilibrium import Equilibrium
 from pcmc.surface.symmetry import mirrored
 
@@ -260,6 +261,15 @@ def test_a_volume_too_far_from_that_of_the_start_is_reached_in_steps():
         result = pcmc.solve(start.retensioned(volumes={"room": volume}))
         start = result.surface
     assert result.converged
+
+
+def test_the_pressure_of_a_room_beside_one_of_given_pressure_is_that_on_its_roof():
+    patches = {"west": {"tension": 5.0, "volume": 40.0}, "east": {"tension": 4.5}}
+    walls = [Divider([[6, 0], [6, 8]], wall=1.5)]
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], walls, edge_length=1.5, patches=patches)
+    result = pcmc.solve(plan.surface())
+    assert result.surface.pressures[2] == pytest.approx(result.surface.pressures[0] - 1.0)  # the wall
+    assert result.certificate.rooms.pressure[0] == pytest.approx(result.surface.pressures[0], rel=1e-12)
 
 
 def test_the_result_shows_its_rooms():
