@@ -37,7 +37,7 @@ def test_of_roofs_side_by_side_each_carries_its_own_load():
     weak = Plan([[0, 0], [10, 0], [10, 6], [0, 6]], tension=1.0, edge_length=1.0).surface()
     X, F, n = weak.vertices, weak.faces, weak.n
     both = Surface(
-        np.concatenate([X, X + [20.0, 0.0, 0.0]]),
+        np.concatenate([X, X + np.array([20.0, 0.0, 0.0])]),
         np.concatenate([F, F + n]),
         np.repeat([0, 1], len(F)),
         [Patch("weak", 1.0), Patch("strong", 10.0)],

@@ -80,7 +80,7 @@ def test_a_usual_section_between_two_roofs_is_left_out():
     X = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]])
     F = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
     two = pcmc.Surface(
-        [*X, *(X + [4, 0, 0])],
+        [*X, *(X + np.array([4, 0, 0]))],
         [*F, *(F + 5)],
         [0] * 8,
         [pcmc.Patch("roofs", 1.0)],
