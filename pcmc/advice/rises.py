@@ -94,8 +94,10 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     if not rises:
         return plan, [], []
     require("shapely", extra="plan")
+    from ..plan.draft import part_count
     from ..plan.proposal import largest_circle, least_tension, plan_area
 
+    part_count(plan)  # refuses lines that do not fit together, which have no area
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)

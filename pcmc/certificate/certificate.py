@@ -145,6 +145,11 @@ class Certificate:
         symmetric in these; ``certify(surface, whole=True)`` is about all."""
         return tuple(str(plane) for plane, _ in self.acting.surface.on_planes if plane.mirror)
 
+    @property
+    def part(self) -> str:
+        """Which part of a roof with mirror planes this is; empty for a whole roof."""
+        return "a part of the roof, which goes on behind its mirror planes" if self.symmetric_in else ""
+
     @cached_property
     def leaning(self) -> pd.DataFrame:
         """A row per wall: its largest angle from the vertical of Π, degrees, and the place."""

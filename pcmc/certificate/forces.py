@@ -12,6 +12,7 @@ left in the limit. Forces at points are those of cables that end, and of points 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -110,8 +111,14 @@ class Forces:
     cable_ends: list[CableEnd]
 
     @classmethod
-    def of(cls, surface: Surface, given: Floats | None = None, standing: Surface | None = None) -> Forces:
-        """The forces on a surface, with its own reactions or ``given`` ones (n,3).
+    def of(
+        cls,
+        surface: Surface,
+        given: Floats | None = None,
+        standing: Surface | None = None,
+        at_ends: list[CableEnd] | None = None,
+    ) -> Forces:
+        """The forces on a surface, with its own reactions or ``given`` ones (n,3); so ``at_ends`` of cables.
 
         A vertex on several planes divides its force among them: Σ c_i n_i of their normals. Where a fixed
         vertex lies in mirror planes, these take the part across them.
@@ -125,7 +132,7 @@ class Forces:
         """
         standing = standing_part(surface).surface if standing is None else standing
         forces = reactions(standing) if given is None else given
-        topo, cables = surface.topology, cable_ends(standing)
+        topo, cables = surface.topology, cable_ends(standing) if at_ends is None else at_ends
         ends = np.zeros_like(forces)
         for _, vertex, force in cables:
             ends[vertex] += force
@@ -269,13 +276,18 @@ def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
     return parts
 
 
-def cable_ends(surface: Surface) -> list[CableEnd]:
-    """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it."""
-    found = []
+def cable_ends(
+    surface: Surface, X: Floats | None = None, tensions: Mapping[str, Floats] | None = None
+) -> list[CableEnd]:
+    """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it; or
+    with other positions X (n,3) and ``tensions`` (k,) of the edges of each cable, by name."""
+    found, X = [], surface.vertices if X is None else X
     for cable, curve in cable_parts(surface):
         for pair in curve.ends:
-            pull = pull_along(surface, cable, pair[:1]) * directions(surface.vertices, pair[None])[0][0]
-            found.append((cable, int(pair[0]), -pull))
+            pull = pull_along(surface, cable, pair[:1])
+            if tensions is not None:
+                pull = tensions[cable.name][(np.sort(cable.edges, axis=1) == np.sort(pair)).all(axis=1)]
+            found.append((cable, int(pair[0]), -pull * directions(X, pair[None])[0][0]))
     return found
 
 

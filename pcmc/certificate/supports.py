@@ -47,7 +47,8 @@ class _Source(NamedTuple):
 def support_table(acting: Forces) -> pd.DataFrame:
     """A row per support of the part of a surface that stands; together they carry all its reactions.
 
-    Where curves meet in a corner, they share its force equally.
+    Where curves meet in a corner, each has half the pulls on its own edges there, and an equal share of the
+    rest of the force, which vanishes as the mesh is refined.
 
     Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
     for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
@@ -176,10 +177,13 @@ def _labelled(acting: Forces) -> Iterator[_Part]:
             if len(left):
                 parts = [*parts, _Part(name, kind, left, acting.surface.vertices[left].mean(axis=0))]
                 sharing[left] = 1.0
-        for part in parts:
+        own, every = [_half_pulls(acting, part) for part in parts], np.zeros_like(forces)
+        for part, pulled in zip(parts, own, strict=True):
+            every[part.vertices] += pulled
+        for part, pulled in zip(parts, own, strict=True):
             letter = LETTERS.get(part.kind, "B")
             count[letter] += 1
-            share = forces[part.vertices] / sharing[part.vertices, None]
+            share = pulled + (forces - every)[part.vertices] / sharing[part.vertices, None]
             yield part._replace(forces=share, label=f"{letter}{count[letter]}")
 
 
@@ -267,6 +271,16 @@ def _pulled(acting: Forces, part: _Part) -> tuple[Ints, Floats]:
         return part.edges, part.pulls
     edges = part.edges[acting.lines[part.edges].any(axis=1)]
     return edges, acting.pulls[edges]
+
+
+def _half_pulls(acting: Forces, part: _Part) -> Floats:
+    """(k,3) the force on each vertex of a support of half the pulls along its edges there."""
+    edges, pulls = _pulled(acting, part)
+    topo, force = acting.surface.topology, np.zeros_like(acting.reactions)
+    half = 0.5 * segment_lengths(acting.surface.vertices, topo.sides[edges])[:, None] * pulls
+    for side in (0, 1):
+        np.add.at(force, topo.edges[edges, side], half)
+    return force[part.vertices]
 
 
 def _patch_of_edge(surface: Surface) -> Ints:

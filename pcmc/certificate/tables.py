@@ -134,7 +134,12 @@ def _along_curve(
 ) -> tuple[Floats, Floats, dict[str, float]]:
     """Lengths, |Σ α n + load| (k,) of a curve's edges; its length, middle, largest force left per length."""
     lengths = curve_lengths(surface, curve)
-    sums = np.linalg.norm(sheet_pulls(surface, curve.pairs) + load, axis=1)
+    pulls = sheet_pulls(surface, curve.pairs) + load
+    for plane, on in (
+        pair for pair in surface.on_planes if pair[0].mirror
+    ):  # its image takes the part across
+        pulls -= np.outer(on[curve.pairs].all(axis=1) * (pulls @ plane.normal), plane.normal)
+    sums = np.linalg.norm(pulls, axis=1)
     most = float(np.linalg.norm(left, axis=1).max(initial=0.0)) / (float(lengths.mean()) or 1.0)
     return lengths, sums, {"length": float(lengths.sum()), **middle(surface, curve), "force_left": most}
 

@@ -9,17 +9,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints, cached_array
+from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..forces.triangles import effective_tensions
 from ..surface import Surface
 from ..surface.geometry import face_areas
-from .cut_mesh import CutMesh
+from ..surface.supports import mirror_edges
+from .cut_mesh import ON, CutMesh
 from .flattening import flattened
 from .layout import ClothSheet, sheet_axes
 from .settings import CuttingOptions
 from .strips import Seam, Side
 
-KINDS = ("seam", "junction", "rim")  # in the order of their numbers
+KINDS = ("seam", "junction", "mirror", "rim")  # in the order of their numbers
 
 
 class StripSides(NamedTuple):
@@ -122,6 +123,14 @@ class Cloth:
         seam[self.mesh.topology.edge_numbers(self.mesh.cuts)] = self.mesh.seam
         return seam
 
+    @cached_array
+    def mirror_edge(self) -> Bools:
+        """(e,) the edges of the mesh in mirror planes, where cloth is sewn to its image."""
+        X, near = self.mesh.X, ON * self.mesh.size
+        return mirror_edges(
+            [(p, abs(p.height(X)) <= near) for p, _ in self.surface.on_planes], self.mesh.topology
+        )
+
     def outlines(self, strip: int) -> list[Ints]:
         """The outlines of a strip: its vertices in the order of its triangles, the longest first."""
         mine, found = self.sides.strip == strip, []
@@ -171,12 +180,14 @@ def seams_of(cloth: Cloth) -> list[Seam]:
     start = np.flatnonzero(np.append(True, np.diff(sides.edge) > 0))
     keys: dict[tuple[Any, ...], list[int]] = {}
     for edge, strips in zip(sides.edge[start].tolist(), np.split(sides.strip, start[1:]), strict=True):
-        keys.setdefault((tuple(sorted(strips.tolist())), int(cloth.seam_of_edge[edge])), []).append(edge)
+        key = tuple(sorted(strips.tolist())), int(cloth.seam_of_edge[edge]), bool(cloth.mirror_edge[edge])
+        keys.setdefault(key, []).append(edge)
     seams: list[Seam] = []
-    for (beside, number), edges in keys.items():
+    for (beside, number, mirror), edges in keys.items():
         mask = np.zeros(len(topo.edges), dtype=bool)
         mask[edges] = True
-        kind = "rim" if len(beside) == 1 else "seam" if number >= 0 else "junction"
+        alone = "mirror" if mirror else "rim"
+        kind = alone if len(beside) == 1 else "seam" if number >= 0 else "junction"
         for curve in topo.curves_among(mask):
             at = np.searchsorted(sides.edge, topo.edge_numbers(curve.pairs))[:, None] + np.arange(len(beside))
             onward = (curve.pairs[:, 0] < curve.pairs[:, 1])[:, None]

@@ -14,7 +14,6 @@ import pandas as pd
 from ..base.arrays import Floats
 from ..base.libraries import load_library
 from ..base.units import Units, as_units, expect_length, length_factor
-from ..certificate.certificate import warning_mark
 from ..drawings import DrawingSet, Sheet
 from ..drawings.drawing_set import CSV, DECIMALS, document_files
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
@@ -24,7 +23,7 @@ from ..surface.geometry import cross_2d, unit_vectors
 from .strips import CuttingPattern, Seam, Side, Strip
 
 SUFFIXES, TABLES = (*DRAWINGS, CSV), ("", "seams")  # tables of strips and of seams
-LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "rim": "PCMC-RIM"}
+LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "mirror": "PCMC-SEAM", "rim": "PCMC-RIM"}
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
 MITRE = 3.0  # of an allowance: farther from its corner cloth is cut across
@@ -70,7 +69,7 @@ def pattern_drawings(
     if len(sewn):
         table = _texts(sewn, decimals, "length", "cut_length")
         sheets += table_sheets("Seams", table.rename(columns={"cut_length": "cut length"}), sheet, 2)
-    add_frames(sheets, name, length, warning_mark(pattern.certificate))
+    add_frames(sheets, name, length, pattern.certificate)
     rows = [[str(strip.number), *at, "strip"] for strip, at in _middles(pattern)]
     points = pd.DataFrame(rows, columns=["point", *"xyz", "on"])
     about = pattern.surface, length, pattern.certificate, _curves(pattern)
@@ -148,7 +147,10 @@ def strip_lines(
                 at, inward = _along(seam, side, strip, place)
                 marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
             at, inward = _along(seam, side, strip, 0.5 * seam.length)
-            others = "+".join(str(s.strip) for s in seam.sides if s is not side)
+            others = (
+                "+".join(str(s.strip) for s in seam.sides if s is not side)
+                or (seam.kind == "mirror") * "image"
+            )
             labels.append((at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
     cloth = _with_allowances(strip, added)
     shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []

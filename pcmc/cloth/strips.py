@@ -87,10 +87,11 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """A line along which cloth is cut: a seam within a sheet, a junction of sheets, or a rim."""
+    """A line along which cloth is cut: a seam within a sheet, a junction of sheets, a rim, or the line in a
+    mirror plane, which is a seam to the image."""
 
     number: int
-    kind: str  # "seam", "junction" or "rim"
+    kind: str  # "seam", "junction", "mirror" or "rim"
     points: Floats  # (k,3) on the roof; the first is repeated at the end if it is closed
     sides: Sequence[Side]
 
@@ -177,6 +178,7 @@ class CuttingPattern:
         table, seams = self.table, self.seam_table
         sewn = seams[seams["kind"] != "rim"]
         rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
+        rows |= {"extent": self.certificate.part} if self.certificate.part else {}
         rows |= {"units": units.sentence} if units else {}
         long, wide = table["length"].max(), table["width"].max()
         rows["strips"] = f"{len(table)}, up to {long:.5g} long and {wide:.5g} wide"

@@ -18,7 +18,7 @@ from ..base.errors import OptionError
 from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
-from ..certificate.certificate import certified, warning_mark
+from ..certificate.certificate import certified
 from ..panelling import Panels, panels
 from ..surface import Surface, expect_surface
 from ..surface.images import expect_no_images
@@ -221,8 +221,7 @@ def drawing_set(
         triangles = triangles_at_true_size(schedule, millimetres)
         flat = flat_panels(triangles)
         sheets += panels_at_true_size(triangles, sheet)
-    part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
-    add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
+    add_frames(sheets, name, length, certificate)
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
     listed = (curves, cut, points, marks, schedule, flat, sheets)
     return DrawingSet(surface, length, certificate, *listed, {texts["member"]: texts for texts in about})

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..base import validate
 from ..base.units import Units, as_units, expect_length, length_factor
-from ..certificate.certificate import warning_mark
 from ..panelling import PanelNet
 from .drawing_set import CSV, DECIMALS, DrawingSet, document_files
 from .drawing_set import SUFFIXES as DRAWINGS
@@ -61,7 +60,7 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
         sheets += table_sheets(title, table, sheet, decimals, head)
     panels = polygons_at_true_size(net, millimetres)
     sheets += panel_sheets(panels, sheet)
-    add_frames(sheets, name, length, warning_mark(net.certificate))
+    add_frames(sheets, name, length, net.certificate)
     points = net.nodes[["node", *"xyz"]].rename(columns={"node": "point"}).astype({"point": str})
     points = points.assign(on="panel")
     about = net.mesh, length, net.certificate, curves

@@ -14,6 +14,7 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..base.libraries import require
+from ..certificate.certificate import Certificate, warning_mark
 
 FORMATS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0)}
 FORMATS["A0"] = (1189.0, 841.0)
@@ -191,8 +192,9 @@ def corner() -> Floats:
     return np.array([MARGIN + GAP, MARGIN + STRIP + GAP])
 
 
-def add_frames(sheets: list[Sheet], name: str, units: str, mark: str) -> None:
-    """Give each sheet its frame, its title strip with its number, and the mark, if there is one."""
+def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate) -> None:
+    """Give each sheet its frame, its title strip with its number, and the mark of a roof that needs one."""
+    mark = warning_mark(certificate)
     for number, sheet in enumerate(sheets, start=1):
         width, height = sheet.size
         low, right, top = MARGIN, width - MARGIN, height - MARGIN
@@ -200,7 +202,7 @@ def add_frames(sheets: list[Sheet], name: str, units: str, mark: str) -> None:
         strip = np.array([[low, low + STRIP], [right, low + STRIP]])
         sheet.lines += [SheetLine(frame, "PCMC-FRAME", True), SheetLine(strip, "PCMC-FRAME")]
         upper, lower = low + 0.7 * STRIP, low + 0.28 * STRIP
-        about = [name, f"scale {sheet.scale}" if sheet.scale else "", f"lengths in {units}"]
+        about = [name, certificate.part, f"scale {sheet.scale}" if sheet.scale else "", f"lengths in {units}"]
         sheet.texts += [
             Text((low + 4.0, upper), sheet.title, LARGE),
             Text((low + 4.0, lower), ", ".join(filter(None, about))),

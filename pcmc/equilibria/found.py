@@ -13,8 +13,7 @@ from ..accuracy import MeshCheck
 from ..base import validate
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
-from ..forces.functional import patch_volumes
-from ..forces.rooms import room_pressures
+from ..forces.rooms import energy_at_volumes
 from ..forces.volume_below import volume_below
 from ..solvers.continuation import Branch
 from ..surface import Surface
@@ -47,11 +46,7 @@ class FoundEquilibrium:
 
     @cached_property
     def energy(self) -> float:
-        surface, energy = self.surface, self.certificate.energy
-        if not surface.rooms:
-            return energy
-        volumes = surface.room_signs @ patch_volumes(surface, surface.vertices)
-        return energy + float(room_pressures(surface) @ volumes)
+        return energy_at_volumes(self.surface)
 
     @property
     def height(self) -> float:

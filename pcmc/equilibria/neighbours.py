@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..base import validate
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import vanished_films
-from ..forces.functional import energy
+from ..forces.rooms import energy_at_volumes
 from ..meshing.films import film_of
 from ..meshing.neighbour_swap import swap
 from ..solvers import solve
@@ -79,6 +80,8 @@ def swap_neighbours(
     'SW' and 'SE' now meet, and 'NW' and 'NE'; E = 1.866025, 2.236... before
     """
     expect_surface(surface)
+    if not isinstance(patches, str | Sequence | None):
+        validate.refuse("patches", patches, "the name of a film, or a list of names")
     names = [patches] if isinstance(patches, str) else patches or vanished_films(surface)
     if not names:
         known = listed([patch.name for patch in surface.patches])
@@ -94,7 +97,8 @@ def swap_neighbours(
             sentences.append(film.meeting(before, "now"))
     result = solve(changed, **options)
     if result.converged:
-        sentences.append(f"E = {result.energy:.7g}, {energy(surface):.7g} before")
+        now, then = energy_at_volumes(result.surface), energy_at_volumes(surface)
+        sentences.append(f"E = {now:.7g}, {then:.7g} before")
         return NeighbourSwap(result.surface, True, "; ".join(sentences), result)
     again = [name for name in vanished_films(result.surface) if name in names]
     why = f"patch {again[0]!r} vanishes again" if again else result.message

@@ -2,8 +2,8 @@
 
 The volume V of a room is that of the cones from ``Surface.origin`` to its patches, each with the sign of its
 normal, and of what closes their boundary. Along edges on Π the cones' sides lie in Π; along edges on other
-sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed; a flat fan about its
-middle closes it, and adds a constant.
+sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed; a flat fan about the
+middle of its length, which is the same on every mesh, closes it, and adds a constant.
 
 A pressure δ in all of the room adds -δ V to E. At rest the pressures δ are those at which V is as prescribed:
 δ is the multiplier of the condition V = V̄ in
@@ -22,14 +22,14 @@ from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
 from ..surface.pieces import point_text
 from ..surface.supports import apply_supports
 from ..surface.topology import components
-from .functional import patch_volumes, weighted
+from .functional import energy, patch_volumes, weighted
 
 SAMPLES = 12  # places along each side of a cell
 MOST_FACES = 4000  # of a room, among which the nearest is sought
@@ -85,7 +85,10 @@ def prescribed_volumes(surface: Surface) -> Floats:
 
 
 def room_pressures(surface: Surface) -> Floats:
-    """(r,) the pressure of the air in each room, force/length²: that which fits the patches around it best.
+    """(r,) the pressure of the air in each room, force/length²: that on its patches that are no walls.
+
+    A wall has the difference to the air beyond it. The fit is by least squares, with the walls where a room
+    has nothing else.
 
     >>> from pcmc import Patch
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 3.0, 2.0)],
@@ -93,7 +96,26 @@ def room_pressures(surface: Surface) -> Floats:
     >>> room_pressures(flat).round(12).tolist()
     [-2.0]
     """
-    return np.asarray(np.linalg.lstsq(surface.room_signs.T, surface.pressures)[0])
+    signs, rows = surface.room_signs.T, surface.roof
+    if np.linalg.matrix_rank(signs[rows]) < len(surface.rooms):
+        rows = np.ones(len(signs), dtype=bool)
+    return np.asarray(np.linalg.lstsq(signs[rows], surface.pressures[rows])[0])
+
+
+def energy_at_volumes(surface: Surface) -> float:
+    """E + Σ p V with the pressures p of the rooms: the energy at their volumes V, whatever the pressures are.
+
+    >>> from pcmc import Patch
+    >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], [[0, 1, 2], [1, 3, 2], [3, 0, 2]],
+    ...                [0, 0, 0], [Patch("tent", 2.0, 9.0)], fixed=[0, 1, 3],
+    ...                rooms=[Room("all", {"tent": 1}, 1.0)])
+    >>> round(energy_at_volumes(tent), 9)  # α A = √3 + 2
+    3.732050808
+    """
+    if not surface.rooms:
+        return energy(surface)
+    volumes = surface.room_signs @ patch_volumes(surface, surface.vertices)
+    return energy(surface) + float(room_pressures(surface) @ volumes)
 
 
 def with_room_pressures(surface: Surface, change: Floats) -> Surface:
@@ -236,7 +258,7 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     for k in np.unique(piece):
         a, b = ends[piece == k].T
         n = count[piece == k]
-        middle = X[np.unique([a, b])].mean(axis=0)
+        middle = np.average(0.5 * (X[a] + X[b]), axis=0, weights=segment_lengths(X, ends[piece == k]))
         yield float((n * _cones(middle, X[b], X[a])).sum())
         net = np.zeros(surface.n)
         np.add.at(net, b, n)

@@ -137,6 +137,7 @@ class PanelNet:
         kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
         worst, area = table.iloc[table["planarity"].argmax()], table["area"]
         rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
+        rows |= {"extent": self.certificate.part} if self.certificate.part else {}
         rows |= {"units": units.sentence} if units else {}
         rows["panels"] = f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"
         rows["area"] = f"{area.sum():.6g}, {100.0 * self.covered:.2f} % of the roof's;"

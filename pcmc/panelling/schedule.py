@@ -44,11 +44,11 @@ class Panels:
         ``c``, its edges' lengths in the order of its family; ``edge_a``, ``edge_b``, ``edge_c``, their rows
         in ``surface.topology.edges``; ``area``, length².
     edges : a row per pair of neighbours, and per edge of a single panel: ``edge``, its row in
-        ``surface.topology.edges``; ``kind``, "inside" a patch, "junction" (also a seam between patches) or
-        "boundary"; ``length``; ``panel``, ``neighbour``, their numbers, 0 for none; ``dihedral``, the angle
-        between both on the inner side of the first: 180 where they are flat, less at a ridge, more at a
-        valley; NaN with one panel. Where more than two panels meet, the edge has a row for each pair, in turn
-        around it.
+        ``surface.topology.edges``; ``kind``, "inside" a patch, "junction" (also a seam between patches),
+        "mirror", where the roof goes on, or "boundary"; ``length``; ``panel``, ``neighbour``, their numbers,
+        0 for none; ``dihedral``, the angle between both on the inner side of the first: 180 where they are
+        flat, less at a ridge, more at a valley; NaN with one panel. Where more than two panels meet, the edge
+        has a row for each pair, in turn around it.
     flat : (k,3,2) the panels laid flat, outside up, corners as in ``surface.faces``: the longest edge lies on
         the x axis and starts at the origin.
     at_least : no partition of these panels within the tolerance has fewer families.
@@ -118,6 +118,8 @@ class Panels:
             rows.append(("angles", f"{angles.min():.1f} to {angles.max():.1f} degrees between neighbours"))
         if units:
             rows.insert(0, ("units", units.sentence))
+        if self.certificate.part:
+            rows.insert(0, ("extent", self.certificate.part))
         if not self.certificate.certified:
             rows.insert(0, ("not certified", self.certificate.verdict.value))
         head = "\n".join(f"{name:>14}  {text}" for name, text in rows)
@@ -213,7 +215,9 @@ def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:
     edge = pairs["edge"].to_numpy()
     junction, boundary = (topo.junction_edge | topo.seam_edge)[edge], topo.boundary_edge[edge]
     table = pairs[["edge"]].assign(
-        kind=np.where(junction, "junction", np.where(boundary, "boundary", "inside")),
+        kind=np.select(
+            [junction, surface.mirror_edge[edge], boundary], ["junction", "mirror", "boundary"], "inside"
+        ),
         length=segment_lengths(surface.vertices, topo.edges[edge]),
     )
     return table.assign(panel=pairs["first"] + 1, neighbour=pairs["second"] + 1, dihedral=pairs["dihedral"])

@@ -277,7 +277,8 @@ def mirror_of(spec: Any, number: int) -> Curve:
     """The straight line of a mirror; ``number`` counts from 1."""
     what = f"mirror {number}"
     line = curve_of(spec, what)
-    if len(line.pieces) != 1 or line.pieces[0].sweep or len(line.pieces[0].points) != 2:
+    straight = len(line.pieces) == 1 and not line.pieces[0].sweep and len(line.pieces[0].points) == 2
+    if not straight or not line.length > 0.0:
         message = f"{what} must be a straight line, two points [[x, y], [x, y]], found {spec!r}"
         raise OptionError(message, what=what, found=spec)
     return line

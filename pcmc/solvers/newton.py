@@ -20,7 +20,7 @@ from ..base.errors import CurvedContactError, SurfaceError
 from ..base.tolerances import POOR
 from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
 from ..forces.functional import energy
-from ..forces.rooms import check_rooms, room_pressures
+from ..forces.rooms import check_rooms, prescribed_volumes, room_pressures, room_volumes
 from ..forces.wall_rows import find_walls
 from ..meshing.elevation import elevate
 from ..meshing.refinement import refinable, refine
@@ -44,6 +44,7 @@ def newton(
     check_rooms(surface)
     refinable("levels", options.levels, surface.m)
     log, first, rows = Log(callback), surface, list[dict[str, Any]]()
+    surface = _with_volumes(surface)
     order = options.order or surface.order
     if order != surface.order > 1:
         elevate(surface, order)  # refuses it before the work
@@ -72,6 +73,18 @@ def newton(
         clear=[end.clear] if end.clear is not None else [],
         room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
     )
+
+
+def _with_volumes(surface: Surface) -> Surface:
+    """Closed rooms that nothing holds, in the size at which they have the prescribed volume together.
+
+    So they come to rest alike from a start of any size.
+    """
+    if surface.held.any() or surface.periodic or not surface.rooms:
+        return surface
+    X, middle = surface.vertices, surface.vertices.mean(axis=0)
+    size = np.cbrt(prescribed_volumes(surface).sum() / room_volumes(surface).sum())
+    return surface.moved(middle + size * (X - middle))
 
 
 def _solve_level(

@@ -13,6 +13,7 @@ from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt, Proof
 from ..certificate.verdict import theorems
 from ..forces.pinching import standing_part
+from ..forces.rooms import room_volumes
 from ..surface import Surface
 from .homotopy import (
     Homotopy,
@@ -27,6 +28,7 @@ from .homotopy import (
 from .result import Callback, Result, Status
 from .starts import low_start
 
+FAR = 10.0  # times a volume
 FAILED = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 
 
@@ -76,7 +78,17 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result:
         if tried[-1].folds:
             break
     failed = _failed(first, (*filter(None, [load]), *proofs), tried)
-    return replace(failed, evaluations=solves.evaluations)
+    note = "; ".join(filter(None, [failed.note, _far_volume(start)]))
+    return replace(failed, evaluations=solves.evaluations, note=note)
+
+
+def _far_volume(start: Surface) -> str:
+    """What to do where a room is asked for many times its volume at the start, or a small part of it."""
+    for room, volume in zip(start.rooms, room_volumes(start).tolist(), strict=True):
+        if volume and room.volume and not 1.0 / FAR < abs(volume / room.volume) < FAR:
+            text = f"room {room.name!r} is to have {room.volume:.4g} and has {volume:.4g} at the start:"
+            return f"{text} go there in steps of 3 times the volume or so, each from the surface before"
+    return ""
 
 
 def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome | Homotopy]:

@@ -153,7 +153,7 @@ class Analysis:
         """A row per case and support, numbered as in ``Certificate.supports``: ``support``, ``name``,
         ``kind``, ``length``, ``x``, ``y``, ``z`` of its middle, and ``force_x``, …, which it exerts. M1, M2,
         … hold the ends of members; see ``supports_with_members``."""
-        tables = [supports_with_members(self.model, case.results.reactions) for case in self.cases]
+        tables = [supports_with_members(case.results) for case in self.cases]
         for case, table in zip(self.cases, tables, strict=True):
             table.insert(0, "case", case.name)
         return pd.concat(tables, ignore_index=True)

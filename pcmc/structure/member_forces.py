@@ -180,20 +180,23 @@ def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
     return found
 
 
-def supports_with_members(model: StructuralModel, reactions: Floats) -> pd.DataFrame:
-    """The table of supports under reactions (n,3), as in ``Certificate.supports``, with a row of the kind
+def supports_with_members(results: StepResults) -> pd.DataFrame:
+    """The table of supports in a case, as in ``Certificate.supports``, with a row of the kind
     "member end" for each point that holds ends of members: all of the force there but that of cables. The
     rows of lines in whose place members are, such as the foot of a wall, are left out."""
-    standing, alone, names = standing_part(model.surface).surface, reactions.copy(), dict[int, list[str]]()
+    model, reactions, names = results.model, results.reactions, dict[int, list[str]]()
+    standing, alone = standing_part(model.surface).surface, reactions.copy()
+    moved = standing.vertices + np.nan_to_num(results.displacements)
+    cables = cable_ends(standing, moved, results.cable_tensions)
     for line in model.lines:
         for v in [] if line.closed else line.vertices[[0, -1]].tolist():
             if model.held[v]:
                 names.setdefault(v, []).append(line.name)
     ends = sorted(names)
     alone[ends] = 0.0
-    for _, v, force in cable_ends(standing):
+    for _, v, force in cables:
         alone[v] += force * (v in names)
-    acting = Forces.of(standing, alone)
+    acting = Forces.of(standing, alone, at_ends=cables)
     table = support_table(acting)[["support", "name", "kind", "length", *"xyz", *FORCE]]
     beside = model.held.copy()
     beside[ends] = False

@@ -189,12 +189,17 @@ class StructuralModel:
     @cached_property
     def cable_sections(self) -> tuple[tuple[float, Material], ...]:
         """Of each cable of the standing surface the area of its section, length², and its material: those of
-        a member, or of all cables, by default the patches' along their warp."""
+        a member, or of all cables, by default the patches' along their warp; in a mirror plane half of it, as
+        the cable has half of its tension there."""
         own = {str(member.on): (member.profile.area, member.material) for member in self.members}
         own |= {line.name: (line.member.profile.area, line.member.material) for line in self.lines}
         others = checked_areas(self.cable_area, self.surface, without=own)
         usual = self.cable_material or replace(self.materials[0], weft=None, shear=None)
-        return tuple(own.get(c.name, (others.get(c.name, 0.0), usual)) for c in self.standing.cables)
+        mirrors = [mask for plane, mask in self.standing.on_planes if plane.mirror]
+        found = [(c, *own.get(c.name, (others.get(c.name, 0.0), usual))) for c in self.standing.cables]
+        return tuple(
+            (area * 0.5 ** sum(bool(mask[c.edges].all()) for mask in mirrors), of) for c, area, of in found
+        )
 
     def cable_edges(self) -> Iterator[tuple[Cable, float, Material, Ints, Floats]]:
         """Each cable, the area of its section, its material, and the numbers (k,) and directions (k,3) of its

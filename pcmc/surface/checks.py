@@ -22,18 +22,18 @@ SMALLEST = 1e-50  # of a size or tension: the squares of forces and areas stay a
 NUMBERS = "iuf"  # kinds of arrays of numbers
 
 
-def positions(vertices: Any) -> Floats:
+def positions(vertices: Any, what: str = "vertices") -> Floats:
     """(n,3) floats up to LARGEST, beyond which they cannot hold the forces; a copy of its own."""
-    X = np.array(_plain(vertices, "vertices"), dtype=np.float64, order="C")
+    X = np.array(_plain(vertices, what), dtype=np.float64, order="C")
     if X.ndim != 2 or X.shape[1] != 3 or not len(X):
-        refuse_shape("vertices", X, "(n, 3) with n > 0")
+        refuse_shape(what, X, "(n, 3) with n > 0")
     if not reachable(X):
         bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
         if len(bad):
-            refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
+            refuse_rows(what, X, bad, "is not finite", hint="replace or remove it")
         bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
         hint = "use a larger unit of length"
-        refuse_rows("vertices", X, bad, f"is farther out than {LARGEST:g}", hint=hint)
+        refuse_rows(what, X, bad, f"is farther out than {LARGEST:g}", hint=hint)
     return X
 
 

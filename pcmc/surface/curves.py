@@ -313,7 +313,7 @@ def ellipse(centre: npt.ArrayLike, axes: npt.ArrayLike, sweep: float = 360.0) ->
     [[0.0, 1.0]]
     """
     middle = checked_points([centre], "ellipse", 1)
-    P = np.concatenate([middle, checked_points(axes, "ellipse", 2, exactly=True)])
+    P = checked_points([*middle, *checked_points(axes, "ellipse", 2, exactly=True)], "ellipse", 3)
     u, v = P[1:]
     if (u @ u) * (v @ v) - (u @ v) ** 2 <= 1e-24 * max(u @ u, v @ v) ** 2:
         raise curve_error("ellipse", "its axes lie on one line; use a polyline", found=P[1:].tolist())

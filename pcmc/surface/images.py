@@ -127,8 +127,8 @@ def images_in(vertices: npt.ArrayLike, lattice: npt.ArrayLike) -> Ints:
     [[1, 0], [3, 2]]
     """
     X = checks.positions(vertices)
-    T = np.asarray(lattice, dtype=float).reshape(-1, 3)
-    if not 1 <= len(T) <= 3 or np.linalg.matrix_rank(T, ON * np.abs(T).max(initial=1e-300)) < len(T):
+    T = checks.positions(lattice, "lattice")
+    if len(T) > 3 or np.linalg.matrix_rank(T, ON * np.abs(T).max()) < len(T):
         text = f"lattice: expected 1, 2 or 3 independent translations, found {T.tolist()}"
         raise SurfaceError(text, what="lattice", found=T.tolist())
     size = max(bounding_size(X), float(np.linalg.norm(T, axis=1).max()))

@@ -112,6 +112,17 @@ def test_the_rows_add_up_to_the_loads(solved):
     assert "the supports carry the loads" in str(found)
 
 
+def test_at_a_corner_a_wall_of_glass_carries_nothing_along_itself():
+    x, y = np.indices((4, 4)).reshape(2, 16)
+    a = np.flatnonzero((x < 3) & (y < 3))
+    F = np.concatenate([np.stack([a, a + 4, a + 5], axis=1), np.stack([a, a + 5, a + 1], axis=1)])
+    glass = {Plane(normal=(0, 1, 0)): y == 0, Plane((0, 3, 0), (0, -1, 0)): y == 3}
+    sail = pcmc.Surface(np.stack([x, y, 0 * x], axis=1), F, [0] * 18, [pcmc.Patch("sail", 2.0, 0.0)],
+                        fixed=(x == 0) | (x == 3), on_planes=glass)  # fmt: skip
+    forces = pcmc.certify(sail).supports.sort_values(["x", "y"])[FORCE].to_numpy()
+    assert forces == pytest.approx(np.array([[-6, 0, 0], [0, -6, 0], [0, 6, 0], [6, 0, 0]]), abs=1e-12)
+
+
 def test_the_sentence_of_balance_tells_whether_there_are_loads():
     """Of a film without loads the forces of its supports cancel, up to what the solver leaves of them."""
     film = pcmc.solve(catenoid(0.4, half_distance=0.5), tolerance=1e-6).certificate

@@ -6,6 +6,7 @@ from periodic_cases import honeycomb, honeycomb_energy, scattered, steiner_films
 
 import pcmc
 from generators.cells import _foam
+from pcmc.forces.functional import patch_areas
 from pcmc.meshing.elevation import elevate
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.neighbour_swap import swap
@@ -123,6 +124,15 @@ def test_a_honeycomb_sheared_on_becomes_that_of_the_next_lattice(shear: float) -
     assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.75**0.5, rel=1e-9)
 
 
+def test_energies_are_told_at_the_volumes_and_without_the_work_of_pressures() -> None:
+    foam = honeycomb([1.0, 0.0], [0.5 + 1.1 * 0.75**0.5, 0.75**0.5])
+    foam = pcmc.solve(foam.retensioned({"a00": 1.3})).surface
+    swapped = pcmc.swap_neighbours(foam, ["b00", "b01", "b10", "b11"])
+    assert np.abs(swapped.surface.pressures).max() > 0.1
+    areas = [surface.tensions @ patch_areas(surface) for surface in (swapped.surface, foam)]
+    assert str(swapped).endswith("E = {:.7g}, {:.7g} before".format(*areas))
+
+
 def test_kelvins_foam_stretched_until_its_squares_vanish() -> None:
     sides = np.array([1.35, 0.9, 1.0 / (1.35 * 0.9)])
     cube = _foam(np.array([[0.0, 0.0, 0.0], [0.5, 0.5, 0.5]]), np.eye(3), 1, 1.0, 1.0)
@@ -198,6 +208,7 @@ def test_what_cannot_be_swapped_is_refused_in_a_line() -> None:
         (films, "midle", "unknown patch 'midle'; did you mean 'middle'?"),
         (films, "south-west", "patch 'south-west' is no film between two junctions"),
         (films.rebuilt(fixed=np.ones(films.n, dtype=bool)), "middle", "held at different places"),
+        (films, 5, "patches: expected the name of a film, or a list of names, found 5"),
         (films, None, "no film between two junctions has vanished; name the one to swap"),
         (elevate(between_plates(films), 2), "middle", "order"),
     ):

@@ -23,6 +23,7 @@ from pcmc.forces.rooms import (
     room_volumes,
     with_room_pressures,
 )
+from pcmc.plan import Divider, Plan
 from pcmc.stability.equilibrium import Equilibrium
 from pcmc.surface.symmetry import mirrored
 
@@ -46,6 +47,20 @@ def test_volumes_are_those_enclosed():
     bubbles = generators.triple_bubble(0.4, exact=True)
     assert room_volumes(bubbles) == pytest.approx([room_volumes(bubbles)[0]] * 3)
     assert room_volumes(bubbles).sum() == pytest.approx(pcmc.certify(bubbles).volume)
+
+
+def test_a_rim_closes_alike_however_its_straight_edges_are_divided():
+    corners = np.array([[0, 0, 1], [0.5, 0, 2], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])  # a gable on one side
+    volumes = []
+    for n in (1, 4):
+        sides = [a + (b - a) * np.arange(k)[:, None] / k for a, b, k in zip(corners, np.roll(corners, -1, 0),
+                 (n, n, 1, 1, 1), strict=True)]  # fmt: skip
+        X = np.concatenate([*sides, [[0.5, 0.5, 2.5]]])
+        rim = np.arange(len(X) - 1)
+        F = np.stack([rim, np.roll(rim, -1), np.full(len(rim), len(rim))], axis=1)
+        tent = Surface(X, F, [0] * len(F), [Patch("tent", 1.0)], rim, rooms=[Room("r", {"tent": 1}, 1.0)])
+        volumes.append(room_volumes(tent)[0])
+    assert volumes[1] == pytest.approx(volumes[0])
 
 
 def test_volumes_do_not_depend_on_where_the_surface_is():
@@ -228,6 +243,33 @@ def test_the_volume_is_reached_from_far_away():
     result = pcmc.solve(bubbles.moved(0.3 * bubbles.vertices + noise))
     assert result.converged
     assert room_volumes(result.surface) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("times", [1e-3, 1e3])
+def test_bubbles_that_nothing_holds_come_to_rest_from_any_size(times):
+    one = generators.double_bubble(volumes=(1.0, 1.0))
+    other = one.retensioned(volumes={"left": times, "right": times})
+    energy = pcmc.solve(one).energy
+    assert pcmc.solve(other).energy / times ** (2 / 3) == pytest.approx(energy, rel=1e-3)
+
+
+def test_a_volume_too_far_from_that_of_the_start_is_reached_in_steps():
+    start = cap(0.5)
+    far = pcmc.solve(start.retensioned(volumes={"room": 300.0}))
+    assert "go there in steps of 3 times the volume or so, each from the surface before" in str(far)
+    for volume in (1.5, 4.5, 13.5, 40.5, 120.0, 300.0):
+        result = pcmc.solve(start.retensioned(volumes={"room": volume}))
+        start = result.surface
+    assert result.converged
+
+
+def test_the_pressure_of_a_room_beside_one_of_given_pressure_is_that_on_its_roof():
+    patches = {"west": {"tension": 5.0, "volume": 40.0}, "east": {"tension": 4.5}}
+    walls = [Divider([[6, 0], [6, 8]], wall=1.5)]
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], walls, edge_length=1.5, patches=patches)
+    result = pcmc.solve(plan.surface())
+    assert result.surface.pressures[2] == pytest.approx(result.surface.pressures[0] - 1.0)  # the wall
+    assert result.certificate.rooms.pressure[0] == pytest.approx(result.surface.pressures[0], rel=1e-12)
 
 
 def test_the_result_shows_its_rooms():

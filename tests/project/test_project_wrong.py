@@ -12,6 +12,7 @@ from small_project import SMALL
 from pcmc import cli
 from pcmc.base.errors import FileError, PlanError
 from pcmc.project import load, run
+from pcmc.project.start import surface_of
 
 
 def project(folder, text):
@@ -48,6 +49,20 @@ def test_absurd_projects_are_refused(tmp_path, text, capsys):
     assert len(str(caught.value)) < 300 + len(str(path))
     assert cli.main(["solve", str(path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("plan", ["rise = 1.0", "tension = 5.0"])
+@pytest.mark.parametrize(
+    ("lines", "what"),
+    [
+        ("outline = [[0, 0], [6, 0], [6, 1], [0, 0], [5, 5]]", "the outline"),
+        ("outline = [[0, 0], [6, 0], [6, 6]]\nmirrors = [[[0, 0], [0, 1e-300]]]", "mirror 1"),
+    ],
+)
+def test_lines_that_make_no_plan_are_refused_with_a_rise_as_without(tmp_path, plan, lines, what):
+    path = project(tmp_path, f"[plan]\n{plan}\n{lines}\n")
+    with refused((FileError, PlanError), what=what):
+        surface_of(load(path))
 
 
 def test_a_number_out_of_range_is_named_with_its_line(tmp_path):

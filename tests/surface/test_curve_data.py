@@ -47,6 +47,7 @@ def test_ellipses_are_refused_by_name():
     for spec, what in (
         ({"ellipse": {"centre": [0, 0]}}, "ellipse"),
         ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [2, 0]]}}, "ellipse"),
+        ({"ellipse": {"centre": [0, 0, 3], "axes": [[1, 0], [0, 2]]}}, "ellipse"),
         ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [0, 2]], "sweep": 400}}, "ellipse"),
         ({"bezier": [[0, 0], [1, 1]], "weights": [1.0]}, "bezier"),
         ({"bezier": [[0, 0], [1, 1]], "weights": [1.0, -1.0]}, "bezier: weights"),

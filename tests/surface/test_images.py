@@ -159,7 +159,8 @@ def test_pressure_at_a_free_edge_is_refused():
 
 
 def test_a_lattice_needs_independent_translations():
-    for lattice in ([], [[0, 0, 0]], [[1, 0, 0], [2, 0, 0]], np.ones((4, 3))):
+    wrong = ([], [[0, 0, 0]], [[1, 0, 0], [2, 0, 0]], np.ones((4, 3)), np.ones((3, 2)), [[np.nan, 0, 0]], "a")
+    for lattice in wrong:
         with refused(SurfaceError, what="lattice"):
             images_in(SQUARE, lattice)
 

@@ -1,0 +1,84 @@
+"""Half of a roof between mirror planes is built as the whole is: under load, as cloth and in panels."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import pcmc
+from pcmc import Cable, Material, Plane, Snow, StructuralModel
+from pcmc.plan import Plan
+from pcmc.structure import analyse, calculix
+
+needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+
+
+@cache
+def halves():
+    """Half of a hall whose ridge is a cable in the mirror plane, and the whole."""
+    outline, mirror = [[0, 0], [5, 0], [5, 6], [0, 6]], [[[5, 0], [5, 6]]]
+    start = Plan(outline, mirrors=mirror, edge_length=1.0, tension=3.0, pressure=0.5).surface()
+    ridge = start.topology.edges[start.mirror_edge]
+    half = pcmc.solve(start.rebuilt(cables=[Cable("ridge", 3.0, ridge)])).surface
+    return half, pcmc.mirrored(half)
+
+
+@needs_ccx
+def test_half_with_a_cable_in_its_mirror_carries_what_the_whole_does():
+    half, whole = (
+        analyse(
+            StructuralModel(
+                surface, Material(5e5), 1e-3, [Snow(0.3)], cable_area=1e-4, cable_material=Material(1.6e8)
+            )
+        )
+        for surface in halves()
+    )
+    sizes = [one["snow"].results.largest_displacement for one in (half, whole)]
+    pulls = [one["snow"].results.cable_tensions["ridge"] for one in (half, whole)]
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-6)
+    assert np.sort(2.0 * pulls[0]) == pytest.approx(np.sort(pulls[1]), abs=1e-4)
+    for one, pull in zip((half, whole), pulls, strict=True):  # the end of the cable carries what it has there
+        table = one.supports.query("case == 'snow' and kind == 'cable end'")
+        ends = np.linalg.norm(table[["force_x", "force_y", "force_z"]], axis=1)
+        assert [np.abs(np.abs(pull) - end).min() < 1e-6 for end in ends] == [True, True]
+
+
+def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
+    half, whole = (pcmc.certify(surface) for surface in halves())
+    columns = ["sheet_pull", "cable_pull"]
+    assert 2.0 * half.cables[columns].to_numpy() == pytest.approx(whole.cables[columns].to_numpy(), rel=1e-6)
+
+
+def test_under_a_cable_across_one_patch_no_curvature_is_asked_for():
+    whole = halves()[1]
+    assert np.isnan(pcmc.mean_curvature(whole)[whole.cables[0].edges]).all()
+    assert pcmc.certify(whole).curvature_error < 1e-9
+
+
+def test_cloth_is_sewn_to_its_image_in_a_mirror():
+    pattern = pcmc.cutting_pattern(halves()[0], width=2.0, allowance=0.05, hem=0.2)
+    sewn = pattern.seam_table.query("kind == 'mirror'")
+    half = pattern.surface
+    ends = half.vertices[half.topology.edges[half.mirror_edge]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    assert sewn["length"].sum() == pytest.approx(length, rel=1e-2)
+    assert sewn[["x0", "x1"]].to_numpy() == pytest.approx(5.0)
+    assert "a part of the roof" in str(pattern)
+
+
+def test_panels_of_a_half_have_no_boundary_in_the_mirror():
+    half, whole = (pcmc.panels(surface, 0.01) for surface in halves())
+    lengths = [one.edge_totals.set_index("kind")["length"] for one in (half, whole)]
+    assert 2.0 * lengths[0]["boundary"] == pytest.approx(lengths[1]["boundary"])
+    assert "mirror" in lengths[0]
+    assert "mirror" not in lengths[1]
+    assert "a part of the roof" in str(half)
+    assert "a part of the roof" not in str(whole)
+
+
+def test_the_mirror_of_a_moved_half_is_known():
+    half = halves()[0]
+    turned = pcmc.cut(halves()[1], Plane((5, 0, 0), (1, 0, 0)))
+    patterns = [pcmc.cutting_pattern(surface, width=2.0).seam_table for surface in (half, turned)]
+    sums = [table.groupby("kind")["length"].sum()["mirror"] for table in patterns]
+    assert sums[0] == pytest.approx(sums[1], rel=1e-6)
