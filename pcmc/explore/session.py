@@ -99,9 +99,10 @@ class SessionState:
         return replace(self, wanted=wanted(self.surface, values))
 
     def showing(self, surface: Surface, certificate: Certificate | None = None) -> SessionState:
-        """Another surface at rest, with the values that it has."""
+        """Another surface, with the values that it has; only the start may not be at rest."""
         certificate = certificate or certify(surface)
-        return replace(self, surface=surface, certificate=certificate, wanted=surface, failure=None)
+        failure = None if certificate.verdict in AT_REST else certificate
+        return replace(self, surface=surface, certificate=certificate, wanted=surface, failure=failure)
 
     def following(self, way: Reached, certificate: Certificate | None) -> SessionState:
         """The last surface at rest on the way to the values asked for."""
@@ -306,8 +307,7 @@ class Session:
         """Show another start, as a new step: the file behind the page was saved."""
         self.start, self.units, self.found = start, units, None
         self.fallback = (fallback or self.fallback).with_walls(start.surface)
-        state = replace(state.showing(start.surface, start.certificate), aims=None)
-        return replace(state, wanted=start.wanted, failure=start.failure).stepped()
+        return replace(state.showing(start.surface, start.certificate), aims=None).stepped()
 
     @act(ends=True)
     def stop(self, state: SessionState, stop: Stop) -> SessionState:

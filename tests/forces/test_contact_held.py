@@ -11,10 +11,18 @@ from starts import four_fans, stationary, two_squares
 import pcmc
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.forces.functional import energy_and_gradient
-from pcmc.forces.pinching import StandingPart, lift, pull_and_capacity, pull_directions, resting_vertices
+from pcmc.forces.pinching import (
+    StandingPart,
+    lift,
+    pull_and_capacity,
+    pull_directions,
+    resting_vertices,
+    standing_part,
+)
 from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
+from pcmc.plan import Divider, Plan
 from pcmc.solvers.newton import newton
 
 
@@ -271,3 +279,22 @@ def test_a_bottom_with_more_vertices_than_the_junction_is_no_place_to_rest():
     found = newton(split).certificate
     assert found.verdict is Verdict.WALL_DOWN
     assert "comes down on the held bottom of its wall" in found.detail
+
+
+@pytest.mark.parametrize("oblique", [0.0, 1.0])
+@pytest.mark.parametrize(("tension", "at_mirror"), [(1.5, True), (1.2, False)])
+def test_in_a_half_it_rests_as_in_the_whole(oblique, tension, at_mirror):
+    wall = Divider([[0, 4 - oblique], [6, 4 + oblique]], wall=tension)
+    patches = {"south": {"tension": 2.0, "pressure": 0.4, "at": [2, 1]}}
+    patches |= {"north": {"tension": 2.2, "pressure": 0.35, "at": [2, 7]}}
+    outline, mirror = [[0, 0], [6, 0], [6, 8], [0, 8]], [[6, 0], [6, 8]]
+    start = Plan(outline, [wall], edge_length=0.6, mirrors=[mirror], patches=patches).surface()
+    half, whole = (pcmc.solve(surface, tolerance=1e-10) for surface in (start, pcmc.mirrored(start)))
+    assert half.converged
+    assert whole.converged
+    assert 2.0 * half.energy == pytest.approx(whole.energy, rel=1e-4)
+    at_rest = standing_part(half.surface).resting
+    middle = np.abs(half.surface.vertices[:, 0] - 6.0) < 1e-9
+    assert at_rest.any()
+    assert (at_rest & middle).any() == at_mirror
+    assert 2 * at_rest.sum() - (at_rest & middle).sum() == standing_part(whole.surface).resting.sum()
