@@ -15,7 +15,7 @@ from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.geometry import cross_2d
 from ..surface.pieces import two_digits
-from ..surface.symmetry import mirrored
+from ..surface.symmetry import image_names, mirrored
 from .forces import cable_parts
 from .proof import WeakCable
 
@@ -109,6 +109,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     >>> print(weak_cable(sail))
     cable 'rope' is too weak for a flat sail: 1.2 < α L / (2 sin(φ/2)) = 1.414, L = 2, φ = 90°; raise it
     """
+    piece = surface
     if surface.on_planes and len(surface.cable_edges.ends) and all(p.mirror for p, _ in surface.on_planes):
         try:
             surface = mirrored(surface)
@@ -139,7 +140,8 @@ def weak_cable(surface: Surface) -> WeakCable | None:
             if factor > found[0]:
                 turn = 2.0 * math.asin(min(1.0, 0.5 * arcs[side] / factor))
                 numbers = (float(x) for x in (pulls[side], factor * pulls[side], lengths[side], turn))
-                found = factor, WeakCable(names[side], *numbers)
+                name = image_names(piece, surface).get(names[side], names[side])
+                found = factor, WeakCable(name, *numbers)
     return found[1]
 
 

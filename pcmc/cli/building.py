@@ -319,7 +319,7 @@ def structure(
         values |= {"thickness": thick[patches[0]] if even else thick} if thick else {}
         values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
         wanted = Structure(**values)
-        wanted.check(start, project.plan)
+        wanted.check(start, project.plan, build.whole or project.output.whole)
         if run := wanted.run if run is None else run:
             expect_program()
         roof = build.roof(project, progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..surface import Surface
+from ..surface.symmetry import image_names, with_images
 
 NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
     "width": {"above": 0.0},
@@ -127,6 +128,12 @@ class CuttingOptions:
             given = getattr(self, key)
             for name in given if isinstance(given, Mapping) else ():
                 validate.choice(f"patch in {key}", name, names)
+
+    def of_whole(self, piece: Surface, whole: Surface) -> CuttingOptions:
+        """The same for the whole of a piece: what is given by patches holds for their images, too."""
+        images = image_names(piece, whole)
+        by_patch = {key: getattr(self, key) for key in BY_PATCH if isinstance(getattr(self, key), Mapping)}
+        return replace(self, **{key: with_images(given, images) for key, given in by_patch.items()})
 
     def of_patch(self, key: str, name: str) -> Any:
         """The value of a key of ``BY_PATCH`` for a patch; None where there is none."""

@@ -11,8 +11,9 @@ from ..structure.section import members_of
 
 if TYPE_CHECKING:
     from ..certificate import Certificate
-    from ..structure import PlacedMember, StructuralModel
+    from ..structure import Member, PlacedMember, StructuralModel
     from ..surface import Surface
+    from .file import Project
     from .outcome import Outcome
 
 
@@ -44,14 +45,25 @@ def members_drawn(
 def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:
     """LostWarning that files leave out the members of the structural model; files that could have ``held``
     them, where they cannot be on what is shown."""
-    if has_members(outcome) and not (held and members_drawn(outcome)):
-        why = "they are known for a part of the roof alone"
-        why = why if held else "a wall in whose place one stands is drawn"
-        warnings.warn(f"{what}: members are left out; {why}", LostWarning, stacklevel=3)
+    project = outcome.project
+    if project is None or project.structure is None or not has_members(outcome):
+        return
+    ropes, why = [cable.name for cable in outcome.surface.cables], ""
+    if held:
+        try:
+            outcome.model(project.structure, anyway=True)
+            return
+        except OptionError as error:
+            why = f"; {error}"
+    elif any(isinstance(one.on, str) and one.on not in ropes for one in _members(project)):
+        why = "; a wall in whose place one stands is drawn"
+    warnings.warn(f"{what}: members are left out{why}", LostWarning, stacklevel=3)
 
 
 def has_members(outcome: Outcome) -> bool:
     """Whether a project has members."""
-    project = outcome.project
-    structure = None if project is None else project.structure
-    return project is not None and structure is not None and bool(members_of(structure.members, project.plan))
+    return outcome.project is not None and bool(_members(outcome.project))
+
+
+def _members(project: Project) -> tuple[Member, ...]:
+    return () if project.structure is None else members_of(project.structure.members, project.plan)

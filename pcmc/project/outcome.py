@@ -286,6 +286,8 @@ class Outcome:
         """The structural model of what is shown."""
         plan = None if self.project is None else self.project.plan
         surface, certificate = self.shown
+        if self.unfold:
+            structure = structure.of_whole(self.surface, surface, plan)
         model = structure.model(surface, plan, anyway=anyway, certificate=certificate, units=self.units)
         if self.unfold and (model.bars or any(not line.wall for line in model.lines)):
             text = "a member at an edge or a point is known for the part of the plan alone, not for its"
@@ -303,9 +305,14 @@ class Outcome:
 
         surface, certificate = self.shown
         project = self.project
-        cloth = of_material(wanted, None if project is None else project.structure, surface)
-        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
-        own = project is not None and wanted is project.pattern
+        structure = None if project is None else project.structure
+        own, cloth = project is not None and wanted is project.pattern, wanted
+        if self.unfold:
+            cloth = wanted.of_whole(self.surface, surface)
+            structure = structure and structure.of_whole(self.surface, surface, None)
+        cut = partial(
+            cutting_pattern_of, surface, of_material(cloth, structure, surface), anyway, certificate
+        )
         return self._once("cutting pattern", cut) if own else cut()
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:

@@ -20,7 +20,7 @@ from ..plan import Plan
 from ..solvers import solve, solve_once
 from ..solvers.result import Progress, Result, Status
 from ..structure.calculix import expect_program
-from ..surface import Surface, mirrored
+from ..surface import Surface
 from . import cache
 from .checking import in_file
 from .file import Project, load
@@ -219,7 +219,7 @@ def _check_wishes(project: Project, surface: Surface) -> None:
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")
         if structure is not None and (output.structure is not None or structure.run):
-            structure.check(mirrored(surface) if output.whole else surface, project.plan)
+            structure.check(surface, project.plan, output.whole)
         if structure is not None and structure.run and (output.structure or output.report):
             expect_program()
         if project.pattern is not None and (output.pattern or output.report):

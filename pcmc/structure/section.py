@@ -12,6 +12,7 @@ from ..plan import Plan
 from ..plan.parts import check_keys, curve_of
 from ..surface import Surface
 from ..surface.curves import Curve
+from ..surface.symmetry import image_names, mirrored, with_images
 from .gas import Gas
 from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
 from .material import Material, Profile
@@ -250,8 +251,32 @@ class Structure:
         on = in_the_open(surface)
         return self.loads([patch.name for patch, out in zip(surface.patches, on, strict=True) if out])
 
-    def check(self, surface: Surface, plan: Plan | None = None) -> None:
-        """Refuse values that name no patch, wall or cable of the surface, before it is solved."""
+    def of_whole(self, piece: Surface, whole: Surface, plan: Plan | None) -> Structure:
+        """The same for the whole of a piece: what it has by names holds for their images, too."""
+        images = image_names(piece, whole)
+        ropes = {new: old for new, old in images.items() if new in [cable.name for cable in whole.cables]}
+        by_name = "thickness", "patches", "wind", "cable_area"
+        values = {key: with_images(getattr(self, key), images) for key in by_name}
+        tables = [{"patches": (), **zone} for zone in self.zones]
+        values["zones"] = [zone | {"patches": with_images(zone["patches"], images)} for zone in tables]
+        if isinstance(self.gas, Mapping) and "patches" in self.gas:
+            values["gas"] = {**self.gas, "patches": with_images(self.gas["patches"], images)}
+        values["members"] = {}
+        for name, table in self.members.items():  # walls find their images themselves
+            on = [
+                *table.get("on", ()),
+                *(d.name for d in (plan.dividers if plan else ()) if d.member == name),
+            ]
+            more = [new for new, old in ropes.items() if old in on]
+            values["members"][name] = {**table, "on": [*table.get("on", ()), *more]}
+        return replace(self, **values)
+
+    def check(self, surface: Surface, plan: Plan | None = None, unfold: bool = False) -> None:
+        """Refuse values that name no patch, wall or cable of the surface, or of its whole if it is to
+        ``unfold``, before it is solved."""
+        if unfold:
+            whole = mirrored(surface)
+            return self.of_whole(surface, whole, plan).check(whole, plan)
         self.thicknesses(surface)
         self.materials(surface)
         check_loads(self.loads_on(surface), surface)

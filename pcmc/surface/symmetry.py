@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -148,9 +148,9 @@ def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> S
     The vertices in mirror planes are shared by the images; the faces of reflected images are turned over, so
     that each patch keeps its positive side. A patch continues under its name in its images, unless more than
     two of its triangles would meet at an edge, or it bounds a room that is separate from its images: then
-    images that do not touch it are numbered, "wall (2)". Supports, weights, cables and rooms are carried
-    over; a room that a plane cuts has the volume of its parts together, and a cable in a mirror plane the
-    tension of its images together.
+    images that do not touch it are numbered, "wall (2)", as are the images of a cable that ends before it.
+    Supports, weights, cables and rooms are carried over; a room that a plane cuts has the volume of its parts
+    together, and a cable in a mirror plane the tension of its images together.
 
     Parameters
     ----------
@@ -220,11 +220,38 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
         on_plane=flat[0][1],
         on_line=lines,
         on_planes=flat[1:],
-        cables=_cables(surface, place),
+        cables=_cables(surface, place, masks, next_to),
         rooms=_rooms(surface, meets, next_to, label, names),
         curves=_curves(surface, images, place),
     )
     return Whole(whole, first % surface.n, np.tile(np.arange(surface.m), k), k)
+
+
+def image_names(piece: Surface, whole: Surface) -> dict[str, str]:
+    """By the names that only the whole of a piece has, of its patches and cables, those they are images of.
+
+    >>> from pcmc import Patch
+    >>> side, rope = Plane(normal=(1, 0, 0), mirror=True), [Cable("rope", 1.0, [[1, 2]])]
+    >>> half = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
+    ...                [Patch("film", 1.0)], fixed=[1, 2], on_planes={side: [0, 3]}, cables=rope)
+    >>> image_names(half, mirrored(half))
+    {'rope (2)': 'rope'}
+    """
+    known, names = ([*(p.name for p in s.patches), *(c.name for c in s.cables)] for s in (piece, whole))
+    return {name: name.rpartition(" (")[0] for name in names if name not in known}
+
+
+def with_images(given: Any, images: Mapping[str, str]) -> Any:
+    """A table by names, or a list of names, with those of images, too; anything else is given back.
+
+    >>> with_images({"film": 1.0, "wall": 2.0}, {"film (2)": "film"})
+    {'film (2)': 1.0, 'film': 1.0, 'wall': 2.0}
+    """
+    if isinstance(given, Mapping):
+        return {new: given[old] for new, old in images.items() if old in given} | dict(given)
+    if isinstance(given, list | tuple):
+        return [*given, *(new for new, old in images.items() if old in given and new not in given)]
+    return given
 
 
 def _chosen(surface: Surface, planes: Sequence[Plane | str] | None) -> list[tuple[Plane, Bools]]:
@@ -341,16 +368,27 @@ def _unused(name: str, taken: set[str]) -> str:
     return new
 
 
-def _cables(surface: Surface, place: Ints) -> tuple[Cable, ...]:
-    """The cables with their images; in a mirror plane the tensions of coinciding images add up."""
-    cables = []
-    for cable in surface.cables:
-        edges = np.sort(place[:, cable.edges].reshape(-1, 2), axis=1)
-        edges, times = np.unique(edges, axis=0, return_counts=True)
-        if times.min() != times.max():
-            text = f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
-            raise SurfaceError(text, what="cables", where=cable.name)
-        cables.append(cable.shared(int(times[0]), edges))
+def _cables(surface: Surface, place: Ints, masks: Bools, next_to: Sequence[Ints]) -> tuple[Cable, ...]:
+    """The cables: one goes on behind a plane unless it ends there, held, before it; in a mirror plane the
+    tensions of coinciding images add up."""
+    goes_on = np.zeros((len(masks), len(surface.cables)), dtype=bool)
+    for c, cable in enumerate(surface.cables):
+        ends = masks[:, cable.edges]
+        free = ends & ~surface.pinned[cable.edges]
+        goes_on[:, c] = [f.any() or e.all(axis=1).any() for f, e in zip(free, ends, strict=True)]
+    label = _joined(goes_on, next_to)
+    cables, taken = list[Cable](), {cable.name for cable in surface.cables}
+    for c, cable in enumerate(surface.cables):
+        for part in np.unique(label[:, c]):
+            edges = np.sort(place[label[:, c] == part][:, cable.edges].reshape(-1, 2), axis=1)
+            edges, times = np.unique(edges, axis=0, return_counts=True)
+            if times.min() != times.max():
+                text = (
+                    f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
+                )
+                raise SurfaceError(text, what="cables", where=cable.name)
+            name = cable.name if part == label[0, c] else _unused(cable.name, taken)
+            cables.append(replace(cable.shared(int(times[0]), edges), name=name))
     return tuple(cables)
 
 

@@ -1,5 +1,7 @@
 """Half of a roof between mirror planes is built as the whole is: under load, as cloth and in panels."""
 
+import dataclasses
+import warnings
 from functools import cache
 
 import numpy as np
@@ -7,7 +9,9 @@ import pytest
 
 import pcmc
 from pcmc import Cable, Material, Plane, Snow, StructuralModel
+from pcmc.base.errors import LostWarning
 from pcmc.plan import Plan
+from pcmc.project.members import warn_of_members
 from pcmc.structure import analyse, calculix
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
@@ -82,3 +86,95 @@ def test_the_mirror_of_a_moved_half_is_known():
     patterns = [pcmc.cutting_pattern(surface, width=2.0).seam_table for surface in (half, turned)]
     sums = [table.groupby("kind")["length"].sum()["mirror"] for table in patterns]
     assert sums[0] == pytest.approx(sums[1], rel=1e-6)
+
+
+ROOMS = """
+units = "m"
+force = "kN"
+[plan]
+edge_length = 1.6
+outline = [[0, 0], [8, 0], [8, 8], [0, 8]]
+mirrors = [[[8, 0], [8, 8]]]
+dividers = [{curve = [[4, 0], [4, 8]], wall = 2.0, name = "w"}]
+[plan.patches]
+side = {tension = 4.0, at = [2, 4], volume = 22.0}
+mid = {tension = 4.2, at = [6, 4]}
+[structure]
+young = 5e5
+thickness = 0.001
+wind = {side = 0.3}
+patches = {side = {thickness = 0.002, young = 1e6}}
+run = true
+[pattern]
+strips = {side = 2, mid = 1}
+"""
+
+
+@needs_ccx
+def test_what_a_project_names_holds_for_its_images(tmp_path):
+    """Wind, cloth and strips of a patch whose image in the whole has a name of its own."""
+    path = tmp_path / "rooms.toml"
+    path.write_text(ROOMS)
+    half = pcmc.project.run(path)
+    whole = dataclasses.replace(half, unfold=True)
+    names = [patch.name for patch in whole.shown.surface.patches]
+    tables = [one.analysis().patches.set_index(["case", "patch"])["largest_force"] for one in (half, whole)]
+    assert "side (2)" in names
+    assert tables[1]["wind", "side (2)"] == pytest.approx(tables[0]["wind", "side"], rel=1e-5)
+    strips = whole.cutting_pattern(whole.pattern_wanted).table.groupby("patch")["warp"]
+    assert strips.count()["side (2)"] == 2
+    assert strips.max()["side (2)"] == pytest.approx(strips.max()["side"])
+
+
+SAIL = """
+units = "m"
+force = "kN"
+[plan]
+outline = [[0, 0], [6, 0], [6, 8], [0, 8]]
+edge = "cable"
+cable = 9.0
+edge_length = 2.0
+supports = [[0, 0, 2], [0, 8, 3]]
+mirrors = [[[6, 0], [6, 8]]]
+tension = 1.0
+pressure = 0.0
+[structure]
+young = 5e5
+thickness = 0.001
+cable_area = {"cable 1" = 1e-4, "cable 2" = 1e-4}
+[structure.members.rope]
+kind = "cable"
+area = 3e-4
+young = 1.6e8
+on = ["cable 3"]
+"""
+
+
+def test_a_cable_and_its_image_are_two(tmp_path):
+    path = tmp_path / "sail.toml"
+    path.write_text(SAIL)
+    half = pcmc.project.run(path)
+    whole = dataclasses.replace(half, unfold=True)
+    found = [{(f.of, f.quantity): f.value for f in one.figures} for one in (half, whole)]
+    for quantity in ("length", "sag"):
+        assert found[1]["cable 3 (2)", quantity] == pytest.approx(found[0]["cable 3", quantity])
+    assert found[1]["cable 1", "length"] == pytest.approx(2.0 * found[0]["cable 1", "length"])
+    model = whole.model(whole.project.structure)
+    areas = {cable.name: area for cable, area, *_ in model.cable_edges()}
+    assert areas == {"cable 1": 1e-4, "cable 2": 1e-4, "cable 3": 3e-4, "cable 3 (2)": 3e-4}
+
+
+def test_drawings_say_why_members_are_left_out(tmp_path):
+    path = tmp_path / "sail.toml"
+    path.write_text(SAIL)  # its member is the section of a cable, which drawings have
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_members(pcmc.project.run(path), "drawings", held=True)
+    mast = "[structure.members.mast]\nyoung = 2.1e8\ndiameter = 0.2\nbars = [[[0, 0], [0, 0]]]\n"
+    text = SAIL.partition("[structure.members.rope]")[0] + mast
+    path.write_text(text.replace('{"cable 1" = 1e-4, "cable 2" = 1e-4}', "1e-4"))
+    half = pcmc.project.run(path)
+    with pytest.warns(LostWarning, match="^roof.obj: members are left out$"):
+        warn_of_members(half, "roof.obj")
+    with pytest.warns(LostWarning, match="left out; .* leave out whole, or the member"):
+        warn_of_members(dataclasses.replace(half, unfold=True), "drawings", held=True)
