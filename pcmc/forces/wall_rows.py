@@ -258,7 +258,8 @@ class Walls:
         for v in edges.T:
             sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
             np.add.at(chord, v, sign[:, None] * side)
-        chord = np.where(self.beyond.any(axis=1)[:, None], self.beyond, chord)
+        ends = np.flatnonzero(self.beyond.any(axis=1))
+        chord[ends] = self.beyond[ends]
         length = np.linalg.norm(chord, axis=1)[:, None]
         tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
         return np.asarray(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
