@@ -183,6 +183,8 @@ def numbers(folder: Path, text: Text) -> Numbers:
 
 def _numbers(folder: Path, outcome: Any, factor: Callable[[str], float]) -> Iterator[tuple[Any, np.ndarray]]:
     for figure in outcome.figures:
+        if figure.value is None:
+            continue
         kind = FIGURES.get(figure.quantity, "force" if figure.owner == "cable" else "")
         yield (figure.quantity, figure.of), np.array([figure.value * factor(kind)])
     for file in sorted(folder.glob("*.csv")):
