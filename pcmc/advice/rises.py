@@ -241,7 +241,7 @@ def mast_note(plan: Plan) -> str:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
     change = (
-        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[1], drawn=False)[2]}"
+        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[-1], drawn=False)[2]}"
     )
     if tight := [mast for mast in masts if not mast.has_room]:
         change = f"{tight[0].text} is too near to what is held beside it for a ring: move it there, or away"
