@@ -248,9 +248,12 @@ def test_a_surface_that_nothing_brings_to_rest_is_shown_as_it_was_given():
     begun = solved_start(CAP.retensioned({"cap": 0.2}))
     np.testing.assert_array_equal(begun.surface.vertices, CAP.vertices)
     assert begun.failure.verdict is Verdict.NO_EQUILIBRIUM
-    state = Session(begun).settle({"tensions": {"cap": 0.8}})
+    session = Session(begun)
+    state = session.settle({"tensions": {"cap": 0.8}})
     assert state.failure is None
     assert state.certificate.verdict is Verdict.STABLE
+    assert session.undo().failure is not None  # it is not at rest the second time either
+    assert session.reset().failure is not None
 
 
 def test_another_file_leaves_no_search_behind(cap):

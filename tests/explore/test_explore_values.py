@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from asking import Client
 from browsing import Explored, needs_browser
 
@@ -64,5 +65,29 @@ def test_a_snow_of_zero_is_one_value_among_others(driver):
         assert page.number(label).get_attribute("value") == "0.25"
         page.enter(label, -30)
         assert "the last surface at rest, patch 1 s = -" in page.text("#verdict .detail")
+    finally:
+        running.close()
+
+
+@needs_browser
+def test_coordinates_far_from_zero_keep_the_digits_that_tell_points_apart(driver):
+    masts = [[512340.25 + x, 5412340.75 + y, z] for x, y, z in ((0, 0, 2), (4, 0, 0), (4, 4, 2), (0, 4, 0))]
+    lines = {"edge": "cable", "cable": 9.0, "supports": masts}
+    sail = Plan([m[:2] for m in masts], edge_length=1.0, tension=1.0, pressure=0.0, **lines).surface()
+    running = explore.start(sail)
+    try:
+        page = Explored(driver, running.url)
+        x, y, z = (
+            page.find(f"input[aria-label='{axis} of point 1']").get_attribute("value") for axis in "xyz"
+        )
+        assert [float(number) for number in (x, y, z)] == masts[0]
+        page.find("#views .measure").click()
+        page.find("#canvas").click()
+        page.find("#measured button").click()
+        picked = driver.execute_script("return window.pcmc.targets.rows.at(-1).target.of")
+        exact = driver.execute_script("return window.pcmc.tools.local(window.pcmc.tools.picked[0])")
+        assert picked == pytest.approx(exact[:2], abs=1e-4)
+        assert f"({exact[0]:.3f}".rstrip("0") in page.text("#measured")
+        assert page.complaints() == []
     finally:
         running.close()

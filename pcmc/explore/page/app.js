@@ -197,7 +197,7 @@ class Page {
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
     const [{ at_rest: atRest, findings, figures, verdict }, { units }] = [header, this];
-    showVerdict(find("#verdict"), header);
+    showVerdict(find("#verdict"), header, this.size);
     showFindings(find("#findings tbody"), findings, figures, units);
     showParts(find("#parts"), figures, units);
     if (findings.supports) showSupports(find("#supports"), findings, units);

@@ -26,6 +26,10 @@ export function digits(x, count = 4) {
   return String(Number(x.toPrecision(count)));
 }
 
+/** A coordinate in something of a size, to 1e-4 of it or finer: far from 0, digits of the number would not tell. */
+export const coordinate = (x, size, count = 4) =>
+  String(Number(x.toFixed(Math.max(0, count - Math.floor(Math.log10(size))))));
+
 export const input = (type, name, attributes = {}) =>
   element("input", { type, "aria-label": name }, attributes);
 

@@ -1,7 +1,7 @@
 // The verdict, the numbers of the surface, and the fields that colours show.
 
 import { colourOf, diverging, familyField, sequential } from "./colours.js";
-import { capital, digits, element, tableOf, tableRow } from "./elements.js";
+import { capital, coordinate, digits, element, tableOf, tableRow } from "./elements.js";
 import { QUANTITIES } from "./panel.js";
 
 const SIGNS = {
@@ -19,7 +19,7 @@ export const COLOURS = {
 };
 
 /** The card that is always in view. */
-export function showVerdict(root, header) {
+export function showVerdict(root, header, size) {
   const { verdict, at_rest: atRest } = header;
   const sentence = verdict.name === "not_converged" && !atRest
     ? "pcmc found no surface at rest for these values" : verdict.sentence;
@@ -27,19 +27,19 @@ export function showVerdict(root, header) {
   root.querySelector(".sign").textContent = SIGNS[verdict.name] || "?";
   root.querySelector(".word").textContent = verdict.word;
   root.querySelector(".sentence").textContent = capital(sentence);
-  root.querySelector(".detail").textContent = [verdict.detail, atRest ? header.way : drawn(header)]
+  root.querySelector(".detail").textContent = [verdict.detail, atRest ? header.way : drawn(header, size)]
     .filter(Boolean).map((part) => `${capital(part)}.`).join(" ");
 }
 
 /** Which surface the page shows if there is none for the values asked for. */
-function drawn({ values: { asked, shown } }) {
+function drawn({ values: { asked, shown } }, size) {
   const near = (a, b) => Math.abs(a - b) <= 1e-9 * Math.abs(b);
   const values = Object.entries(QUANTITIES).flatMap(([kind, { label }]) => Object.entries(shown[kind])
     .filter(([name, has]) => !near(has, asked[kind][name] ?? 0))
     .map(([name, has]) => `${name} ${label.split(" ").pop()} = ${digits(has)}`));
   values.push(...Object.entries(shown.points)
     .filter(([name, at]) => at.some((x, k) => !near(x, asked.points[name][k])))
-    .map(([name, at]) => `${name} at (${at.map((x) => digits(x)).join(", ")})`));
+    .map(([name, at]) => `${name} at (${at.map((x) => coordinate(x, size)).join(", ")})`));
   if (!values.length) return "Shown: the surface as given";
   const listed = values.slice(0, 3).join(", ") + (values.length > 3 ? ", …" : "");
   return `Shown: the last surface at rest, ${listed}`;

@@ -1,6 +1,6 @@
 // A card for each patch, cable and room, with a slider and a number for each of its values.
 
-import { digits, element, input } from "./elements.js";
+import { coordinate, digits, element, input } from "./elements.js";
 
 const STEPS = 1000;
 const ROOM = 2; // times a value beyond the slider's end: where it ends then
@@ -57,8 +57,8 @@ class Range {
 
 export class Panel {
   /** `changed(final)` is called while a value changes, and with true when the change is done. */
-  constructor(root, { controls, patches, values, units }, together, changed) {
-    Object.assign(this, { units, together, changed, rows: [] });
+  constructor(root, { controls, patches, size, values, units }, together, changed) {
+    Object.assign(this, { size, units, together, changed, rows: [] });
     const tensions = Object.values({ ...values.asked.tensions, ...values.asked.cables });
     this.usual = Math.max(...tensions) || 1;
     root.replaceChildren(...controls.map((group, i) => this.card(group, i, patches, values.asked)));
@@ -132,7 +132,7 @@ export class Panel {
   put(entry, value, moving = false) {
     entry.value = value;
     if (entry.numbers) {
-      entry.numbers.forEach((number, k) => { number.value = digits(value[k], 6); });
+      entry.numbers.forEach((number, k) => { number.value = coordinate(value[k], this.size, 6); });
       return;
     }
     if (!moving) {

@@ -1,6 +1,6 @@
 // What the picture is asked for: measures between its points, a section, and single points that are moved.
 
-import { button, digits, element } from "./elements.js";
+import { button, coordinate, digits, element } from "./elements.js";
 import { dot, hit, minus, plus, scaled } from "./geometry.js";
 
 const STILL = 5; // pixels that a click may move
@@ -33,8 +33,8 @@ export class Tools {
   }
 
   /** Another mesh: its frame and units. */
-  begin({ origin, axes, foot, mirrors, units }) {
-    Object.assign(this, { origin, axes, foot, mirrors, unit: units.given ? ` ${units.length}` : "" });
+  begin({ origin, axes, foot, mirrors, size, units }) {
+    Object.assign(this, { origin, axes, foot, mirrors, size, unit: units.given ? ` ${units.length}` : "" });
     this.pick(null);
     this.section();
   }
@@ -115,8 +115,9 @@ export class Tools {
     const [last, first] = this.picked.map((one) => this.local(one)).reverse();
     const shown = (x) => `${digits(x)}${this.unit}`;
     if (!first) {
-      const place = () => this.local(this.folded(point)).slice(0, 2).map((x) => Number(x.toPrecision(6)));
-      this.told.append(element("span", `Height ${shown(last[2])} at (${digits(last[0])}, ${digits(last[1])})`),
+      const place = () => this.local(this.folded(point)).slice(0, 2).map((x) => Number(coordinate(x, this.size, 6)));
+      const [x, y] = last.map((one) => coordinate(one, this.size));
+      this.told.append(element("span", `Height ${shown(last[2])} at (${x}, ${y})`),
         button("Target here", () => this.addHeight(place())));
       return;
     }
@@ -135,9 +136,9 @@ export class Tools {
     const across = viewer.camera.corners().map((corner) => dot(normal, corner));
     const [low, high] = [Math.min(...across), Math.max(...across)];
     const offset = low + (high - low) * (place.value / STEPS + 1e-4); // beside a wall in the middle
-    const shown = this.local(normal.map((x) => offset * x))[Number(axis)];
-    place.setAttribute("aria-valuetext", `${digits(shown)}${this.unit}`);
-    place.title = `${"xyz"[Number(axis)]} = ${digits(shown)}${this.unit}`;
+    const shown = coordinate(this.local(normal.map((x) => offset * x))[Number(axis)], this.size);
+    place.setAttribute("aria-valuetext", `${shown}${this.unit}`);
+    place.title = `${"xyz"[Number(axis)]} = ${shown}${this.unit}`;
     viewer.setCut([...normal, offset]);
   }
 }
