@@ -48,8 +48,8 @@ class _Source(NamedTuple):
 def support_table(acting: Forces) -> pd.DataFrame:
     """A row per support of the part of a surface that stands; together they carry all its reactions.
 
-    Where curves meet in a corner, each has half the pulls on its own edges there. The rest of the force, which
-    vanishes as the mesh is refined, is shared equally by the lines, or by planes where there are none.
+    Where curves meet in a corner, each has half the pulls on its own edges there. The rest of the force,
+    which vanishes as the mesh is refined, is shared equally by the lines, or by planes where there are none.
 
     Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
     for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
