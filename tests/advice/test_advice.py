@@ -12,7 +12,6 @@ from pcmc import cli
 from pcmc.advice.advice import changes
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, Plan
-from pcmc.plan.parts import BALANCED
 from pcmc.project import load, run_project
 
 HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
