@@ -172,7 +172,7 @@ def _mended(task: Task, plan: Plan, result: Result) -> Mended:
     """
     sail, masts = as_sail(plan, task.rises), point_masts(plan)
     base = plan if sail is None else sail
-    fit = all(mast.has_room for mast in masts)
+    fit = all(mast.has_room and not mast.in_mirror for mast in masts)
     for share in SHARES if masts and fit else () if masts or sail is None else (0.0,):
         changed = with_rings(base, masts, share) if masts else base
         other = _tried(task, changed, result)

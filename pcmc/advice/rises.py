@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 from scipy.spatial import cKDTree
 
 from ..base import validate
@@ -167,6 +168,7 @@ class Mast:
     point: Floats  # (3,) in the coordinates of Π
     clearance: float  # distance in plan to the nearest line or other point that is held
     least: float  # the smallest radius of a ring that the triangles beside it can follow
+    in_mirror: bool  # whether it is inside of the whole roof alone
 
     @property
     def text(self) -> str:
@@ -184,7 +186,7 @@ class Mast:
 
 
 def point_masts(plan: Plan) -> list[Mast]:
-    """The supports of a plan that are points inside it and on no line.
+    """The supports of a plan that are points inside it, or inside the whole of it, and on no line.
 
     >>> square = [[0, 0], [8, 0], [8, 8], [0, 8]]
     >>> tent = Plan(square, edge_length=1, tension=1.0, pressure=0.0, supports=[[0, 0], [4, 3, 2]])
@@ -196,17 +198,30 @@ def point_masts(plan: Plan) -> list[Mast]:
         return []
     parts: Sequence[Hole | Divider] = (*plan.holes, *plan.dividers)
     curves = [s for s in plan.supports if isinstance(s, Curve)]
-    curves += [plan.outline, *(part.curve for part in parts)]
-    lines = [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in curves]
+    curves += [part.curve for part in parts]
+    lines, mirrors = (
+        [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in some]
+        for some in (curves, plan.mirrors)
+    )
     points = np.array([plan.plane.to_local(p) if len(p) == 3 else np.append(p, 0.0) for p in given.values()])
-    away = np.min([line.nearest(points[:, :2])[1] for line in lines], axis=0)
-    inside = away > SNAP * plan.edge_length
+    snap, places = SNAP * plan.edge_length, shapely.points(points[:, :2])
+    rim = PlanLine("outline", Kind.OUTLINE, plan.outline.local(plan.plane)).shape
+    in_mirror = np.zeros(len(points), dtype=bool)
+    for mirror in mirrors:  # there the roof goes on
+        rim, in_mirror = (
+            rim.difference(mirror.shape.buffer(snap)),
+            in_mirror | (mirror.nearest(points[:, :2])[1] <= snap),
+        )
+    away = np.min(
+        [shapely.distance(rim, places), *(line.nearest(points[:, :2])[1] for line in lines)], axis=0
+    )
+    inside = away > snap
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))
-    found = zip(given, points, away.tolist(), inside, strict=True)
+    found = zip(given, points, away.tolist(), in_mirror.tolist(), inside, strict=True)
     least = LEAST_RING * plan.edge_length
-    return [Mast(number, point, clearance, least) for number, point, clearance, free in found if free]
+    return [Mast(number, point, far, least, cut) for number, point, far, cut, free in found if free]
 
 
 def with_rings(plan: Plan, masts: Sequence[Mast], share: float) -> Plan:
@@ -243,6 +258,10 @@ def mast_note(plan: Plan) -> str:
     change = (
         f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[1], drawn=False)[2]}"
     )
+    if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
+        radius = f"of radius {cut[0].radius(SHARES[1]):g} around {cut[0].text}"
+        change = f"hold it on a ring instead: lead the outline around it on an arc {radius},"
+        change += " from mirror to mirror, and give that arc, with its height, in supports"
     if tight := [mast for mast in masts if not mast.has_room]:
         change = f"{tight[0].text} is too near to what is held beside it for a ring: move it there, or away"
     return (

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.arrays import Bools
+from ..base.arrays import Bools, Floats
 from ..base.tolerances import EXCESS, HARDLY, ON, PARALLEL
 from ..forces.cables import cable_pulls
 from ..forces.pinching import standing_part
@@ -15,7 +15,7 @@ from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.supports import common_point, uncancelled_pressures
 from ..surface.values import balanced_wall
-from .forces import load
+from .forces import loads
 from .proof import Overload, UnbalancedJunction, Unheld
 
 
@@ -33,7 +33,8 @@ def load_ratio(surface: Surface) -> float:
     boundary. Fixed lines inside the surface carry, too: Σ α of all their sheets per length. So do single
     held vertices, at most what their triangles pull; and cables, τ at each end on a support. A free edge
     carries nothing. With weights, α + w z stands for α, and Σ w A counts against the pressure. 0 for a closed
-    surface that nothing holds. Load and capacity may depend on the shape; ``overload`` is the proof.
+    surface that nothing holds. Of several connected parts, that of the worst. Load and capacity may depend on
+    the shape; ``overload`` is the proof.
     """
     topo = surface.topology
     fixed, held = (np.asarray(mask[topo.edges].all(axis=1)) for mask in (surface.fixed, surface.held))
@@ -41,7 +42,7 @@ def load_ratio(surface: Surface) -> float:
     outer = topo.boundary_edge & fixed
     corners[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
     carrying = (topo.boundary_edge & held) | (fixed & ~(corners & ~topo.boundary_edge))
-    return abs(load(surface)) / (_capacity(surface, carrying) or np.inf)
+    return _load_over_capacity(surface, carrying)
 
 
 def overload(surface: Surface) -> Overload | None:
@@ -61,8 +62,8 @@ def overload(surface: Surface) -> Overload | None:
     if not (surface.net_pressures.any() and load_is_given(surface)):
         return None
     fixed = np.asarray(surface.pinned[surface.topology.edges].all(axis=1))
-    ratio = abs(load(surface)) / (_capacity(surface, fixed) or np.inf)
-    return Overload(float(ratio), load_name(surface)) if ratio > 1.0 + EXCESS else None
+    ratio = _load_over_capacity(surface, fixed)
+    return Overload(ratio, load_name(surface)) if ratio > 1.0 + EXCESS else None
 
 
 def load_is_given(surface: Surface) -> bool:
@@ -92,9 +93,22 @@ def load_is_given(surface: Surface) -> bool:
     return not (alone.any() or moving.any())
 
 
-def _capacity(surface: Surface, carrying: Bools) -> float:
-    """The most that edges by their mask (e,), single vertices and ends of cables carry along Π's normal."""
+def _load_over_capacity(surface: Surface, carrying: Bools) -> float:
+    """Load over capacity of edges by their mask (e,) along Π's normal, in the worst connected part."""
+    forces, ends = loads(surface) @ np.array(surface.plane.normal), surface.cable_edges.ends
+    parts, first = surface.topology.components, surface.faces[:, 0]
+    points = (len(forces) - len(ends)) // len(first)  # of the quadrature, on a triangle
+    part = np.concatenate([np.repeat(parts[first], points), parts[ends[:, 0]]])
+    capacity = _capacity(surface, carrying)
+    load = np.abs(np.bincount(part, forces, len(capacity)))
+    return float((load / np.where(capacity > 0.0, capacity, np.inf)).max())
+
+
+def _capacity(surface: Surface, carrying: Bools) -> Floats:
+    """(c,) the most that edges by their mask (e,), single vertices and ends of cables carry along Π's normal,
+    by connected part."""
     topo, X, F = surface.topology, surface.vertices, surface.faces
+    parts, count = topo.components, int(topo.components.max()) + 1
     pull = np.repeat(surface.tensions[surface.patch_of_face][:, None], 3, axis=1)  # at the sides' middles
     if surface.weights.any():
         height, weight = surface.plane.height(X)[F], surface.weights[surface.patch_of_face, None]
@@ -106,15 +120,18 @@ def _capacity(surface: Surface, carrying: Bools) -> float:
     for plane, mask in surface.on_planes:  # a plane carries across itself; a mirror plane nothing at all
         steep = 0.0 if plane.mirror else abs(float(np.dot(plane.normal, surface.plane.normal)))
         lengths[slides & mask[topo.edges[carrying]].all(axis=1)] *= steep
-    capacity = float(sheets[carrying] @ lengths)
+    capacity = np.bincount(parts[topo.edges[carrying, 0]], sheets[carrying] * lengths, count)
     supports = surface.fixed | surface.on_plane
     single = (surface.fixed & ~topo.on_boundary) | (supports & topo.on_boundary)
     single[topo.edges[carrying]] = False
     if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
-        capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
-    pulls = np.abs(cable_pulls(surface, X))
-    return capacity + float(pulls[supports[surface.cable_edges.ends].sum(axis=1) == 1].sum())
+        pulled = pull.mean(axis=1) * (opposite * single[F]).sum(axis=1)
+        capacity = capacity + 0.5 * np.bincount(parts[F[:, 0]], pulled, count)
+    ends = surface.cable_edges.ends
+    last = supports[ends].sum(axis=1) == 1
+    pulls = np.abs(cable_pulls(surface, X))[last]
+    return np.asarray(capacity + np.bincount(parts[ends[last, 0]], pulls, count), dtype=np.float64)
 
 
 def coarseness(surface: Surface) -> float:

@@ -136,7 +136,8 @@ def drawing_set(
     sheet : format of the sheets, "A4" to "A0".
     scale : of plan, elevations and sections, 1 to this; by default the largest usual one that fits.
     heights : z of horizontal sections; by default at a quarter, half and three quarters of the height.
-    lines : pairs of points (x, y), for vertical sections; by default through the middle, along x and y.
+    lines : pairs of points (x, y), for vertical sections; by default through the middle, along x and y, where
+        they meet the roof.
     tolerance : of the panels' families; None for no schedule.
     panel_sheets : draw every panel at true size, on sheets and flat in the .dxf's model space, where those
         larger than a sheet are alone; needs a tolerance.
@@ -261,6 +262,7 @@ def _profiles(
     surface: Surface, lines: Sequence[Ends] | None, without: Collection[str]
 ) -> list[tuple[views.DrawnView, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
+    given = lines is not None
     if lines is None:
         low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
         x, y = map(float, 0.5 * (low + high))
@@ -277,7 +279,8 @@ def _profiles(
             surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]), without
         )
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
-        if not found:
+        if not found and given:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
-        profiles.append((views.profile(title, ends[0], along, found), found))
+        if found:
+            profiles.append((views.profile(title, ends[0], along, found), found))
     return profiles

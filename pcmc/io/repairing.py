@@ -136,11 +136,12 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     changes = {done: number for done, number in answer["changes"].items() if number}
     names = ("cables", "rooms", "planes", "lines")
     given = {name: getattr(data, name) or data.parts.get(name) for name in names}
-    given = {"supports": data.support is not None, **given}
+    given = {"supports": data.support is not None and np.any(data.support), **given}
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)
-    notes = (*data.notes, *([f"left out: {left_out}; the boundary is fixed"] if left_out else []))
+    held = "; the boundary is fixed" if surface.fixed.any() else ""
+    notes = (*data.notes, *([f"left out: {left_out}{held}"] if left_out else []))
     if edge_length is not None:
         if several:
             from ..meshing.remeshing import remesh  # needs the extra remesh

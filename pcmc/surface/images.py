@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .surface import Surface
 
 NONE: Ints = read_only(np.empty((0, 2), dtype=np.int64))
+NEARLY = 1e-4  # of the size: vertices nearer to an image, but not at it, are a mistake
 COARSE = "refine the mesh of the cell, so that each edge joins two vertices by one way only"
 
 
@@ -120,7 +121,7 @@ def images_in(vertices: npt.ArrayLike, lattice: npt.ArrayLike) -> Ints:
 
     Raises
     ------
-    SurfaceError : the translations are not independent.
+    SurfaceError : the translations are not independent; or vertices are almost images, but for rounding.
 
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> images_in(corners, [[1, 0, 0]]).tolist()
@@ -136,8 +137,18 @@ def images_in(vertices: npt.ArrayLike, lattice: npt.ArrayLike) -> Ints:
     around = np.linalg.norm(T, axis=1) / (2.0 * np.pi) * np.exp(2j * np.pi * steps)
     from scipy.spatial import cKDTree  # here, as few surfaces ask
 
-    tree = cKDTree(np.hstack([around.real, around.imag, X - X[0] - steps @ T]))
-    group = components(tree.query_pairs(ON * size, output_type="ndarray"), len(X))
+    places = np.hstack([around.real, around.imag, X - X[0] - steps @ T])
+    pairs = cKDTree(places).query_pairs(NEARLY * size, output_type="ndarray")
+    i, j = pairs.T
+    apart = np.linalg.norm(places[i] - places[j], axis=1)
+    there = apart <= ON * size
+    off = np.flatnonzero(~there & np.rint(steps[i] - steps[j]).any(axis=1))
+    if len(off):
+        k, l = pairs[off[0]].tolist()
+        text = f"vertices {k} and {l} are images of each other but for {apart[off[0]]:.2g}"
+        text = f"{text} ({len(off)} such pairs); give positions and lattice with more digits"
+        raise SurfaceError(text, what="vertices", where=l, found=float(apart[off[0]]))
+    group = components(pairs[there], len(X))
     vertex = np.unique(group, return_index=True)[1][group]
     image = np.flatnonzero(vertex != np.arange(len(X)))
     return np.stack([image, vertex[image]], axis=1)

@@ -10,7 +10,7 @@ import tomlkit
 from drawn import drawing
 
 from pcmc import cli, project
-from pcmc.advice.rises import point_masts, with_rings
+from pcmc.advice.rises import mast_note, point_masts, with_rings
 from pcmc.base.errors import FileWarning, PlanWarning
 from pcmc.plan import Plan
 
@@ -152,3 +152,18 @@ def test_an_apex_below_a_raised_ring_is_explained(tmp_path):
     outcome = project.run_project(project.load(path), use_cache=False)
     assert not outcome.good
     assert "hole 'lantern' is held at 3 m, so the apex cannot be 2 m" in outcome.notes
+
+
+def test_a_point_in_a_mirror_is_inside_the_whole_roof():
+    whole = Plan(
+        [[0, 0], [12, 0], [12, 8], [0, 8]], supports=[[6, 4, 4], [6, 0]], tension=1.0, edge_length=1.0
+    )
+    half = Plan(
+        [[0, 0], [6, 0], [6, 8], [0, 8]],
+        supports=[[6, 4, 4], [6, 0]],
+        mirrors=[[[6, 0], [6, 8]]],
+        tension=1.0,
+    )
+    found = [[(m.text, m.clearance, m.in_mirror) for m in point_masts(plan)] for plan in (whole, half)]
+    assert found == [[("[6, 4, 4]", 4.0, False)], [("[6, 4, 4]", pytest.approx(4.0), True)]]
+    assert "lead the outline around it on an arc of radius 0.48 around [6, 4, 4]" in mast_note(half)

@@ -32,6 +32,21 @@ def test_the_load_is_given_where_what_carries_it_does_not_move():
     assert overload(raised) == overload(whole)
 
 
+def test_of_roofs_side_by_side_each_carries_its_own_load():
+    """60 over 32 beside 60 over 320: together they would carry both, but nothing joins them."""
+    weak = Plan([[0, 0], [10, 0], [10, 6], [0, 6]], tension=1.0, edge_length=1.0).surface()
+    X, F, n = weak.vertices, weak.faces, weak.n
+    both = Surface(
+        np.concatenate([X, X + np.array([20.0, 0.0, 0.0])]),
+        np.concatenate([F, F + n]),
+        np.repeat([0, 1], len(F)),
+        [Patch("weak", 1.0), Patch("strong", 10.0)],
+        fixed=np.tile(weak.fixed, 2),
+    )
+    assert load_ratio(both) == pytest.approx(load_ratio(weak))
+    assert overload(both).ratio == pytest.approx(overload(weak).ratio)
+
+
 def test_between_mirrors_the_load_is_given_too():
     half = Plan([[0, 0], [5, 0], [5, 6], [0, 6]], tension=1.0, mirrors=[[[5, 0], [5, 6]]], edge_length=1.0)
     surface = half.surface()

@@ -76,6 +76,20 @@ def test_sections_are_at_quarters_of_the_height_and_through_the_middle_or_along_
     assert texts(diagonal) >= {"2.828", "+2.600"}
 
 
+def test_a_usual_section_between_two_roofs_is_left_out():
+    X = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]])
+    F = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    two = pcmc.Surface(
+        [*X, *(X + np.array([4, 0, 0]))],
+        [*F, *(F + 5)],
+        [0] * 8,
+        [pcmc.Patch("roofs", 1.0)],
+        fixed=[*range(4), *range(5, 9)],
+    )
+    found = drawing_set(two, "m", sheet="A3", anyway=True).sections
+    assert [line.points[0, 1] for line in found if np.ptp(line.points[:, 1]) == 0.0] == [0.0, 0.0]
+
+
 def test_an_elevation_shows_what_faces_the_viewer_with_right_on_the_right():
     axes = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0])}
     for title, (right, towards) in ELEVATIONS.items():

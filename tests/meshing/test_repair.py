@@ -10,6 +10,7 @@ from periodic_cases import bay
 from refusals import refused
 
 import pcmc
+from generators import double_bubble
 from pcmc import cli, io
 from pcmc.base.errors import FileError, FileWarning, OptionError, SurfaceError
 from pcmc.meshing.elevation import elevate
@@ -81,6 +82,12 @@ def test_curved_elements_are_left_out_and_this_is_said(tmp_path):
         repaired = pcmc.repair(tmp_path / name)
         assert repaired.surface.order == 1
         assert "left out: supports, curved elements; the boundary is fixed" in repaired.notes
+
+
+@pytest.mark.filterwarnings("ignore:no vertex is fixed")
+def test_bubbles_have_no_boundary_that_could_be_fixed(tmp_path):
+    pcmc.write(tmp_path / "bubbles.pcmc", double_bubble(volumes=(1.0, 1.0)))
+    assert str(pcmc.repair(tmp_path / "bubbles.pcmc")) == "left out: rooms"
 
 
 def test_images_are_left_out_and_this_is_said(tmp_path):

@@ -158,6 +158,11 @@ def test_pressure_at_a_free_edge_is_refused():
         pcmc.energy(strip(fixed=[0, 3]))
 
 
+def test_vertices_that_are_almost_images_are_named():
+    with pytest.raises(SurfaceError, match=r"vertices 0 and 1 are images .* but for 3e-07 \(1 such"):
+        images_in([[0, 0, 0], [1, 0, 3e-7], [0.5, 0.5, 0], [0.5, 0.5, 3e-7]], [[1, 0, 0]])
+
+
 def test_a_lattice_needs_independent_translations():
     wrong = ([], [[0, 0, 0]], [[1, 0, 0], [2, 0, 0]], np.ones((4, 3)), np.ones((3, 2)), [[np.nan, 0, 0]], "a")
     for lattice in wrong:
