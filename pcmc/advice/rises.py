@@ -238,7 +238,7 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
     lines = []
     for number, mast in enumerate(masts, 1):
         radius = f"{mast.radius(share):g}"
-        x, y, z = (f"{value:.6g}" for value in mast.point)
+        x, y, z = (f"{value:.10g}" for value in mast.point)
         if drawn:
             lines.append(f"draw a circle of radius {radius} around ({x}, {y}) at height {z} on layer 'mast'")
             lines.append(f"delete the point or line at ({x}, {y}) there")
