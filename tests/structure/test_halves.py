@@ -178,3 +178,11 @@ def test_drawings_say_why_members_are_left_out(tmp_path):
         warn_of_members(half, "roof.obj")
     with pytest.warns(LostWarning, match="left out; .* leave out whole, or the member"):
         warn_of_members(dataclasses.replace(half, unfold=True), "drawings", held=True)
+
+
+def test_the_corner_of_two_mirrors_ends_a_seam():
+    outline, mirrors = [[0, 0], [3, 0], [3, 2], [0, 2]], [[[3, 0], [3, 2]], [[0, 2], [3, 2]]]
+    quarter = pcmc.solve(Plan(outline, mirrors=mirrors, edge_length=0.5, tension=3.0, pressure=0.5).surface())
+    seams = pcmc.cutting_pattern(quarter.surface, strips=1).seam_table.query("kind == 'mirror'")
+    ends = seams[["x0", "y0", "x1", "y1"]].to_numpy().reshape(-1, 2, 2)
+    assert sorted(np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)) == pytest.approx([2.0, 3.0])
