@@ -16,6 +16,7 @@ from scipy.sparse import csr_array
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..forces.functional import gradient_by, weighted
+from ..forces.rooms import pressure_shares
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, segment_lengths
@@ -101,7 +102,7 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
     weight /= np.where(upright, 1.0, twice)[:, None]
     over = np.flatnonzero((weight >= -1e-9).all(axis=1) & ~upright)
     if not len(over):
-        message = f"height at ({point[0]:g}, {point[1]:g}): no patch is over that point"
+        message = f"height at ({point[0]:.12g}, {point[1]:.12g}): no patch is over that point"
         raise OptionError(message, what="of", found=point)
     heights = np.einsum("fc,fc->f", weight[over], corner[over, :, 2])
     face = over[heights.argmax()]
@@ -141,7 +142,7 @@ def _curvature(surface: Surface, of: str) -> Measurement:
 
 def _pressure(surface: Surface, of: str) -> Measurement:
     """The pressure of the air in a room of prescribed volume, force/length²."""
-    row = np.linalg.pinv(surface.room_signs.T)[part_index(surface, "volumes", of)]
+    row = pressure_shares(surface)[part_index(surface, "volumes", of)]
     return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), {"pressures": row})
 
 

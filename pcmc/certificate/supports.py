@@ -20,6 +20,7 @@ FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force",
 COLUMNS = ["support", "name", "kind", "length", *"xyz", *FORCE, *MOMENT, "per_length_max"]
 LETTERS = {"point": "S", "cable end": "C"}  # of the kinds whose forces act at one point; B for the others
 COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
+SLIGHT = 1e-12  # the weight of a plane beside a line, which alone can hold what acts along the plane
 NONE: Ints = np.empty(0, dtype=np.int64)
 
 
@@ -47,8 +48,8 @@ class _Source(NamedTuple):
 def support_table(acting: Forces) -> pd.DataFrame:
     """A row per support of the part of a surface that stands; together they carry all its reactions.
 
-    Where curves meet in a corner, each has half the pulls on its own edges there, and an equal share of the
-    rest of the force, which vanishes as the mesh is refined.
+    Where curves meet in a corner, each has half the pulls on its own edges there. The rest of the force,
+    which vanishes as the mesh is refined, is shared equally by the lines, or by planes where there are none.
 
     Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
     for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
@@ -170,20 +171,21 @@ def _labelled(acting: Forces) -> Iterator[_Part]:
     for forces, parts, rest in _sources(acting):
         sharing = np.zeros(len(forces))
         for part in parts:
-            sharing[part.vertices] += 1.0
+            sharing[part.vertices] += _weights(acting, part)
         if rest is not None:
             mask, name, kind = rest
             left = np.flatnonzero(mask & forces.any(axis=1) & (sharing == 0.0))
             if len(left):
                 parts = [*parts, _Part(name, kind, left, acting.surface.vertices[left].mean(axis=0))]
-                sharing[left] = 1.0
+                sharing[left] = _weights(acting, parts[-1])
         own, every = [_half_pulls(acting, part) for part in parts], np.zeros_like(forces)
         for part, pulled in zip(parts, own, strict=True):
             every[part.vertices] += pulled
         for part, pulled in zip(parts, own, strict=True):
             letter = LETTERS.get(part.kind, "B")
             count[letter] += 1
-            share = pulled + (forces - every)[part.vertices] / sharing[part.vertices, None]
+            share = (_weights(acting, part) / sharing[part.vertices])[:, None]
+            share = pulled + share * (forces - every)[part.vertices]
             yield part._replace(forces=share, label=f"{letter}{count[letter]}")
 
 
@@ -271,6 +273,11 @@ def _pulled(acting: Forces, part: _Part) -> tuple[Ints, Floats]:
         return part.edges, part.pulls
     edges = part.edges[acting.lines[part.edges].any(axis=1)]
     return edges, acting.pulls[edges]
+
+
+def _weights(acting: Forces, part: _Part) -> Floats:
+    """(k,) how much of the rest of a force a support takes: a plane next to none where a line is clamped."""
+    return np.where(acting.clamped[part.vertices] & (part.kind != "line"), SLIGHT, 1.0)
 
 
 def _half_pulls(acting: Forces, part: _Part) -> Floats:

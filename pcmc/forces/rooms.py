@@ -87,19 +87,23 @@ def prescribed_volumes(surface: Surface) -> Floats:
 def room_pressures(surface: Surface) -> Floats:
     """(r,) the pressure of the air in each room, force/length²: that on its patches that are no walls.
 
-    A wall has the difference to the air beyond it. The fit is by least squares, with the walls where a room
-    has nothing else.
-
     >>> from pcmc import Patch
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 3.0, 2.0)],
     ...                fixed=[0, 1, 2], rooms=[Room("all", {"a": -1}, 1.0)])
     >>> room_pressures(flat).round(12).tolist()
     [-2.0]
     """
-    signs, rows = surface.room_signs.T, surface.roof
-    if np.linalg.matrix_rank(signs[rows]) < len(surface.rooms):
-        rows = np.ones(len(signs), dtype=bool)
-    return np.asarray(np.linalg.lstsq(signs[rows], surface.pressures[rows])[0])
+    return np.asarray(pressure_shares(surface) @ surface.pressures)
+
+
+def pressure_shares(surface: Surface) -> Floats:
+    """(r,k) what of the patches' pressures is that of each room: a mean over its patches that are no walls.
+
+    A wall has the difference to the air beyond it. It counts only where rooms have nothing else.
+    """
+    signs = surface.room_signs * surface.roof
+    whole = np.linalg.matrix_rank(signs) == len(signs)
+    return np.asarray(np.linalg.pinv((signs if whole else surface.room_signs).T))
 
 
 def energy_at_volumes(surface: Surface) -> float:

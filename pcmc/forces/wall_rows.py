@@ -164,7 +164,8 @@ def held_walls(
 ) -> list[tuple[int, Ints, Ints, Ints]]:
     """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
 
-    These have one top edge to either side of each junction vertex; none unless a junction rests on one.
+    These have one top edge to either side of each junction vertex, or end on another plane that it slides on,
+    as in a mirror; none unless a junction rests on one.
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
@@ -172,7 +173,7 @@ def held_walls(
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = topo.edges_of(surface.patch_of_face == index)
         vertices = distinct(topo.edges[of_wall], surface.n)
-        if not bottom[of_wall].any() or surface.on_plane[vertices].any():
+        if not bottom[of_wall].any() or surface.on_ground[vertices].any():
             continue
         top = topo.edges[of_wall[roof_edge[of_wall]]]
         below = vertices[surface.fixed[vertices] & ~roof_vertex[vertices]]
@@ -180,7 +181,8 @@ def held_walls(
             continue
         foot = _held_feet(surface.n, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
         free = np.unique(top)[~surface.fixed[np.unique(top)]]
-        if foot is None or (np.bincount(top.ravel(), minlength=surface.n)[free] != 2).any():
+        sides = np.bincount(top.ravel(), minlength=surface.n) + ends_on_planes(surface, top).any(axis=1)
+        if foot is None or (sides[free] != 2).any():
             continue
         gap = np.linalg.norm(X[free] - X[foot[free]], axis=1)
         rests = rests or bool(lying(gap, X).any())
@@ -189,6 +191,14 @@ def held_walls(
     count = np.bincount(np.concatenate(shared), minlength=surface.n) if shared else np.empty(0)
     alone = [bool((count[tops[~surface.fixed[tops]]] == 1).all()) for tops in shared]
     return [wall for wall, single in zip(walls, alone, strict=True) if single] if rests else []
+
+
+def ends_on_planes(surface: Surface, edges: Ints) -> Floats:
+    """(n,3) the unit normals of other planes than Π, at the ends that curves of edges (k,2) have on them."""
+    normals, alone = np.zeros((surface.n, 3)), np.bincount(edges.ravel(), minlength=surface.n) == 1
+    for plane, on in surface.on_planes:
+        normals[on & alone & ~surface.fixed] = plane.normal
+    return normals
 
 
 def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
@@ -222,6 +232,7 @@ class Walls:
     side: Floats  # (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to
     pinchable: Bools  # (patches,) the patches that are such walls
     foot: Ints  # (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere
+    beyond: Floats  # (n,3) the unit normal of another plane where a top edge ends on one, as in a mirror
 
     @property
     def held(self) -> Bools:
@@ -247,6 +258,8 @@ class Walls:
         for v in edges.T:
             sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
             np.add.at(chord, v, sign[:, None] * side)
+        ends = np.flatnonzero(self.beyond.any(axis=1))
+        chord[ends] = self.beyond[ends]
         length = np.linalg.norm(chord, axis=1)[:, None]
         tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
         return np.asarray(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
@@ -297,4 +310,5 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         side=np.where(np.where(low, push, height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
         foot=foot,
+        beyond=ends_on_planes(surface, top_edges),
     )

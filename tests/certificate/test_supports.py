@@ -123,6 +123,12 @@ def test_at_a_corner_a_wall_of_glass_carries_nothing_along_itself():
     assert forces == pytest.approx(np.array([[-6, 0, 0], [0, -6, 0], [0, 6, 0], [6, 0, 0]]), abs=1e-12)
 
 
+def test_glass_carries_nothing_along_itself_where_a_curved_sheet_is_fixed_beside_it():
+    table = pcmc.solve(against_glass()).certificate.supports.set_index("kind")
+    assert table.loc["upright plane", ["force_x", "force_z"]].to_numpy(float) == pytest.approx(0.0, abs=1e-9)
+    assert table.loc["line", "force_z"] == pytest.approx(-0.5 * np.pi, rel=0.03)  # half the load on the disc
+
+
 def test_the_sentence_of_balance_tells_whether_there_are_loads():
     """Of a film without loads the forces of its supports cancel, up to what the solver leaves of them."""
     film = pcmc.solve(catenoid(0.4, half_distance=0.5), tolerance=1e-6).certificate

@@ -270,6 +270,8 @@ def test_the_pressure_of_a_room_beside_one_of_given_pressure_is_that_on_its_roof
     result = pcmc.solve(plan.surface())
     assert result.surface.pressures[2] == pytest.approx(result.surface.pressures[0] - 1.0)  # the wall
     assert result.certificate.rooms.pressure[0] == pytest.approx(result.surface.pressures[0], rel=1e-12)
+    design = meet(result.surface, Target("pressure", "west", 1.5), Parameter("west", "volume"))
+    assert design.surface.pressures[0] == pytest.approx(1.5, rel=1e-6)
 
 
 def test_the_result_shows_its_rooms():
