@@ -32,6 +32,7 @@ from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.lagrange import expect_flat
+from ..surface.pieces import point_text
 from .extrapolation import extrapolate
 from .mesh_check import check_mesh, with_bar
 from .varied import Varied
@@ -112,7 +113,7 @@ def find_end(
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
             worst = there.faces[worst_face(there, ~there.roof)[0]]  # of walls, triangles may vanish
-            detail += f" near ({', '.join(f'{x:.3g}' for x in there.vertices[worst].mean(axis=0))})"
+            detail += f" near {point_text(there.vertices[worst].mean(axis=0), there.size)}"
     last = branch.last.vertices
     before = branch.surfaces.get(len(branch.points) - 2, branch.last).vertices
     motion = last - before if before.shape == last.shape else np.zeros_like(last)
@@ -358,5 +359,4 @@ def _where(end: End, mode: Floats) -> str:
         return f"{part} {'inflates' if through[largest] > 0.0 else 'sinks'}{' or the opposite' * turns}"
     names = " | ".join(surface.patches[k].name for k in near[:3]) + " …" * (len(near) > 3)
     part = f"the junction {names}" if len(near) > 1 else repr(surface.patches[near[0]].name)
-    place = ", ".join(f"{x:.3g}" for x in surface.vertices[most].round(9) + 0.0)
-    return f"{part} sways to one side, most near ({place})"
+    return f"{part} sways to one side, most near {point_text(surface.vertices[most], surface.size)}"

@@ -15,6 +15,7 @@ from ..certificate.supports import held_curves
 from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..forces.volume_below import volume_below
 from ..surface import Surface
+from ..surface.pieces import point_text
 from ..surface.topology import EdgeCurve
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
@@ -121,8 +122,8 @@ def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[Ed
     for curve, name, at, force, most in zip(
         curves, names, middles, forces, table["per_length_max"].tolist(), strict=True
     ):
-        place = ", ".join(f"{c:.3g}" for c in at)
-        yield curve, name if names.count(name) == 1 else f"{name} near ({place})", force, most
+        own = name if names.count(name) == 1 else f"{name} near {point_text(at, surface.size)}"
+        yield curve, own, force, most
 
 
 def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float, float]:

@@ -238,7 +238,7 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
     lines = []
     for number, mast in enumerate(masts, 1):
         radius = f"{mast.radius(share):g}"
-        x, y, z = (f"{value:.6g}" for value in mast.point)
+        x, y, z = (f"{value:.10g}" for value in mast.point)
         if drawn:
             lines.append(f"draw a circle of radius {radius} around ({x}, {y}) at height {z} on layer 'mast'")
             lines.append(f"delete the point or line at ({x}, {y}) there")
@@ -256,7 +256,7 @@ def mast_note(plan: Plan) -> str:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
     change = (
-        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[1], drawn=False)[2]}"
+        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[-1], drawn=False)[2]}"
     )
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
         radius = f"of radius {cut[0].radius(SHARES[1]):g} around {cut[0].text}"

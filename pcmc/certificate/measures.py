@@ -102,7 +102,7 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
     weight /= np.where(upright, 1.0, twice)[:, None]
     over = np.flatnonzero((weight >= -1e-9).all(axis=1) & ~upright)
     if not len(over):
-        message = f"height at ({point[0]:g}, {point[1]:g}): no patch is over that point"
+        message = f"height at ({point[0]:.12g}, {point[1]:.12g}): no patch is over that point"
         raise OptionError(message, what="of", found=point)
     heights = np.einsum("fc,fc->f", weight[over], corner[over, :, 2])
     face = over[heights.argmax()]

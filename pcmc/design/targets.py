@@ -95,7 +95,7 @@ class Target:
     def label(self) -> str:
         """The quantity in words."""
         if self.quantity == "height":
-            return f"height at {self.name or f'({self.of[0]:g}, {self.of[1]:g})'}"
+            return f"height at {self.name or f'({self.of[0]:.12g}, {self.of[1]:.12g})'}"
         return self.quantity if self.of is None else f"{self.quantity} of {self.of}"
 
     @property

@@ -91,3 +91,12 @@ def test_coordinates_far_from_zero_keep_the_digits_that_tell_points_apart(driver
         assert page.complaints() == []
     finally:
         running.close()
+
+
+@needs_browser
+def test_large_and_small_numbers_have_as_many_digits_as_others(page):
+    script = (
+        "import('./page/elements.js').then(({ digits }) => arguments[1](arguments[0].map((x) => digits(x))))"
+    )
+    shown = page.driver.execute_async_script(script, [51234567, -0.000051234567, 5.1e7, 51234.567])
+    assert shown == ["5.123e+7", "-5.123e-5", "5.1e+7", "51230"]

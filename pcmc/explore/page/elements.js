@@ -22,7 +22,7 @@ export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 /** Four digits, without trailing zeros. */
 export function digits(x, count = 4) {
   if (x === null || x === undefined || !Number.isFinite(x)) return "–";
-  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(count - 2);
+  if (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-4)) return x.toExponential(count - 1).replace(/\.?0+e/, "e");
   return String(Number(x.toPrecision(count)));
 }
 
