@@ -23,7 +23,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
 from ..base.errors import CurvedContactError
-from ..base.tolerances import EXCESS
+from ..base.tolerances import EXCESS, ON
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import segment_lengths
@@ -33,6 +33,8 @@ from ..surface.topology import topology
 from .functional import energy_and_gradient
 from .motion_space import MotionSpace, VertexClasses, vertex_classes
 from .wall_rows import WallRows, Walls, find_walls
+
+WEISZFELD = 30  # steps to the direction of the largest pull where walls meet
 
 
 def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpace | None = None) -> Floats:
@@ -299,21 +301,28 @@ def pull_and_capacity(
     The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
     Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
-    On a held bottom the pull is the force across its curve, to any side, and ℓ is taken on the bottom.
+    On a held bottom the pull is the force along the direction d of ``pull_directions``, ℓ is taken on the
+    bottom, and the wall's area is ½ ℓ |d × e| for an edge along e.
     ``force`` (n,3) is -∇E without supports, if that is known.
     """
     force = -energy_and_gradient(surface, supports=False)[1] if force is None else force
-    pull = np.where(resting, walls.side * (force @ np.array(surface.plane.normal)), 0.0)
-    held = resting & walls.held
-    pull[held] = np.linalg.norm(walls.across_bottom(force, surface.vertices)[held], axis=1)
+    d = pull_directions(surface, walls, resting, force)
+    pull = np.where(resting, np.einsum("ij,ij->i", force, d), 0.0)
+    vertex, half, along = _edge_ends(surface, walls)
+    across = np.linalg.norm(np.cross(d[vertex], along), axis=1)
+    capacity = np.bincount(vertex, half * across, surface.n)
+    return pull, np.where(resting, capacity, 0.0)
+
+
+def _edge_ends(surface: Surface, walls: Walls) -> tuple[Ints, Floats, Floats]:
+    """Of both ends of each top edge: the vertex (2k,), ½ α_w ℓ (2k,), and the edge's unit vector (2k,3)."""
     ends = np.where(walls.foot >= 0, walls.foot, np.arange(surface.n))[walls.top_edges]
     start, end = surface.vertices[ends.T]
-    tension = surface.tensions[walls.wall_below]
-    half = 0.5 * tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
-    capacity = np.zeros(surface.n)
-    for end in walls.top_edges.T:
-        np.add.at(capacity, end, half)
-    return pull, np.where(resting, capacity, 0.0)
+    span = surface.plane.along(end - start)
+    length = np.linalg.norm(span, axis=1)
+    half = 0.5 * surface.tensions[walls.wall_below] * length
+    along = span / np.where(length > 0.0, length, 1.0)[:, None]
+    return walls.top_edges.T.ravel(), np.tile(half, 2), np.tile(along, (2, 1))
 
 
 def excess_pull(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
@@ -327,12 +336,34 @@ def excess_pull(surface: Surface, walls: Walls, resting: Bools, force: Floats) -
 
 
 def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
-    """(n,3) the unit direction to lift each vertex of a standing part: off Π, or as a held one is pulled."""
+    """(n,3) the unit direction to lift each vertex of a standing part: off Π, or as a held one is pulled.
+
+    Where held walls meet, they resist a motion d by h(d) = Σ c |d × e|, c = ½ α_w ℓ, most where it is across
+    all of them. The direction is the one of the largest ⟨f, d⟩ / h(d): there f ∝ M d, M = Σ c (1 - e eᵀ) /
+    |d × e|, a fixed point (Weiszfeld's).
+    """
     direction = walls.side[:, None] * np.array(surface.plane.normal)
     held = resting & walls.held
-    if held.any():
-        across = walls.across_bottom(force, surface.vertices)
-        length = np.linalg.norm(across, axis=1)
-        pulled = held & (length > 0.0)
-        direction[pulled] = across[pulled] / length[pulled, None]
+    if not held.any():
+        return direction
+    pull = walls.across_bottom(force, surface.vertices)
+    length = np.linalg.norm(pull, axis=1)
+    pulled = held & (length > 0.0)
+    direction[pulled] = pull[pulled] / length[pulled, None]
+    vertex, c, e = _edge_ends(surface, walls)
+    meet = np.flatnonzero(pulled & (np.bincount(vertex, minlength=surface.n) > 2))
+    if not len(meet):
+        return direction
+    here = np.isin(vertex, meet)
+    number, c, e = np.searchsorted(meet, vertex[here]), c[here], e[here]
+    P = c[:, None, None] * (np.eye(3) - e[:, :, None] * e[:, None, :])
+    d = direction[meet]
+    for _ in range(WEISZFELD):
+        M = np.zeros((len(meet), 3, 3))
+        np.add.at(
+            M, number, P / np.maximum(np.linalg.norm(np.cross(d[number], e), axis=1), ON)[:, None, None]
+        )
+        d = np.linalg.solve(M, force[meet, :, None])[:, :, 0]
+        d /= np.linalg.norm(d, axis=1)[:, None]
+    direction[meet] = d
     return direction

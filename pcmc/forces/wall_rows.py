@@ -16,6 +16,7 @@ from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, vertex_sums
 from ..surface.images import expect_no_images
+from ..surface.supports import members
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
@@ -165,32 +166,49 @@ def held_walls(
     """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
 
     These have one top edge to either side of each junction vertex, or end on another plane that it slides on,
-    as in a mirror; none unless a junction rests on one.
+    as in a mirror, or where they meet other such walls; none unless a junction rests on one.
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
     bottom = topo.boundary_edge & (surface.fixed & low)[topo.edges].all(axis=1)
+    meeting = np.zeros(surface.n, dtype=np.int64)  # the walls whose top edges have the vertex
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = topo.edges_of(surface.patch_of_face == index)
         vertices = distinct(topo.edges[of_wall], surface.n)
+        top = topo.edges[of_wall[roof_edge[of_wall]]]
+        meeting[np.unique(top)] += 1
         if not bottom[of_wall].any() or surface.on_ground[vertices].any():
             continue
-        top = topo.edges[of_wall[roof_edge[of_wall]]]
         below = vertices[surface.fixed[vertices] & ~roof_vertex[vertices]]
         if not len(top) or not low[below].all():
             continue
         foot = _held_feet(surface.n, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
-        free = np.unique(top)[~surface.fixed[np.unique(top)]]
-        sides = np.bincount(top.ravel(), minlength=surface.n) + ends_on_planes(surface, top).any(axis=1)
-        if foot is None or (sides[free] != 2).any():
+        if foot is None:
             continue
+        free = np.unique(top)[~surface.fixed[np.unique(top)]]
         gap = np.linalg.norm(X[free] - X[foot[free]], axis=1)
         rests = rests or bool(lying(gap, X).any())
         walls.append((index, topo.edges[of_wall], top, foot))
-    shared = [np.unique(top) for _, _, top, _ in walls]
-    count = np.bincount(np.concatenate(shared), minlength=surface.n) if shared else np.empty(0)
-    alone = [bool((count[tops[~surface.fixed[tops]]] == 1).all()) for tops in shared]
-    return [wall for wall, single in zip(walls, alone, strict=True) if single] if rests else []
+    while rests and walls:
+        fit = _fit_together(surface, walls, meeting)
+        if all(fit):
+            return walls
+        walls = [wall for wall, good in zip(walls, fit, strict=True) if good]
+    return []
+
+
+def _fit_together(surface: Surface, walls: list[tuple[int, Ints, Ints, Ints]], meeting: Ints) -> list[bool]:
+    """Which walls end or meet only on other planes, or at free vertices all of whose walls are here."""
+    feet = np.stack([foot for *_, foot in walls])
+    sides = np.stack([np.bincount(top.ravel(), minlength=surface.n) for _, _, top, _ in walls])
+    together = (sides > 0).sum(axis=0)
+    one_foot = (np.where(sides > 0, feet, feet.max(axis=0)) == feet.max(axis=0)).all(axis=0)
+    alone = (sides == 2) & (together == 1)
+    on_other = members(surface.on_planes, surface.n)
+    joined = (together > 1) & (together == meeting) & one_foot & ~on_other
+    mirrored = [ends_on_planes(surface, top).any(axis=1) for _, _, top, _ in walls]
+    good = alone | joined | ((sides == 1) & (together == 1) & mirrored) | (sides == 0) | surface.fixed
+    return [bool(row.all()) for row in good]
 
 
 def ends_on_planes(surface: Surface, edges: Ints) -> Floats:
@@ -258,8 +276,8 @@ class Walls:
         for v in edges.T:
             sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
             np.add.at(chord, v, sign[:, None] * side)
-        ends = np.flatnonzero(self.beyond.any(axis=1))
-        chord[ends] = self.beyond[ends]
+        ends = np.bincount(edges.ravel(), minlength=len(X)) != 2
+        chord[ends] = self.beyond[ends]  # where walls meet, none: any pull is across one of them
         length = np.linalg.norm(chord, axis=1)[:, None]
         tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
         return np.asarray(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)

@@ -18,6 +18,7 @@ from pcmc.forces.pinching import (
     pull_directions,
     resting_vertices,
     standing_part,
+    top_spacing,
 )
 from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
@@ -90,7 +91,6 @@ def test_the_first_vertex_may_be_a_foot():
 
 
 def test_walls_that_cannot_pair_their_vertices_cannot_pinch():
-    assert not find_walls(held(four_fans(4)), held=True).pinchable.any()  # four walls meet at one vertex
     line = [[0, -2, 0], [0, -1, 1], [0, 0, 2], [0, 1, 1], [0, 2, 0]]
     X = np.array([*line, [-2, 0, 0], [2, 0, 0], [0, 0, 0]], dtype=float)
     left, right = ([[i, i + 1, 5] for i in range(4)], [[i + 1, i, 6] for i in range(4)])
@@ -134,6 +134,52 @@ def test_pull_less_capacity_is_what_a_lift_to_any_side_gains(count):
             else:
                 assert slope == pytest.approx(gain, abs=2e-5)
         assert capacity[v] == pytest.approx(3.0 * spacing, rel=1e-12)
+
+
+def test_where_walls_meet_no_lift_gains_more_than_that_along_the_pull():
+    """With h(u) + f·u = (E(lifted by t u) - E) / t, no f·u / h(u) is larger than pull over capacity."""
+    start = held(four_fans(4)).retensioned({"fan 1": 2.6})
+    walls = find_walls(start, held=True)
+    assert walls.pinchable.sum() == 4
+    resting = walls.top_free
+    standing = StandingPart.of(start, walls, resting).surface
+    full = start.moved(StandingPart.of(start, walls, resting).whole_positions(standing.vertices))
+    force = -energy_and_gradient(standing, supports=False)[1]
+    pull, capacity = pull_and_capacity(standing, walls, resting, force)
+    middle = np.bincount(walls.top_edges.ravel(), minlength=full.n) == 4
+    v = int(np.flatnonzero(middle)[0])
+    step, random = 1e-6 / float(top_spacing(full, walls)[v]), np.random.default_rng(0)
+
+    def share(u):
+        ways = np.tile(u / np.linalg.norm(u), (full.n, 1))
+        slope = (energy(lift(full, walls, middle, step, ways)) - energy(full)) / 1e-6
+        return force[v] @ ways[v] / (slope + force[v] @ ways[v])
+
+    best = pull_directions(standing, walls, resting, force)[v]
+    assert share(best) == pytest.approx(pull[v] / capacity[v], rel=1e-4)
+    assert np.linalg.norm(np.cross(best, force[v])) > 1e-3 * np.linalg.norm(force[v])  # not along the pull
+    assert max(share(u) for u in random.standard_normal((200, 3))) < (1.0 + 1e-4) * pull[v] / capacity[v]
+
+
+def test_strong_walls_that_cross_leave_a_roof_in_each_bay():
+    cross = [Divider(line, wall=2.5) for line in ([[6, 0], [6, 8]], [[0, 4], [12, 4]])]
+    roof = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], cross, edge_length=0.45, tension=2.0, pressure=0.4)
+    bay = Plan([[0, 0], [6, 0], [6, 4], [0, 4]], edge_length=0.45, tension=2.0, pressure=0.4)
+    result = pcmc.solve(roof.surface())
+    assert result.certificate.verdict is Verdict.STABLE
+    part = standing_part(result.surface)
+    np.testing.assert_array_equal(part.resting, part.walls.top_free)
+    assert result.energy == pytest.approx(4.0 * pcmc.solve(bay.surface()).energy, rel=5e-4)
+
+
+@pytest.mark.parametrize("line", [[[6, 4], [12, 4]], [[6, 4], [12, 8]]])
+def test_walls_that_end_at_another_rest_together(line):
+    walls = [Divider([[6, 0], [6, 8]], wall=2.5), Divider(line, wall=2.5)]
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], walls, edge_length=0.8, tension=2.0, pressure=0.4)
+    result = pcmc.solve(plan.surface())
+    assert result.certificate.verdict is Verdict.STABLE
+    part = standing_part(result.surface)
+    np.testing.assert_array_equal(part.resting, part.walls.top_free)
 
 
 def directions_of_pull(standing, walls, resting):
