@@ -9,7 +9,7 @@ import pytest
 
 import pcmc
 from pcmc import Cable, Material, Plane, Snow, StructuralModel
-from pcmc.base.errors import LostWarning
+from pcmc.base.errors import LostWarning, OptionError
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
 from pcmc.structure import analyse, calculix
@@ -176,5 +176,29 @@ def test_drawings_say_why_members_are_left_out(tmp_path):
     half = pcmc.project.run(path)
     with pytest.warns(LostWarning, match="^roof.obj: members are left out$"):
         warn_of_members(half, "roof.obj")
-    with pytest.warns(LostWarning, match="left out; .* leave out whole, or the member"):
+    with pytest.warns(LostWarning, match="left out; .* draw the whole plan, without mirrors"):
         warn_of_members(dataclasses.replace(half, unfold=True), "drawings", held=True)
+
+
+def test_the_corner_of_two_mirrors_ends_a_seam():
+    outline, mirrors = [[0, 0], [3, 0], [3, 2], [0, 2]], [[[3, 0], [3, 2]], [[0, 2], [3, 2]]]
+    quarter = pcmc.solve(Plan(outline, mirrors=mirrors, edge_length=0.5, tension=3.0, pressure=0.5).surface())
+    seams = pcmc.cutting_pattern(quarter.surface, strips=1).seam_table.query("kind == 'mirror'")
+    ends = seams[["x0", "y0", "x1", "y1"]].to_numpy().reshape(-1, 2, 2)
+    assert sorted(np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)) == pytest.approx([2.0, 3.0])
+
+
+@pytest.mark.filterwarnings("ignore:.*single point")
+@pytest.mark.parametrize("where", ["bars = [[[6, 4], [6, 4]]]", "along = [[[0, 0], [6, 0]]]"])
+def test_a_member_at_a_mirror_without_images_asks_for_the_whole_plan(tmp_path, where):
+    """With ``whole`` it is refused, too, so that is no advice."""
+    path = tmp_path / "roof.toml"
+    plan = "[plan]\nedge_length = 2.0\noutline = [[0, 0], [6, 0], [6, 8], [0, 8]]\ntension = 3.0\n"
+    plan += "mirrors = [[[6, 0], [6, 8]]]\npressure = 0.0\nsupports = [[6, 4, 1]]\n"
+    member = (
+        f"[structure]\nyoung = 5e5\nthickness = 0.001\nmembers.m = {{diameter = 0.2, young = 2e8, {where}}}\n"
+    )
+    for whole in ("", "whole = true\n"):
+        path.write_text(f'{plan}{member}[output]\nstructure = "roof.inp"\n{whole}')
+        with pytest.raises(OptionError, match="draw the whole plan, without mirrors"):
+            pcmc.project.run(path)
