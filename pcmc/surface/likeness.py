@@ -34,9 +34,9 @@ def refuse_unlike(surface: Surface, plane: Plane, side: Ints) -> None:
     parts += [(f"cable {c.name!r}", (c.tension, c.weight), c.edges) for c in surface.cables]
     digits = [" ".join(f"{number:.5g}" for number in numbers) for _, numbers, _ in parts]  # met, or given
     for sign in (1, -1):
-        there = {kind for kind, (_, _, on) in zip(digits, parts, strict=True) if (sign * side[on] < 0).any()}
+        behind = {kind for kind, (_, _, on) in zip(digits, parts, strict=True) if (sign * side[on] < 0).any()}
         for kind, (name, _, on) in zip(digits, parts, strict=True):
-            if (sign * side[on] > 0).any() and kind not in there:
+            if (sign * side[on] > 0).any() and kind not in behind:
                 text = f"the {plane} divides no symmetric surface: nothing on its other side has the tension"
                 raise SurfaceError(f"{text} and the loads of {name}", what="plane", where=name)
     X, fixed, edges = surface.vertices, surface.given_supports.fixed, surface.topology.edges
@@ -48,5 +48,5 @@ def refuse_unlike(surface: Surface, plane: Plane, side: Ints) -> None:
         away = np.asarray(cKDTree(there).query(image)[0]) if len(there) else np.full(len(here), np.inf)
         if len(here) and away.max() > reach:
             text = f"the {plane} divides no symmetric surface: the fixed vertex at"
-            at, behind = (point_text(places[away.argmax()], surface.size) for places in (here, image))
-            raise SurfaceError(f"{text} {at} has no image at {behind}", what="plane", where=at)
+            at, place = (point_text(places[away.argmax()], surface.size) for places in (here, image))
+            raise SurfaceError(f"{text} {at} has no image at {place}", what="plane", where=at)
