@@ -28,8 +28,8 @@ def refuse_unlike(surface: Surface, plane: Plane, side: Ints) -> None:
     if any(other.mirror for other, _ in surface.on_planes):
         return
     parts: list[tuple[str, tuple[float, ...], Ints]] = []
-    for k, p in enumerate(surface.patches):
-        loads = abs(p.pressure), p.weight, abs(p.snow)
+    for k, p in enumerate(surface.patches):  # the pressure of a room is a result, and differs with the mesh
+        loads = abs(p.pressure) * (not surface.room_signs[:, k].any()), p.weight, abs(p.snow)
         parts.append((f"patch {p.name!r}", (p.tension, *loads), surface.faces[surface.patch_of_face == k]))
     parts += [(f"cable {c.name!r}", (c.tension, c.weight), c.edges) for c in surface.cables]
     digits = [" ".join(f"{number:.5g}" for number in numbers) for _, numbers, _ in parts]  # met, or given
