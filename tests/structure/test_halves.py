@@ -15,6 +15,7 @@ from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
 from pcmc.structure import analyse, calculix
+from pcmc.structure.section import Structure
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
@@ -216,3 +217,10 @@ def test_a_line_in_a_mirror_is_drawn_as_no_rim():
     ends = half.vertices[half.topology.edges[half.mirror_edge]]
     assert 2.0 * lengths[0]["PCMC-RIM"] == pytest.approx(lengths[1]["PCMC-RIM"])
     assert lengths[0]["PCMC-MIRROR"] == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+def test_the_volume_of_a_gas_is_that_of_the_part():
+    half, whole = halves()
+    given = Structure(young=5e5, thickness=1e-3, gas={"volume": 20.0, "patches": ["patch 1"]})
+    gas = given.of_whole(half, whole, None).enclosed
+    assert (gas.volume, list(gas.patches)) == (40.0, ["patch 1"])
