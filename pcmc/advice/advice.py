@@ -268,11 +268,13 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
 
     pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
-    folds = [1.0 / attempt.value for attempt in result.certificate.tried if attempt.folds and attempt.value]
+    tried = [a for a in result.certificate.tried if a.folds and a.way != "distance"]  # of a tension's loads
+    folds = [1.0 / attempt.value for attempt in tried if attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
     def higher(tension: float) -> float:
-        return two_digits(max(least, factor * tension, tension))
+        wanted = max(least, factor * tension)
+        return max(tension, two_digits(wanted)) if wanted > tension else tension
 
     if plan.tension is not None:
         return replace(plan, tension=higher(plan.tension))
@@ -307,6 +309,8 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
                 continue
             if key == "wall":
                 new = next((p.tension for p in walls if _is_wall_of(after, p.name)), None)
+                if new == old:  # balanced as it is
+                    continue
             why = f"instead of {kind}" if kind else f"now {_toml(old)}"
             lines.append(f"{place} {key} = {_toml(new)}  ({why})")
     return lines

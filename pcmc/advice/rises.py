@@ -256,7 +256,7 @@ def mast_note(plan: Plan) -> str:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
     change = (
-        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[1], drawn=False)[2]}"
+        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[-1], drawn=False)[2]}"
     )
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
         radius = f"of radius {cut[0].radius(SHARES[1]):g} around {cut[0].text}"

@@ -9,6 +9,7 @@ import tomlkit
 from nightly import night_but
 
 from pcmc import cli
+from pcmc.advice.advice import changes
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, Plan
 from pcmc.project import load, run_project
@@ -65,6 +66,25 @@ def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, kind):
     assert heading.endswith(f"{tried}:")
     assert lines
     assert outcome_of(tmp_path, typed(text, lines)).good
+
+
+def test_a_wall_that_is_balanced_as_it_is_is_no_change():
+    line = Divider([[6, 0], [6, 6]])
+    hall = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], [line], edge_length=0.8, tension=5.0)
+    wall = next(patch.tension for patch in hall.surface().patches if patch.wall)
+    typed_in = replace(hall, dividers=[replace(line, wall=wall)])
+    assert changes(typed_in, hall) == []
+    assert changes(replace(hall, dividers=[replace(line, wall=2.0 * wall)]), hall)
+
+
+def test_no_tension_is_advised_for_a_tent_whose_ring_is_too_small(tmp_path):
+    """Without loads its shape is the same with any tension."""
+    ring = "holes = [{curve = {circle = {centre = [5, 5, 4], radius = 0.6}}}]\n"
+    square = "[plan]\nedge_length = 1.0\noutline = [[0, 0], [10, 0], [10, 10], [0, 10]]\n"
+    outcome = outcome_of(tmp_path, f"{square}tension = 1.234\npressure = 0.0\n{ring}")
+    assert "distance" in [attempt.way for attempt in outcome.certificate.tried]
+    assert not outcome.good
+    assert not outcome.advice
 
 
 @pytest.mark.nightly
