@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, cached_array
+from ..base.arrays import Floats, Ints, cached_array
 from ..forces.triangles import effective_tensions
 from ..surface import Surface
 from ..surface.geometry import face_areas
@@ -124,12 +124,12 @@ class Cloth:
         return seam
 
     @cached_array
-    def mirror_edge(self) -> Bools:
-        """(e,) the edges of the mesh in mirror planes, where cloth is sewn to its image."""
-        X, near = self.mesh.X, ON * self.mesh.size
-        return mirror_edges(
-            [(p, abs(p.height(X)) <= near) for p, _ in self.surface.on_planes], self.mesh.topology
-        )
+    def mirror_of_edge(self) -> Ints:
+        """(e,) the mirror plane that each edge of the mesh is in, to be sewn to its image, from 1; else 0."""
+        found, X, near = np.zeros(len(self.mesh.topology.edges), dtype=int), self.mesh.X, ON * self.mesh.size
+        for number, (plane, _) in enumerate(self.surface.on_planes, 1):
+            found[mirror_edges([(plane, abs(plane.height(X)) <= near)], self.mesh.topology)] = number
+        return found
 
     def outlines(self, strip: int) -> list[Ints]:
         """The outlines of a strip: its vertices in the order of its triangles, the longest first."""
@@ -180,7 +180,7 @@ def seams_of(cloth: Cloth) -> list[Seam]:
     start = np.flatnonzero(np.append(True, np.diff(sides.edge) > 0))
     keys: dict[tuple[Any, ...], list[int]] = {}
     for edge, strips in zip(sides.edge[start].tolist(), np.split(sides.strip, start[1:]), strict=True):
-        key = tuple(sorted(strips.tolist())), int(cloth.seam_of_edge[edge]), bool(cloth.mirror_edge[edge])
+        key = tuple(sorted(strips.tolist())), int(cloth.seam_of_edge[edge]), int(cloth.mirror_of_edge[edge])
         keys.setdefault(key, []).append(edge)
     seams: list[Seam] = []
     for (beside, number, mirror), edges in keys.items():

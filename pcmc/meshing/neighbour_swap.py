@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array, diags_array
-from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
@@ -27,7 +25,7 @@ from ..surface.lagrange import expect_flat
 from ..surface.supports import apply_supports
 from ..surface.topology import joined
 from .films import Film, film_of, lattice_steps
-from .quality import turns_over
+from .quality import in_the_middle, turns_over
 
 EDGE = 1.5  # of an equilateral triangle, over the square root of its area
 WIDTH = 0.5  # of the edges of the triangles beside: how wide the new film is at first
@@ -290,16 +288,10 @@ def _rebuilt(
 def _widened(surface: Surface, parting: Floats) -> tuple[Surface, float]:
     """The surface with its new film as wide as lowers the energy most, all others following; how many times.
 
-    ``parting`` (n,3) is the way of the film's vertices from its middle; the graph's Laplacian extends it.
+    ``parting`` (n,3): the way of the film's vertices from its middle. Others go the mean way of those around.
     """
-    edges, n, way = surface.topology.edges, surface.n, parting.copy()
-    links = coo_array(
-        (np.ones(2 * len(edges)), np.concatenate([edges, edges[:, ::-1]]).T), shape=(n, n)
-    ).tocsr()
-    laplacian = (diags_array(links.sum(axis=1) + 1e-9) - links).tocsr()
-    inner = np.flatnonzero(~parting.any(axis=1) & ~surface.fixed & (surface.original == np.arange(n)))
-    if len(inner):
-        way[inner] = -splu(laplacian[inner][:, inner].tocsc()).solve(laplacian[inner] @ parting)
+    known = parting.any(axis=1) | surface.fixed | (surface.original != np.arange(surface.n))
+    way = in_the_middle(surface.original[surface.faces], known, parting)
     way = surface.spread(apply_supports(surface, way))
     most = VOLUME * np.abs(prescribed_volumes(surface))
     best, least, times, before = surface, energy(surface), 1.0, patch_volumes(surface, surface.vertices)

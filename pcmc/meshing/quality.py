@@ -7,6 +7,8 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled, inlined
@@ -27,7 +29,7 @@ from ..surface.geometry import (
     sub,
 )
 from ..surface.supports import apply_supports, onto_circles
-from ..surface.topology import SHEET
+from ..surface.topology import SHEET, components
 
 SQRT3 = sqrt(3.0)
 SWEEPS = 20  # of redistribution, at most
@@ -208,3 +210,28 @@ def _improve(X: Floats, star: Ints, v: int) -> bool:
         return False
     X[v] = places[best]
     return True
+
+
+def in_the_middle(faces: Ints, known: Bools, values: Floats, excess: float = 0.0) -> Floats:
+    """Values (n,) or (n,k) with the unknown ones the mean of their neighbours', plus an excess.
+
+    Those that no edges join to a known one stay as they are.
+
+    >>> faces, known = np.array([[0, 1, 2], [1, 3, 2]]), np.array([True, False, False, True])
+    >>> in_the_middle(faces, known, np.array([0.0, 0.0, 0.0, 1.0]))
+    array([0. , 0.5, 0.5, 1. ])
+    """
+    n = len(known)
+    ends = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    i, j = np.concatenate([ends, ends[:, ::-1]]).T
+    A = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
+    part = components(ends, n)
+    unknown = np.flatnonzero(~known & np.isin(part, part[known]))
+    result = np.array(values, dtype=float)
+    if len(unknown):
+        degree = A.sum(axis=1)
+        result[unknown] = 0.0
+        L = csr_array(diags_array(degree) - A)[unknown]
+        right = excess * (degree[unknown] if result.ndim == 1 else degree[unknown, None]) - L @ result
+        result[unknown] = splu(L[:, unknown].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right)
+    return result

@@ -290,8 +290,12 @@ class Outcome:
             structure = structure.of_whole(self.surface, surface, plan)
         model = structure.model(surface, plan, anyway=anyway, certificate=certificate, units=self.units)
         if self.unfold and (model.bars or any(not line.wall for line in model.lines)):
-            text = "a member at an edge or a point is known for the part of the plan alone, not for its"
-            raise OptionError(f"{text} images; leave out whole, or the member", what="whole")
+            text = (
+                "a member at an edge or a point is known for the part of the plan alone, not for its images;"
+            )
+            raise OptionError(
+                f"{text} draw the whole plan, without mirrors, or leave out whole", what="whole"
+            )
         return model
 
     @property

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import splu
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats
 from ..base.tolerances import FAILED, ON, PARALLEL
 from ..certificate.forces import load
 from ..forces.pinching import place_wall_rows
 from ..forces.wall_rows import find_walls
-from ..meshing.quality import triangle_quality
+from ..meshing.quality import in_the_middle, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import cross_2d
-from ..surface.topology import components
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
 WIDE = 1.5  # of that extent: a plan that is wider is not kept
@@ -51,11 +48,11 @@ def low_start(surface: Surface) -> Surface | None:
     if not kept and surface.on_planes:
         return None  # spread anew, its boundary would leave the planes
     if not kept:
-        low[:, :2] = _in_the_middle(faces, surface.fixed | ~roof, place[:, :2])
+        low[:, :2] = in_the_middle(faces, surface.fixed | ~roof, place[:, :2])
     known = held | ~roof
-    low[:, 2] = _in_the_middle(faces, known, place[:, 2])
+    low[:, 2] = in_the_middle(faces, known, place[:, 2])
     # a dome: 1 above the mean of the neighbours
-    above = place[:, 2] - low[:, 2] if kept else _in_the_middle(faces, known, np.zeros(surface.n), 1.0)
+    above = place[:, 2] - low[:, 2] if kept else in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
         domed = _at(surface, low + above[:, None] * [0.0, 0.0, 1.0])
         above *= np.sign(load(domed)) or 1.0
@@ -65,10 +62,10 @@ def low_start(surface: Surface) -> Surface | None:
     if roof.all():
         return _at(surface, low)
     # walls below: between their feet and the roof; rows of walls that can pinch right below it
-    moved = _at(surface, _in_the_middle(surface.faces, roof | held, low))
+    moved = _at(surface, in_the_middle(surface.faces, roof | held, low))
     if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
         place = surface.plane.to_local(moved.vertices)
-        moved = _at(surface, _in_the_middle(surface.faces, roof | surface.held, place))
+        moved = _at(surface, in_the_middle(surface.faces, roof | surface.held, place))
     walls_below = find_walls(moved)
     return moved.moved(place_wall_rows(moved, walls_below, moved.vertices))
 
@@ -91,21 +88,3 @@ def _at(surface: Surface, place: Floats) -> Surface:
     """The surface with its vertices at coordinates (n,3) on and above Π, or where supports let them be."""
     X = place @ surface.plane.axes + np.array(surface.plane.point)
     return surface.moved(surface.onto_supports(X))
-
-
-def _in_the_middle(faces: Ints, known: Bools, values: Floats, excess: float = 0.0) -> Floats:
-    """Values (n,) or (n,k) with the unknown ones the mean of their neighbours', plus an excess."""
-    n = len(known)
-    ends = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    i, j = np.concatenate([ends, ends[:, ::-1]]).T
-    A = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
-    part = components(ends, n)
-    unknown = np.flatnonzero(~known & np.isin(part, part[known]))
-    result = np.array(values, dtype=float)
-    if len(unknown):
-        degree = A.sum(axis=1)
-        result[unknown] = 0.0
-        L = csr_array(diags_array(degree) - A)[unknown]
-        right = excess * (degree[unknown] if result.ndim == 1 else degree[unknown, None]) - L @ result
-        result[unknown] = splu(L[:, unknown].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right)
-    return result

@@ -24,6 +24,7 @@ from ..surface.topology import EdgeCurve
 from .frames import bar_axes
 from .material import Material, Profile
 
+DRAW = "draw the whole plan, without mirrors"
 KINDS = ("beam", "cable")
 ENDS = ("hinged", "clamped")
 BESIDE = 0.02  # of the length of edges: so near to a curve their ends are on it
@@ -166,7 +167,9 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
             edges = surface.topology.edge_numbers(line.pairs)
             problem = "runs where another one does; leave one of them out" if taken[edges].any() else ""
             if cut[line.vertices].any():
-                problem = "meets a mirror plane; take the whole roof, whole = true"
+                problem = "meets a mirror plane; " + (
+                    "take the whole roof, whole = true" if line.wall else DRAW
+                )
             if problem:
                 raise OptionError(f"member {line.name!r} {problem}", what="members", where=line.name)
             taken[edges] = True
@@ -224,7 +227,7 @@ def bars_on(
             known = ", ".join(point_text(X[v]) for v in points[:6]) or "none"
             problem = f"no support of one point is at {at}; there are: {known}"
         elif mirrored[here[0]]:
-            problem = "it stands in a mirror plane; take the whole roof, whole = true"
+            problem = f"it stands in a mirror plane; {DRAW}"
         elif member.kind == "cable" and not rim[here[0]]:
             problem = f"a stay from {at}, inside the roof, would pierce it; take a point of its edge"
         elif np.linalg.norm(foot - X[here[0]]) <= SHORTEST * surface.size:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import warnings
+from collections import Counter
 from functools import cache
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 
 import pcmc
 from pcmc import Cable, Material, Plane, Snow, StructuralModel
-from pcmc.base.errors import LostWarning
+from pcmc.base.errors import LostWarning, OptionError
+from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
 from pcmc.structure import analyse, calculix
+from pcmc.structure.section import Structure
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
@@ -176,5 +179,48 @@ def test_drawings_say_why_members_are_left_out(tmp_path):
     half = pcmc.project.run(path)
     with pytest.warns(LostWarning, match="^roof.obj: members are left out$"):
         warn_of_members(half, "roof.obj")
-    with pytest.warns(LostWarning, match="left out; .* leave out whole, or the member"):
+    with pytest.warns(LostWarning, match="left out; .* draw the whole plan, without mirrors"):
         warn_of_members(dataclasses.replace(half, unfold=True), "drawings", held=True)
+
+
+def test_the_corner_of_two_mirrors_ends_a_seam():
+    outline, mirrors = [[0, 0], [3, 0], [3, 2], [0, 2]], [[[3, 0], [3, 2]], [[0, 2], [3, 2]]]
+    quarter = pcmc.solve(Plan(outline, mirrors=mirrors, edge_length=0.5, tension=3.0, pressure=0.5).surface())
+    seams = pcmc.cutting_pattern(quarter.surface, strips=1).seam_table.query("kind == 'mirror'")
+    ends = seams[["x0", "y0", "x1", "y1"]].to_numpy().reshape(-1, 2, 2)
+    assert sorted(np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)) == pytest.approx([2.0, 3.0])
+
+
+@pytest.mark.filterwarnings("ignore:.*single point")
+@pytest.mark.parametrize("where", ["bars = [[[6, 4], [6, 4]]]", "along = [[[0, 0], [6, 0]]]"])
+def test_a_member_at_a_mirror_without_images_asks_for_the_whole_plan(tmp_path, where):
+    """With ``whole`` it is refused, too, so that is no advice."""
+    path = tmp_path / "roof.toml"
+    plan = "[plan]\nedge_length = 2.0\noutline = [[0, 0], [6, 0], [6, 8], [0, 8]]\ntension = 3.0\n"
+    plan += "mirrors = [[[6, 0], [6, 8]]]\npressure = 0.0\nsupports = [[6, 4, 1]]\n"
+    member = (
+        f"[structure]\nyoung = 5e5\nthickness = 0.001\nmembers.m = {{diameter = 0.2, young = 2e8, {where}}}\n"
+    )
+    for whole in ("", "whole = true\n"):
+        path.write_text(f'{plan}{member}[output]\nstructure = "roof.inp"\n{whole}')
+        with pytest.raises(OptionError, match="draw the whole plan, without mirrors"):
+            pcmc.project.run(path)
+
+
+def test_a_line_in_a_mirror_is_drawn_as_no_rim():
+    lengths = [Counter(), Counter()]
+    for found, surface in zip(lengths, halves(), strict=True):
+        for curve in model_curves(surface):
+            steps = np.diff(curve.points, axis=0, append=curve.points[: int(curve.closed)])
+            found[curve.layer] += np.linalg.norm(steps, axis=1).sum()
+    half = halves()[0]
+    ends = half.vertices[half.topology.edges[half.mirror_edge]]
+    assert 2.0 * lengths[0]["PCMC-RIM"] == pytest.approx(lengths[1]["PCMC-RIM"])
+    assert lengths[0]["PCMC-MIRROR"] == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+def test_the_volume_of_a_gas_is_that_of_the_part():
+    half, whole = halves()
+    given = Structure(young=5e5, thickness=1e-3, gas={"volume": 20.0, "patches": ["patch 1"]})
+    gas = given.of_whole(half, whole, None).enclosed
+    assert (gas.volume, list(gas.patches)) == (40.0, ["patch 1"])
