@@ -96,8 +96,8 @@ def load_is_given(surface: Surface) -> bool:
 def _load_over_capacity(surface: Surface, carrying: Bools) -> float:
     """Load over capacity of edges by their mask (e,) along Π's normal, in the worst connected part."""
     forces, ends = loads(surface) @ np.array(surface.plane.normal), surface.cable_edges.ends
-    parts, first = surface.topology.components, surface.faces[:, 0]
-    points = (len(forces) - len(ends)) // len(first)  # of the quadrature, on a triangle
+    parts, first = surface.topology.components, surface.nodes[:, 0]
+    points = (len(forces) - len(ends)) // len(first)  # of the quadrature, on an element
     part = np.concatenate([np.repeat(parts[first], points), parts[ends[:, 0]]])
     capacity = _capacity(surface, carrying)
     load = np.abs(np.bincount(part, forces, len(capacity)))

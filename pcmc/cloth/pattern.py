@@ -30,6 +30,7 @@ STUCK, SMALLER = 3, 0.95  # rounds after which the widest strip must be smaller 
 TOO_WIDE = 1.25  # unless it is less than so much wider than the cloth
 FILL = 0.995  # of the cloth's width that strips are laid out for
 ROUNDING = 1e-9  # of a width
+MOST_STRIPS = 1000  # of a sheet
 MOST_STRAIN = 0.25  # of cloth: strips that need more are refused
 
 
@@ -131,9 +132,12 @@ def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[Cl
             continue
         along, across = sheet_axes(P, surface.plane, options.of_patch("direction", name))
         low, high = (P @ across).min(), (P @ across).max()
-        number = count if net is None else int(np.ceil((high - low) / net - 1e-9))
+        number = count if net is None else np.ceil((high - low) / net - 1e-9)
+        if not number <= MOST_STRIPS:
+            text = f"patch {name!r} would have {number:.3g} strips; at most {MOST_STRIPS} are made: give"
+            raise OptionError(f"{text} a larger width, or fewer strips", what="width", found=number)
         mine = np.isin(np.arange(surface.m), source)
-        levels = np.linspace(low, high, max(number, 1) + 1)
+        levels = np.linspace(low, high, max(int(number), 1) + 1)
         sheets.append(ClothSheet(name, mine, along, across, levels))
     return sheets
 

@@ -43,7 +43,9 @@ class DrawingSet:
     certificate: Certificate  # of the surface
     curves: Sequence[SheetLine]  # ridges, rims, wall lines, cables and members
     sections: Sequence[SheetLine]  # in which each plane cuts the roof
-    points: pd.DataFrame  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable)
+    points: (
+        pd.DataFrame
+    )  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall, mirror or cable)
     marks: Sequence[tuple[str, Floats]]  # name and place (3,) of each mast or other support of one point
     schedule: Panels | None  # the panels, if a tolerance was given
     flat: Sheet | None  # all panels at true size, mm, where sheets of panels are asked for

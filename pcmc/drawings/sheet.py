@@ -42,6 +42,7 @@ LAYERS = {
     "PCMC-RIDGE": SheetLayer(1, 50, "junctions of the roof: ridges and valleys"),
     "PCMC-RIM": SheetLayer(7, 50, "rims of the roof"),
     "PCMC-WALL": SheetLayer(3, 35, "bottoms and ends of walls"),
+    "PCMC-MIRROR": SheetLayer(8, 35, "lines in mirror planes, where the roof goes on"),
     "PCMC-CABLE": SheetLayer(6, 70, "cables"),
     MEMBERS: SheetLayer(30, 70, "members of the structural model"),
     "PCMC-PANEL": SheetLayer(8, 13, "edges of panels"),

@@ -62,7 +62,7 @@ class DrawnView:
 
 
 def model_curves(surface: Surface, without: Collection[str] = ()) -> list[SheetLine]:
-    """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone, but for those
+    """Ridges, where two sheets meet; rims, where one ends; lines in mirrors and of walls alone, but for those
     ``without``; cables."""
     names = [patch.name for patch in surface.patches]
     found = [

@@ -1,4 +1,4 @@
-"""The order of a session's acts: answered as they come, one at a time; moves end when newer ones arrive."""
+"""The order of a session's acts: answered as they were sent, one at a time; newer ones end moves."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from .session import Session, SessionState
 
 
+OVERTAKEN = 1.0  # seconds that an act waits for one that its page sent before it, on another connection
+Turn = tuple[str, int]  # a page, and the number of its act
+
+
 def act(
     moves: bool = False, ends: bool = False
 ) -> Callable[[Callable[..., SessionState]], Callable[..., SessionState]]:
@@ -22,8 +26,13 @@ def act(
 
     def made(method: Callable[..., SessionState]) -> Callable[..., SessionState]:
         @wraps(method)
-        def run(self: Session, *given: Any, **named: Any) -> SessionState:
+        def run(self: Session, *given: Any, turn: Turn | None = None, **named: Any) -> SessionState:
             with self.order:
+                if turn is not None:
+                    page, number = turn
+                    self.order.wait_for(lambda: self.turns.get(page, 0) >= number, OVERTAKEN)
+                    self.turns[page] = max(number + 1, self.turns.get(page, 0))
+                    self.order.notify_all()
                 mine = self.arrived
                 self.arrived += 1
                 if moves or ends:

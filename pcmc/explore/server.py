@@ -22,6 +22,7 @@ from ..project.writing import certified_files
 from ..surface import Surface
 from ..surface.images import expect_no_images
 from . import page_data
+from .acts import Turn
 from .following import ProjectFallback, Stop
 from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, check_request, listen, pack
 from .roof import ShownRoof, Watch, save, signature
@@ -97,7 +98,9 @@ class Explorer:
             self.sessions.move_to_end(name)
             return self.sessions[name]
 
-    def answer(self, name: str, act: str, asked: dict[str, Any], gone: Stop) -> bytes:
+    def answer(
+        self, name: str, act: str, asked: dict[str, Any], gone: Stop, turn: Turn | None = None
+    ) -> bytes:
         """Answer a request of the session ``name``; ``gone`` is true once the browser has hung up."""
         if act == "open":
             name = check_request(REQUESTS[act], asked).get("session") or self.open()[0]
@@ -108,7 +111,7 @@ class Explorer:
             return pack(*(self._question(session, act, given, gone) or ({"superseded": True},)))
         values = (given,) if act in ("follow", "settle") else ()
         options = {} if values else given | ({"gone": gone} if act == "meet" else {})
-        state = getattr(session, act)(*values, **options)
+        state = getattr(session, act)(*values, turn=turn, **options)
         if state.superseded:  # newer values have arrived meanwhile
             return pack({"superseded": True})
         about, arrays = self._shown(state, moving=act == "follow")

@@ -164,6 +164,7 @@ class Session:
     def __post_init__(self) -> None:
         self.order = threading.Condition()
         self.arrived = self.served = self.newest = 0  # numbers of acts
+        self.turns: dict[str, int] = {}  # by page, the number of the act that it sends next
         self.fallback = self.fallback.with_walls(self.start.surface)
         self.now = replace(self.start, steps=(self.start.surface,))
 

@@ -34,7 +34,12 @@ from .polygons import cut_polygons
 KEY, CABLE, NAME, MEMBER = "pcmc", "pcmc cable", "pcmc name", "pcmc member"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
-CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL": (0, 128, 0, 255)}
+CURVES = {
+    "PCMC-RIDGE": (200, 0, 0, 255),
+    "PCMC-RIM": (0, 0, 0, 255),
+    "PCMC-WALL": (0, 128, 0, 255),
+    "PCMC-MIRROR": (128, 128, 128, 255),
+}
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255), "cable": (128, 0, 128, 255)}
 ORANGE = (224, 112, 0, 255)  # of members
 

@@ -284,11 +284,13 @@ def mirror_of(spec: Any, number: int) -> Curve:
     return line
 
 
-def rooms_of(spec: Any, patches: Sequence[PatchSpec]) -> dict[str, RoomData]:
-    """The rooms with a volume: those of single patches, and those given by name."""
+def rooms_of(spec: Any, patches: Sequence[PatchSpec], given: Any = ()) -> dict[str, RoomData]:
+    """The rooms with a volume: those of single patches, and those given by name.
+
+    ``given`` are the patches as plain data, whose pressures are refused there."""
     rooms = {a.name: RoomData((a.name,), a.volume) for a in patches if a.volume is not None}
-    for name, given in (spec or {}).items():
-        values = vars(given) if isinstance(given, RoomData) else given
+    for name, room in (spec or {}).items():
+        values = vars(room) if isinstance(room, RoomData) else room
         check_keys(values, RoomData, f"room {name!r}", ("patches", "volume"), name)
         volume = validate.number("volume", values["volume"], where=name)
         known = [patch.name for patch in patches]
@@ -296,10 +298,14 @@ def rooms_of(spec: Any, patches: Sequence[PatchSpec]) -> dict[str, RoomData]:
         if rooms.setdefault(name, RoomData(over, volume)) != RoomData(over, volume):
             raise OptionError(f"room {name!r} has two volumes; give one", what="volume", where=name)
     owner: dict[str, str] = {}
-    for name, patch in ((name, patch) for name, room in rooms.items() for patch in room.patches):
-        if owner.setdefault(patch, name) != name:
-            message = f"patch {patch!r} is in the rooms {owner[patch]!r} and {name!r}; leave it out of one"
-            raise OptionError(message, what="rooms", where=patch)
+    for name, part in ((name, part) for name, room in rooms.items() for part in room.patches):
+        if owner.setdefault(part, name) != name:
+            message = f"patch {part!r} is in the rooms {owner[part]!r} and {name!r}; leave it out of one"
+            raise OptionError(message, what="rooms", where=part)
+    for name in given if isinstance(given, Mapping) else ():
+        if name in owner and "pressure" in given[name]:
+            message = f"patch {name!r} has a volume and a pressure; give one: the pressure follows from the"
+            raise OptionError(f"{message} volume", what="volume", where=name)
     return rooms
 
 
@@ -322,9 +328,6 @@ def patches_of(spec: Any) -> tuple[PatchSpec, ...]:
     patches = []
     for name, values in spec.items():
         check_keys(values, PatchSpec, f"patch {name!r}", ("a tension",), name)
-        if "volume" in values and "pressure" in values:
-            message = f"patch {name!r} has a volume and a pressure; give one: the pressure follows from the"
-            raise OptionError(f"{message} volume", what="volume", where=name)
         patches.append(PatchSpec(name, **values))
     return tuple(patches)
 

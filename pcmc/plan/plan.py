@@ -129,7 +129,7 @@ class Plan:
         for key, maker in (makers | {"cables": parts.cable_of, "mirrors": parts.mirror_of}).items():
             parsed[key] = tuple(maker(spec, number) for number, spec in enumerate(getattr(self, key), 1))
         parsed |= {"patches": parts.patches_of(self.patches), "points": parts.points_of(self.points)}
-        parsed["rooms"] = parts.rooms_of(self.rooms, parsed["patches"])
+        parsed["rooms"] = parts.rooms_of(self.rooms, parsed["patches"], self.patches)
         validate.choice("edge of the outline", self.edge, EDGES)
         parsed |= parts.edge_cable(self, "the outline")
         for key, value in parsed.items():

@@ -190,6 +190,8 @@ def project_of(
     given, mesh, rises, drawing, chosen = data, None, list[Rise](), None, Chosen()
     with in_file(path, FileError):
         if "mesh" in data:
+            if "plan" in data:
+                raise FileError("a project has a plan or a mesh, not both; remove one of them", what="plan")
             table = {"file": data["mesh"]} if isinstance(data["mesh"], str) else dict(data["mesh"])
             check_beside(table["file"], "mesh")
             mesh = MeshFile(rises=taken(table, RISES, None, keep=True), **table)
@@ -215,6 +217,15 @@ def project_of(
         named = [] if plan is None else [p.member for p in (*plan.dividers, *plan.holes) if p.member]
         if structure is not None:
             members_of(structure.members, plan)
+            for name, member in structure.members.items():
+                if name not in named and not any(member.get(key) for key in ("on", "along", "bars")):
+                    text = (
+                        f"member {name!r} is nowhere; name it in a divider or a hole of the plan, give it on,"
+                    )
+                    raise OptionError(f"{text} along or bars, or remove it", what="member", found=name)
+                if plan is None and member.get("bars"):
+                    text = f"member {name!r}: bars stand at points of a plan, and here is a mesh; remove bars"
+                    raise OptionError(text, what="bars", where=name)
         elif named:
             text = f"member {named[0]!r} has no section; add [structure] with young and thickness of the roof"
             raise OptionError(f"{text}, and [structure.members.{named[0]}]", what="member", found=named[0])

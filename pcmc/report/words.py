@@ -41,7 +41,7 @@ VERDICTS = {
 LEGEND = (
     "J1, J2 and so on number the junctions, B1, B2 and so on the supports along lines, S1, S2 and so on those"
     " at points, C1, C2 and so on the ends of cables on lines, as in the tables. Black: rims. Red: ridges."
-    " Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels."
+    " Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels, and mirrors."
 )
 """How to read the plan."""
 ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes may be from the number."

@@ -32,6 +32,7 @@ from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]
 
+NEAR = 2.0  # times the volume: up to this a start is left as it is
 LOST = (Status.DEGENERATE, Status.STALLED)  # worth a second attempt
 
 
@@ -78,13 +79,15 @@ def newton(
 def _with_volumes(surface: Surface) -> Surface:
     """Closed rooms that nothing holds, in the size at which they have the prescribed volume together.
 
-    So they come to rest alike from a start of any size.
+    So they come to rest from a start of any size. One that is not far off stays as it was drawn.
     """
     if surface.held.any() or surface.periodic or not surface.rooms:
         return surface
+    times = prescribed_volumes(surface).sum() / room_volumes(surface).sum()
+    if 1.0 / NEAR <= times <= NEAR:
+        return surface
     X, middle = surface.vertices, surface.vertices.mean(axis=0)
-    size = np.cbrt(prescribed_volumes(surface).sum() / room_volumes(surface).sum())
-    return surface.moved(middle + size * (X - middle))
+    return surface.moved(middle + np.cbrt(times) * (X - middle))
 
 
 def _solve_level(

@@ -34,7 +34,8 @@ class Gas:
         size p, against the air outside.
     ambient : p_a ≥ 0, pressure of the air outside, force per area; by default the standard atmosphere,
         101.325 kPa, in the model's units. With 0 it is p V = const.
-    volume : V > 0 of the form, length³; by default what the patches enclose with Π.
+    volume : V > 0 of the form, length³; by default what the patches enclose with Π. In a project with mirrors
+        it is that of the part that is drawn.
 
     >>> Gas(patches=["top", "bottom"], ambient=100.0).outside(Units("m", "kN"))
     100.0

@@ -259,8 +259,11 @@ class Structure:
         values = {key: with_images(getattr(self, key), images) for key in by_name}
         tables = [{"patches": (), **zone} for zone in self.zones]
         values["zones"] = [zone | {"patches": with_images(zone["patches"], images)} for zone in tables]
-        if isinstance(self.gas, Mapping) and "patches" in self.gas:
-            values["gas"] = {**self.gas, "patches": with_images(self.gas["patches"], images)}
+        if isinstance(self.gas, Mapping):
+            gas = values["gas"] = dict(self.gas)
+            gas["patches"] = with_images(gas.get("patches", ()), images)
+            if gas.get("volume") is not None:  # that of the piece
+                gas["volume"] *= round(whole.m / piece.m)
         values["members"] = {}
         for name, table in self.members.items():  # walls find their images themselves
             on = [

@@ -12,7 +12,7 @@ from .images import expect_no_images
 from .surface import Surface
 from .topology import EdgeCurve, joined
 
-RIDGE, RIM, WALL = "RIDGE", "RIM", "WALL"  # the kinds of curves
+RIDGE, RIM, WALL, MIRROR = "RIDGE", "RIM", "WALL", "MIRROR"  # the kinds of curves
 
 
 class Polyline(NamedTuple):
@@ -65,7 +65,7 @@ def section(surface: Surface, point: Floats, normal: Floats) -> list[Polyline]:
 
 def curves_by_kind(surface: Surface, without: Collection[str] = ()) -> Iterator[tuple[str, EdgeCurve]]:
     """Each curve with its kind, by the sheets at it that are no walls: two or more, one, or none; but for
-    those of the walls ``without`` alone.
+    those of the walls ``without`` alone. In a mirror plane, where the roof goes on, a curve is no rim.
 
     >>> from pcmc import Patch
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
@@ -73,7 +73,10 @@ def curves_by_kind(surface: Surface, without: Collection[str] = ()) -> Iterator[
     >>> [(kind, len(curve.vertices)) for kind, curve in curves_by_kind(square)]
     [('RIM', 4)]
     """
-    for curve in (*surface.topology.junctions, *surface.topology.boundary_loops):
+    topo, mirror = surface.topology, surface.mirror_edge
+    outer = topo.curves_among(topo.boundary_edge & ~mirror) if mirror.any() else topo.boundary_loops
+    curves = [(curve, False) for curve in (*topo.junctions, *outer)]
+    for curve, cut in [*curves, *((curve, True) for curve in topo.curves_among(mirror))]:
         roofs = sum(not surface.walls[k] for k in curve.sheets)
         if roofs or not {surface.patches[k].name for k in curve.sheets} <= {*without}:
-            yield (WALL, RIM, RIDGE)[min(roofs, 2)], curve
+            yield MIRROR if cut else (WALL, RIM, RIDGE)[min(roofs, 2)], curve

@@ -17,6 +17,7 @@ from .guides import Guide, Plane
 from .held_curve import HeldCurve
 from .images import expect_no_images
 from .lagrange import turned_over
+from .likeness import refuse_unlike
 from .parts import Cable, Room
 from .supports import refuse_in_mirror
 from .surface import Surface, expect_surface
@@ -38,7 +39,8 @@ def cut(surface: Surface, plane: Plane) -> Surface:
 
     Raises
     ------
-    SurfaceError : a triangle crosses the plane or lies in it, or nothing lies on one side of it.
+    SurfaceError : a triangle crosses the plane or lies in it, nothing lies on one side of it, or the sides
+        differ in patches, cables or fixed places.
 
     >>> from pcmc import Patch
     >>> square = Surface([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]], [0, 0],
@@ -65,6 +67,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     if stays.all() or not stays.any():
         where = "in front of" if stays.all() else "behind"
         raise SurfaceError(f"all of the surface is {where} the {plane}", what="plane", where=where)
+    refuse_unlike(surface, plane, side)
     vertices = np.unique(surface.faces[stays])
     number = np.full(surface.n, -1)
     number[vertices] = np.arange(len(vertices))

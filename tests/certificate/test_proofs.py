@@ -47,6 +47,13 @@ def test_of_roofs_side_by_side_each_carries_its_own_load():
     assert overload(both).ratio == pytest.approx(overload(weak).ratio)
 
 
+def test_curved_elements_carry_the_load_of_their_plan():
+    weak = Plan([[0, 0], [10, 0], [10, 6], [0, 6]], tension=3.0, edge_length=2.0).surface()
+    curved = solve(weak, order=2).surface
+    assert curved.order == 2
+    assert load_ratio(curved) == pytest.approx(load_ratio(weak))
+
+
 def test_between_mirrors_the_load_is_given_too():
     half = Plan([[0, 0], [5, 0], [5, 6], [0, 6]], tension=1.0, mirrors=[[[5, 0], [5, 6]]], edge_length=1.0)
     surface = half.surface()

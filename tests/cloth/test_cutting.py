@@ -285,6 +285,7 @@ def test_a_cable_is_a_seam():
         ({"width": 0.0}, "width: expected"),
         ({"width": 1.0, "strips": 2}, "strips: the width gives their number; leave out one of both"),
         ({"strips": 0}, "strips: expected"),
+        ({"width": 1e-300}, "at most 1000 are made"),
         ({"width": 0.1, "allowance": 0.05}, "width: 0.1 leaves no cloth between two allowances of 0.05"),
         (
             {"seams": [[[0.0, 0.0], [9.0, 0.0]]]},

@@ -321,9 +321,9 @@ def test_sliders_agree_with_their_numbers(page, explorer):
 def test_slow_work_is_said(page, monkeypatch):
     real = Session.settle
 
-    def slow(self, values):
+    def slow(self, values, turn):
         time.sleep(2.0)
-        return real(self, values)
+        return real(self, values, turn=turn)
 
     monkeypatch.setattr(Session, "settle", slow)
     number = page.number("Tension α of left wall")

@@ -179,6 +179,17 @@ def test_acts_are_done_in_order_and_none_is_dropped(cap, hall):
     assert session.reset().surface is hall.surface
 
 
+def test_acts_of_a_page_are_done_as_sent_though_connections_overtake_each_other(cap):
+    session = Session(cap)
+    early = threading.Thread(target=lambda: session.reset(turn=("page", 1)))
+    early.start()
+    session.settle({"tensions": {"cap": 0.7}}, turn=("page", 0))
+    early.join()
+    state = session.state()
+    assert state.surface is cap.surface
+    assert state.wanted is cap.surface  # as the sliders that the answer to the reset has set
+
+
 def test_the_mesh_check_is_of_the_surface_shown(cap):
     session = Session(cap)
     check = session.check_mesh()

@@ -44,6 +44,14 @@ WRONG = {
         OptionError,
         "volume",
     ),
+    "the volume of a room and a pressure": (
+        {
+            "patches": TWO | {"west": {"tension": 3.0, "pressure": 2.0}},
+            "rooms": {"hall": {"patches": ["west"], "volume": 9.0}},
+        },
+        OptionError,
+        "volume",
+    ),
     "two volumes": (
         {
             "patches": {"roof": {"tension": 3.0, "volume": 9.0}},

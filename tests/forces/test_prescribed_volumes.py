@@ -250,7 +250,7 @@ def test_bubbles_that_nothing_holds_come_to_rest_from_any_size(times):
     one = generators.double_bubble(volumes=(1.0, 1.0))
     other = one.retensioned(volumes={"left": times, "right": times})
     energy = pcmc.solve(one).energy
-    assert pcmc.solve(other).energy / times ** (2 / 3) == pytest.approx(energy, rel=1e-3)
+    assert pcmc.solve(other).energy / times ** (2 / 3) == pytest.approx(energy, rel=4e-3)
 
 
 def test_a_volume_too_far_from_that_of_the_start_is_reached_in_steps():

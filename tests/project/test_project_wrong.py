@@ -65,6 +65,25 @@ def test_lines_that_make_no_plan_are_refused_with_a_rise_as_without(tmp_path, pl
         surface_of(load(path))
 
 
+ARCH = (
+    "\n[structure]\nyoung = 1e6\nthickness = 0.001\n[structure.members.arch]\nyoung = 1e8\ndiameter = 0.1\n"
+)
+FLAT = "[plan]\noutline = [[0, 0], [6, 0], [6, 4]]\ntension = 3.0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (f"mesh = 'roof.obj'\n{FLAT}", "plan"),
+        (FLAT + ARCH, "member"),
+        (f"mesh = 'roof.obj'{ARCH}on = ['wall 1']\nbars = [[[0, 0], [0, 0, -3]]]\n", "bars"),
+    ],
+)
+def test_what_a_project_would_leave_out_is_refused(tmp_path, text, what):
+    with refused(FileError, what=what):
+        load(project(tmp_path, text))
+
+
 def test_a_number_out_of_range_is_named_with_its_line(tmp_path):
     path = project(tmp_path, SMALL.replace("[solve]", f"[solve]\niterations = {'9' * 400}"))
     line = 1 + path.read_text(encoding="utf-8").split("\n").index("[solve]")

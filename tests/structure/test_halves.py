@@ -2,6 +2,7 @@
 
 import dataclasses
 import warnings
+from collections import Counter
 from functools import cache
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 import pcmc
 from pcmc import Cable, Material, Plane, Snow, StructuralModel
 from pcmc.base.errors import LostWarning, OptionError
+from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
 from pcmc.structure import analyse, calculix
+from pcmc.structure.section import Structure
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
@@ -202,3 +205,22 @@ def test_a_member_at_a_mirror_without_images_asks_for_the_whole_plan(tmp_path, w
         path.write_text(f'{plan}{member}[output]\nstructure = "roof.inp"\n{whole}')
         with pytest.raises(OptionError, match="draw the whole plan, without mirrors"):
             pcmc.project.run(path)
+
+
+def test_a_line_in_a_mirror_is_drawn_as_no_rim():
+    lengths = [Counter(), Counter()]
+    for found, surface in zip(lengths, halves(), strict=True):
+        for curve in model_curves(surface):
+            steps = np.diff(curve.points, axis=0, append=curve.points[: int(curve.closed)])
+            found[curve.layer] += np.linalg.norm(steps, axis=1).sum()
+    half = halves()[0]
+    ends = half.vertices[half.topology.edges[half.mirror_edge]]
+    assert 2.0 * lengths[0]["PCMC-RIM"] == pytest.approx(lengths[1]["PCMC-RIM"])
+    assert lengths[0]["PCMC-MIRROR"] == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+def test_the_volume_of_a_gas_is_that_of_the_part():
+    half, whole = halves()
+    given = Structure(young=5e5, thickness=1e-3, gas={"volume": 20.0, "patches": ["patch 1"]})
+    gas = given.of_whole(half, whole, None).enclosed
+    assert (gas.volume, list(gas.patches)) == (40.0, ["patch 1"])

@@ -9,7 +9,7 @@ import pytest
 from refusals import refused
 
 import pcmc
-from generators import barrel, four_fans, schwarz_p, spherical_cap, two_squares
+from generators import barrel, four_fans, hypar_roof, schwarz_p, spherical_cap, two_squares
 from generators.schwarz_p import AREA
 from pcmc import Cable, Circle, Line, Patch, Plane, Room, Surface, cli, cut, mirrored
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
@@ -345,6 +345,19 @@ def test_what_mirror_planes_refuse():
             cut(whole, Plane((0, place, 0), (0, 1, 0)))
     with refused(SurfaceError, what="plane"):
         cut(whole, 3)
+
+
+def test_a_surface_that_is_not_symmetric_is_not_cut():
+    saddle = hypar_roof(4)  # its corners are at the heights 4 and 0 in turn
+    with refused(SurfaceError, what="plane", where="(-5, -5, 4)") as caught:
+        cut(saddle, Plane(normal=(0, -1, 0)))
+    assert str(caught.value).endswith("the fixed vertex at (-5, -5, 4) has no image at (-5, 5, 4)")
+    level = hypar_roof(4, height=0.0)
+    assert cut(level, Plane(normal=(1, 0, 0))).m == level.m // 2
+    with refused(SurfaceError, what="plane", where="cable 'east'"):
+        cut(level.retensioned(cables={"east": 11.0}), Plane(normal=(1, 0, 0)))
+    with refused(SurfaceError, what="plane", where="patch 'fan 1'"):
+        cut(four_fans(4, mesh="double").retensioned({"fan 1": 9.0}), DIAGONALS[0])
 
 
 def test_the_whole_on_the_command_line(tmp_path, monkeypatch, capsys):

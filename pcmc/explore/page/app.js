@@ -7,7 +7,7 @@ import {
 } from "./findings.js";
 import { Panel } from "./panel.js";
 import { QUESTIONS } from "./questions.js";
-import { ask, fetchFile } from "./server.js";
+import { ask, askInTurn, fetchFile } from "./server.js";
 import { Targets } from "./targets.js";
 import { Tools } from "./tools.js";
 import { Variants } from "./variants.js";
@@ -140,7 +140,7 @@ class Page {
     this.since = began;
     this.showWork();
     try {
-      const answer = await ask(`api/${this.name}/${act}`, values);
+      const answer = await askInTurn(`api/${this.name}/${act}`, values);
       const { header } = answer;
       if (act === "follow") this.lasted = performance.now() - began;
       if (!header.superseded && header.number > this.header.number) {

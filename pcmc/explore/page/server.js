@@ -16,7 +16,7 @@ export function unpack(buffer) {
 const token = new URLSearchParams(location.search).get("token") ?? "";
 
 async function request(path, options = {}) {
-  const headers = { "Content-Type": "application/json", "X-Token": token };
+  const headers = { "Content-Type": "application/json", "X-Token": token, ...options.headers };
   const response = await fetch(path, { ...options, headers }).catch(() => {
     throw new Error("The program behind this page has stopped. Start it again and reload the page.");
   });
@@ -26,10 +26,16 @@ async function request(path, options = {}) {
 }
 
 /** POST a JSON body; returns the unpacked answer. */
-export async function ask(path, body = {}) {
-  const response = await request(path, { method: "POST", body: JSON.stringify(body) });
+export async function ask(path, body = {}, headers = {}) {
+  const response = await request(path, { method: "POST", body: JSON.stringify(body), headers });
   return unpack(await response.arrayBuffer());
 }
+
+const page = Math.random().toString(36).slice(2, 12);
+let turns = 0;
+
+/** As `ask`, for acts: the server does them in the order in which they were sent, on whichever connections. */
+export const askInTurn = (path, body) => ask(path, body, { "X-Turn": `${page} ${turns++}` });
 
 /** GET a file; returns its body. */
 export const fetchFile = async (path) => (await request(path)).blob();
