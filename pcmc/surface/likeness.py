@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Ints
 from ..base.errors import SurfaceError
@@ -39,6 +38,8 @@ def refuse_unlike(surface: Surface, plane: Plane, side: Ints) -> None:
             if (sign * side[on] > 0).any() and kind not in behind:
                 text = f"the {plane} divides no symmetric surface: nothing on its other side has the tension"
                 raise SurfaceError(f"{text} and the loads of {name}", what="plane", where=name)
+    from scipy.spatial import cKDTree  # here, as few surfaces are cut
+
     X, fixed, edges = surface.vertices, surface.given_supports.fixed, surface.topology.edges
     held = edges[fixed[edges].all(axis=1)]
     reach = 0.5 * segment_lengths(X, held).max(initial=0.0) + 10.0 * ON * surface.size
