@@ -75,6 +75,9 @@ class CuttingOptions:
         if self.compensation is not None and self.stiffness is not None:
             text = "stiffness: the compensation is given; leave out one of both"
             raise OptionError(text, what="stiffness")
+        if self.stiffness is None and self.poisson != CuttingOptions.poisson:
+            text = "poisson: it counts with the stiffness of the cloth alone; give stiffness, or leave it out"
+            raise OptionError(text, what="poisson", found=self.poisson)
         for count in self._values("strips"):
             validate.integer("strips", count, least=1)
         for name, limits in NUMBERS.items():

@@ -188,6 +188,10 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     _check_wishes(project, surface)
     solved = solve_project(project, surface, report)
     notes = [*solved.notes]
+    starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
+    if starts:
+        label, more = starts[0].label, " and others" * (len(starts) > 1)
+        notes.append(f"{label}{more}: the value given is where the search begins; the targets decide it")
     if project.has_file:  # a drawing alone is proposed as a whole
         notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
     if project.drawing is not None or start.data is not None:

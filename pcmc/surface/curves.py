@@ -23,6 +23,7 @@ NEAR = 0.5  # of the edge length: an extreme nearer to another stop than this be
 EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
 LEVEL = 1e-12  # product of slopes beside a joint, up to which a coordinate may turn there
 BESIDE = 0.25  # in parameter: how far beside such a joint its coordinate is compared
+MOST_UNEVEN = 1e6  # weights of a rational curve: where they differ by more, it is corners to rounding
 PLATEAU = 1e-12  # of the length: changes of a coordinate up to this are none
 DENSE = 64  # points per curved piece, for lengths and crossings; fewer where there are many pieces,
 DENSEST, FEWEST = 4096, 4  # about so many on a curve, and at least so many on each piece
@@ -263,6 +264,9 @@ def bezier(control: npt.ArrayLike, weights: npt.ArrayLike | None = None) -> Curv
     if len(given) != len(P):
         problem = f"expected a weight for each of its {len(P)} control points, found {len(given)}"
         raise curve_error("bezier", problem, found=len(given), expected=len(P))
+    if max(given) > MOST_UNEVEN * min(given):
+        text = f"weights from {min(given):g} to {max(given):g}; the largest may be {MOST_UNEVEN:g} times the"
+        raise curve_error("bezier", f"{text} smallest", found=max(given))
     return _closed_if_ends_meet(Curve((Piece(P, weights=np.array(given)),)))
 
 

@@ -137,6 +137,15 @@ def test_targets_of_a_half_say_that_they_are_the_half_s(folder):
     assert "targets of areas, volumes and lengths are those of the part between the mirror planes" in notes
 
 
+def test_a_value_given_for_what_the_targets_decide_is_named(folder):
+    Path("roof.toml").write_text(WITH_UNITS.replace("tension = 2.0", "rise = 1.0"), encoding="utf-8")
+    plain = project.designed("roof.toml")
+    other = project.designed("roof.toml", changed=lambda surface: surface.retensioned({"roof": 4.0}))
+    assert other.surface.tensions == pytest.approx(plain.surface.tensions, rel=1e-4)
+    begins = "tension of roof: the value given is where the search begins; the targets decide it"
+    assert [begins in roof.notes for roof in (plain, other)] == [False, True]
+
+
 def test_no_command_writes_over_what_it_reads(folder, capsys):
     pcmc.write("roof.pcmc", opened("roof.toml", start=True).surface)
     os.symlink("roof.pcmc", "link.pcmc")

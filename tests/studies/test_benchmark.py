@@ -168,6 +168,7 @@ def test_the_growth_of_cost_is_a_slope():
     table = pd.DataFrame({"triangles": triangles} | dict.fromkeys(TIMES, 0.5))
     table = table.assign(solve_seconds=1e-6 * triangles**1.1, solve_gigabytes=1e-9 * triangles**1.2)
     table = table.assign(refined_triangles=triangles, refined_seconds=1e-6 * triangles**1.2)
+    table = table.assign(kept_seconds=1e-6 * triangles**1.05)
     rows = {row.what: row for row in scaling.rows(table, quick=False)}
     assert rows["exponent of time"].value == pytest.approx(1.1)
     assert rows["exponent of memory"].value == pytest.approx(1.2)
@@ -175,6 +176,7 @@ def test_the_growth_of_cost_is_a_slope():
     assert rows["time per triangle"].value == pytest.approx(10**0.1)
     assert rows["exponent of time through one refinement"].value == pytest.approx(1.2)
     assert rows["time per triangle through one refinement"].value == pytest.approx(10**0.2)
+    assert rows["time per triangle, freed memory kept"].value == pytest.approx(10**0.05)
     if solver.available()[0] == "pardiso":
         assert (rows["exponent of time"].met, rows["exponent of memory"].met) == ("yes", "no")
 

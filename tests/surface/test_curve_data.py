@@ -51,6 +51,7 @@ def test_ellipses_are_refused_by_name():
         ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [0, 2]], "sweep": 400}}, "ellipse"),
         ({"bezier": [[0, 0], [1, 1]], "weights": [1.0]}, "bezier"),
         ({"bezier": [[0, 0], [1, 1]], "weights": [1.0, -1.0]}, "bezier: weights"),
+        ({"bezier": [[0, 0], [1, 1], [2, 0]], "weights": [1.0, 1e30, 1.0]}, "bezier"),
         ({"polyline": [[0, 0], [1, 1]], "weights": [1.0, 1.0]}, "weights"),
     ):
         with refused(OptionError, what=what):
