@@ -14,8 +14,9 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.geometry import cross_2d
+from ..surface.parts import image_names
 from ..surface.pieces import two_digits
-from ..surface.symmetry import image_names, mirrored
+from ..surface.symmetry import mirrored
 from .forces import cable_parts
 from .proof import WeakCable
 

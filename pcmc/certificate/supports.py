@@ -178,9 +178,8 @@ def _labelled(acting: Forces) -> Iterator[_Part]:
             if len(left):
                 parts = [*parts, _Part(name, kind, left, acting.surface.vertices[left].mean(axis=0))]
                 sharing[left] = _weights(acting, parts[-1])
-        pulls_at = np.asarray(
-            forces.any(axis=1, keepdims=True)
-        )  # none where others, such as ends of members, take all
+        # no pulls where others, such as ends of members, take all
+        pulls_at = np.asarray(forces.any(axis=1, keepdims=True))
         own = [_half_pulls(acting, part) * pulls_at[part.vertices] for part in parts]
         every = np.zeros_like(forces)
         for part, pulled in zip(parts, own, strict=True):

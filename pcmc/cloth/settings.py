@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..surface import Surface
-from ..surface.symmetry import image_names, with_images
+from ..surface.parts import image_names, with_images
 
 NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
     "width": {"above": 0.0},

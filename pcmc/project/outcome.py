@@ -290,12 +290,9 @@ class Outcome:
             structure = structure.of_whole(self.surface, surface, plan)
         model = structure.model(surface, plan, anyway=anyway, certificate=certificate, units=self.units)
         if self.unfold and (model.bars or any(not line.wall for line in model.lines)):
-            text = (
-                "a member at an edge or a point is known for the part of the plan alone, not for its images;"
-            )
-            raise OptionError(
-                f"{text} draw the whole plan, without mirrors, or leave out whole", what="whole"
-            )
+            text = "a member at an edge or a point is known for the part of the plan alone, not for its"
+            text += " images; draw the whole plan, without mirrors, or leave out whole"
+            raise OptionError(text, what="whole")
         return model
 
     @property
@@ -314,9 +311,8 @@ class Outcome:
         if self.unfold:
             cloth = wanted.of_whole(self.surface, surface)
             structure = structure and structure.of_whole(self.surface, surface, None)
-        cut = partial(
-            cutting_pattern_of, surface, of_material(cloth, structure, surface), anyway, certificate
-        )
+        cloth = of_material(cloth, structure, surface)
+        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
         return self._once("cutting pattern", cut) if own else cut()
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:

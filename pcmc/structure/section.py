@@ -12,7 +12,8 @@ from ..plan import Plan
 from ..plan.parts import check_keys, curve_of
 from ..surface import Surface
 from ..surface.curves import Curve
-from ..surface.symmetry import image_names, mirrored, with_images
+from ..surface.parts import image_names, with_images
+from ..surface.symmetry import mirrored
 from .gas import Gas
 from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
 from .material import Material, Profile

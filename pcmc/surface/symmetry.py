@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -228,33 +228,6 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
         curves=_curves(surface, images, place),
     )
     return Whole(whole, first % surface.n, np.tile(np.arange(surface.m), k), k)
-
-
-def image_names(piece: Surface, whole: Surface) -> dict[str, str]:
-    """By the names that only the whole of a piece has, of its patches and cables, those they are images of.
-
-    >>> from pcmc import Patch
-    >>> side, rope = Plane(normal=(1, 0, 0), mirror=True), [Cable("rope", 1.0, [[1, 2]])]
-    >>> half = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
-    ...                [Patch("film", 1.0)], fixed=[1, 2], on_planes={side: [0, 3]}, cables=rope)
-    >>> image_names(half, mirrored(half))
-    {'rope (2)': 'rope'}
-    """
-    known, names = ([*(p.name for p in s.patches), *(c.name for c in s.cables)] for s in (piece, whole))
-    return {name: name.rpartition(" (")[0] for name in names if name not in known}
-
-
-def with_images(given: Any, images: Mapping[str, str]) -> Any:
-    """A table by names, or a list of names, with those of images, too; anything else is given back.
-
-    >>> with_images({"film": 1.0, "wall": 2.0}, {"film (2)": "film"})
-    {'film (2)': 1.0, 'film': 1.0, 'wall': 2.0}
-    """
-    if isinstance(given, Mapping):
-        return {new: given[old] for new, old in images.items() if old in given} | dict(given)
-    if isinstance(given, list | tuple):
-        return [*given, *(new for new, old in images.items() if old in given and new not in given)]
-    return given
 
 
 def _chosen(surface: Surface, planes: Sequence[Plane | str] | None) -> list[tuple[Plane, Bools]]:
