@@ -243,6 +243,10 @@ def _rests(
     if not part.resting.any():
         return None
     n, walls, resting = surface.n, part.walls, part.resting
+    meet = resting & walls.held & walls.meeting
+    if meet.any():  # there the largest pull over capacity is found by iteration, without a bound
+        where = f"walls meet at resting vertex {meet.argmax()}"
+        raise _Unproved(f"{where}, and what they hold there has no bound")
     pull, capacity = pull_and_capacity(part.surface, walls, resting, -found.forces[:n])
     size = np.linalg.norm(found.forces[:n], axis=1)
     off = np.linalg.norm(found.forces_radius[:n], axis=1) + 2.0 * stiffness[:n] * radius + 1e-14 * size

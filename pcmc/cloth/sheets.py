@@ -147,10 +147,8 @@ def strip_lines(
                 at, inward = _along(seam, side, strip, place)
                 marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
             at, inward = _along(seam, side, strip, 0.5 * seam.length)
-            others = (
-                "+".join(str(s.strip) for s in seam.sides if s is not side)
-                or (seam.kind == "mirror") * "image"
-            )
+            others = "+".join(str(s.strip) for s in seam.sides if s is not side)
+            others = "image" if seam.kind == "mirror" else others
             labels.append((at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
     cloth = _with_allowances(strip, added)
     shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []

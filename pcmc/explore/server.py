@@ -150,7 +150,7 @@ class Explorer:
         about, arrays = page_data.outline(state.surface, origin)
         header, fields = self._shown(state)
         left_out = LEFT_OUT if has_members(roof.outcome) and "member_ends" not in fields else ""
-        untouched = state.surface is self.start.surface  # which the note tells of
+        untouched = state.surface is self.start.surface  # the note is about the start
         once = {
             "session": name,
             "formats": list(FORMATS),

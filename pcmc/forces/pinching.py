@@ -301,8 +301,8 @@ def pull_and_capacity(
     The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
     Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
-    On a held bottom the pull is the force along the direction d of ``pull_directions``, ℓ is taken on the
-    bottom, and the wall's area is ½ ℓ |d × e| for an edge along e.
+    On a held bottom the pull is the force along the direction d of ``pull_directions``, and ℓ is taken on the
+    bottom; where walls meet, the area is ½ ℓ |d × e| for an edge along e.
     ``force`` (n,3) is -∇E without supports, if that is known.
     """
     force = -energy_and_gradient(surface, supports=False)[1] if force is None else force
@@ -310,7 +310,7 @@ def pull_and_capacity(
     pull = np.where(resting, np.einsum("ij,ij->i", force, d), 0.0)
     vertex, half, along = _edge_ends(surface, walls)
     across = np.linalg.norm(np.cross(d[vertex], along), axis=1)
-    capacity = np.bincount(vertex, half * across, surface.n)
+    capacity = np.bincount(vertex, half * np.where(walls.meeting[vertex], across, 1.0), surface.n)
     return pull, np.where(resting, capacity, 0.0)
 
 
@@ -351,7 +351,7 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
     pulled = held & (length > 0.0)
     direction[pulled] = pull[pulled] / length[pulled, None]
     vertex, c, e = _edge_ends(surface, walls)
-    meet = np.flatnonzero(pulled & (np.bincount(vertex, minlength=surface.n) > 2))
+    meet = np.flatnonzero(pulled & walls.meeting)
     if not len(meet):
         return direction
     here = np.isin(vertex, meet)

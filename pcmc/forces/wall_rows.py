@@ -258,6 +258,11 @@ class Walls:
         return self.top_free & (self.foot >= 0)
 
     @property
+    def meeting(self) -> Bools:
+        """(n,) the vertices of more than two top edges: there walls meet."""
+        return np.asarray(np.bincount(self.top_edges.ravel(), minlength=len(self.foot)) > 2)
+
+    @property
     def sliding(self) -> Bools:
         """(patches,) the walls whose bottom slides on Π."""
         held = np.zeros_like(self.pinchable)

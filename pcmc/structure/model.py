@@ -189,8 +189,8 @@ class StructuralModel:
     @cached_property
     def cable_sections(self) -> tuple[tuple[float, Material], ...]:
         """Of each cable of the standing surface the area of its section, length², and its material: those of
-        a member, or of all cables, by default the patches' along their warp; in a mirror plane half of it, as
-        the cable has half of its tension there."""
+        a member, or of all cables, by default the patches' along their warp. A cable in a mirror plane is cut
+        in half: it has half its tension, and half its section."""
         own = {str(member.on): (member.profile.area, member.material) for member in self.members}
         own |= {line.name: (line.member.profile.area, line.member.material) for line in self.lines}
         others = checked_areas(self.cable_area, self.surface, without=own)

@@ -1,4 +1,4 @@
-"""Names by a place: parts of a roof in the coordinates of a survey are told apart."""
+"""Parts of one name are told apart by their places, in the coordinates of a survey, too."""
 
 from __future__ import annotations
 

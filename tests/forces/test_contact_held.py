@@ -170,6 +170,7 @@ def test_strong_walls_that_cross_leave_a_roof_in_each_bay():
     part = standing_part(result.surface)
     np.testing.assert_array_equal(part.resting, part.walls.top_free)
     assert result.energy == pytest.approx(4.0 * pcmc.solve(bay.surface()).energy, rel=5e-4)
+    assert "walls meet at resting vertex" in pcmc.verify(result.surface).reason
 
 
 @pytest.mark.parametrize("line", [[[6, 4], [12, 4]], [[6, 4], [12, 8]]])
