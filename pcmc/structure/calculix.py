@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ from .model import StructuralModel
 from .results import StepResults, read_steps
 
 PROGRAM = "ccx"
+USUAL_SIZE = 10.0  # of a surface in the files that it gets; a larger one gets a larger unit of length
 MISSING = (
     f"{PROGRAM} is not installed: the load cases need CalculiX "
     "(Debian, Ubuntu: apt install calculix-ccx; else https://www.calculix.de), found as ccx on the path"
@@ -52,13 +54,15 @@ def run_as_far(
 
     CalculixError where it finds none even for the first of them, the form-finding load.
     """
+    # where beams meet the program compares 1e-5 to terms of 1/length: in mm it misses what it finds in m
+    unit = 10.0 ** max(round(math.log10(model.surface.size / USUAL_SIZE)), 0)
     with folder_for_input() as path:
         with writing(path):
-            path.write_text(text_of(model, steps, every=True), encoding="utf-8", newline="\n")
+            path.write_text(text_of(model, steps, every=True, unit=unit), encoding="utf-8", newline="\n")
         with suppress(NotConverged):
             run_file(path, timeout)
         try:
-            found = read_steps(path.with_suffix(".dat"), model, steps)
+            found = read_steps(path.with_suffix(".dat"), model, steps, unit)
         except FileError as error:
             text = str(error).removeprefix(f"{path.with_suffix('.dat')}: ")
             raise CalculixError(f"{PROGRAM}: the results of step {steps[0].name!r}: {text}") from None

@@ -54,9 +54,10 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) -> str:
+def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False, unit: float = 1.0) -> str:
     """The input file of a model under these steps, the form-finding load first; with ``every`` it prints the
-    results of each increment, and writes none for viewers.
+    results of each increment, and writes none for viewers. A length of 1 in the file is ``unit`` in the
+    model.
     """
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
     text = [f"*HEADING\npcmc structural model, {'' if model.certificate.certified else 'NOT CERTIFIED: '}"]
@@ -65,9 +66,8 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
     text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]
     text += [f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1)]
-    text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes])]
-    for section in (_elements, _beams, _supports):
-        text += section(model)
+    text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes] / unit)]
+    text += chain(_elements(model, unit), _beams(model, unit), _supports(model))
     # σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge
     prestress = [(model.faces + 1, model.stresses, POINTS)]
     for cable, area, _, numbers, along in model.cable_edges():
@@ -75,22 +75,23 @@ def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False) 
         prestress += [(numbers, pull / area * along[:, :, None] * along[:, None, :], CABLE_POINTS)]
     rows = list[tuple[Any, ...]]()  # a line for each integration point
     for elements, stress, points in prestress:
-        tensors = np.repeat(stress[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], points, axis=0)
+        tensors = unit**2 * np.repeat(stress[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], points, axis=0)
         point = np.tile(np.arange(1, points + 1), len(elements))
         rows.append((np.repeat(elements, points), point, tensors))
     text += [card("INITIAL CONDITIONS, TYPE=STRESS", *map(np.concatenate, zip(*rows, strict=True)))]
-    return "".join(chain(text, *(_step(model, step, k == 0, every) for k, step in enumerate(steps))))
+    return "".join(chain(text, *(_step(model, step, k == 0, every, unit) for k, step in enumerate(steps))))
 
 
-def _elements(model: StructuralModel) -> Iterator[str]:
+def _elements(model: StructuralModel, unit: float) -> Iterator[str]:
     """Elements, node sets, materials and sections by patch and by cable."""
     surface, (name, section, _) = model.standing, KINDS[model.elements]
     patch_of = surface.patch_of_face[model.active]
     for k in np.unique(patch_of) + 1:
-        mine, material, thickness = patch_of == k - 1, model.materials[k - 1], short(model.thicknesses[k - 1])
+        mine, material = patch_of == k - 1, model.materials[k - 1]
+        thickness = short(model.thicknesses[k - 1] / unit)
         corners = surface.faces[model.active[mine]]
         yield card(f"ELEMENT, TYPE={name}, ELSET=PATCH_{k}", model.faces[mine] + 1, corners + 1)
-        yield _set(f"NODES_{k}", np.unique(corners)) + _material(f"PATCH_{k}", material)
+        yield _set(f"NODES_{k}", np.unique(corners)) + _material(f"PATCH_{k}", material, unit)
         if not material.cloth:
             yield f"*{section} SECTION, ELSET=PATCH_{k}, MATERIAL=PATCH_{k}\n{thickness}\n"
             continue
@@ -103,13 +104,13 @@ def _elements(model: StructuralModel) -> Iterator[str]:
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k + 1},\n" for k in np.unique(patch_of))
     for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
         yield card(f"ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}", numbers, cable.edges + 1)
-        yield _material(f"CABLE_{k}", material)
-        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{k}\n{short(area)}\n"
+        yield _material(f"CABLE_{k}", material, unit)
+        yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{k}\n{short(area / unit**2)}\n"
     if surface.cables:
         yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(surface.cables)))
 
 
-def _beams(model: StructuralModel) -> Iterator[str]:
+def _beams(model: StructuralModel, unit: float) -> Iterator[str]:
     """Members, as rectangles with the stiffness of their profiles, and what holds their ends.
 
     They have nodes of their own, tied to those of the sheets: where membranes and beams share nodes, the
@@ -119,7 +120,7 @@ def _beams(model: StructuralModel) -> Iterator[str]:
     number = np.zeros(len(X), dtype=np.int64)
     number[vertices] = model.surface.n + 1 + np.arange(len(vertices))
     if len(vertices):
-        yield card("NODE, NSET=BEAMS", number[vertices], X[vertices])
+        yield card("NODE, NSET=BEAMS", number[vertices], X[vertices] / unit)
     first = model.surface.m + 1 + sum(len(cable.edges) for cable in model.standing.cables)
     for k, line in enumerate(model.beams, 1):
         elements, first = first + np.arange(len(line.pairs)), first + len(line.pairs)
@@ -131,9 +132,10 @@ def _beams(model: StructuralModel) -> Iterator[str]:
         for a, row in enumerate(rows):
             yield _set(f"MEMBER_{k}_{a + 1}", elements[which.ravel() == a] - 1, "ELSET")
             yield f"*BEAM SECTION, ELSET=MEMBER_{k}_{a + 1}, MATERIAL=MEMBER_{k}, SECTION=RECT\n"
-            yield f"{short(width)},{short(height)}\n{','.join(map(short, row))}\n"
+            yield f"{short(width / unit)},{short(height / unit)}\n{','.join(map(short, row))}\n"
         m = line.member.material
-        yield _material(f"MEMBER_{k}", replace(m, young=factor * m.young, density=factor * m.density))
+        m = replace(m, young=factor * m.young, density=factor * m.density)
+        yield _material(f"MEMBER_{k}", m, unit)
     turns = held_turns(model, X)
     for v, node in zip(vertices.tolist(), number[vertices].tolist(), strict=True):
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
@@ -151,15 +153,16 @@ def _beams(model: StructuralModel) -> Iterator[str]:
     yield _set("ENDS", number[vertices[model.held[vertices]]] - 1)
 
 
-def _material(name: str, material: Material) -> str:
+def _material(name: str, material: Material, unit: float) -> str:
     """Of a cloth the numbers across its plane do not act: the stress there is 0."""
-    text, E, v = f"*MATERIAL, NAME={name}\n*ELASTIC", short(material.young), short(material.poisson)
+    text, v = f"*MATERIAL, NAME={name}\n*ELASTIC", short(material.poisson)
+    E = short(material.young * unit**2)
     if material.weft is None or material.shear is None:
         text += f"\n{E},{v}\n"
     else:
-        F, G = short(material.weft), short(material.shear)
+        F, G = short(material.weft * unit**2), short(material.shear * unit**2)
         text += f", TYPE=ENGINEERING CONSTANTS\n{E},{F},{F},{v},0.,0.,{G},{G},\n{G}\n"
-    return text + (f"*DENSITY\n{short(material.density)}\n" if material.density > 0.0 else "")
+    return text + (f"*DENSITY\n{short(material.density * unit**4)}\n" if material.density > 0.0 else "")
 
 
 def _supports(model: StructuralModel) -> Iterator[str]:
@@ -179,7 +182,7 @@ def _supports(model: StructuralModel) -> Iterator[str]:
         yield f"*BOUNDARY\nGUIDE_{k},{'1,1' if model.freedom[leader] == 2 else '2,3'}\n"
 
 
-def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterator[str]:
+def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: float) -> Iterator[str]:
     """A step of the analysis, with all loads that act at its end."""
     released = form and bool(model.lines)
     if released:  # members take over from what held the form, while its loads stay
@@ -195,14 +198,16 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool) -> Iterat
         values, names = pressures[patch_of == k], (model.faces[patch_of == k] + 1).tolist()
         even = [(f"PATCH_{k + 1}", values[0])] if (values == values[0]).all() else []
         loaded = even or zip(names, values, strict=True)
-        rows += [f"{name},{label},{short(p)}\n" for name, p in loaded if p]
+        rows += [f"{name},{label},{short(p * unit**2)}\n" for name, p in loaded if p]
     if step.gravity:
         down = ",".join(short(-c) for c in model.standing.plane.normal)
         heavy = {f"PATCH_{k + 1}": model.materials[k].density for k in np.unique(patch_of)}
         heavy = {"EALL": 1.0} if all(heavy.values()) else heavy
         heavy |= {f"CABLE_{k}": of.density for k, (_, of) in enumerate(model.cable_sections, 1)}
         heavy |= {f"MEMBER_{k}": line.member.material.density for k, line in enumerate(model.beams, 1)}
-        rows += [f"{name},GRAV,{short(step.gravity)},{down}\n" for name, dense in heavy.items() if dense]
+        rows += [
+            f"{name},GRAV,{short(step.gravity / unit)},{down}\n" for name, dense in heavy.items() if dense
+        ]
     if not rows:  # without a line the loads of the step before would stay
         rows = [f"EALL,{label},0.\n"]
     yield "".join([f"*DLOAD, OP=NEW{', AMPLITUDE=WHOLE' if released else ''}\n", *rows])

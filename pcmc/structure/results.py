@@ -95,14 +95,17 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     return steps
 
 
-def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tuple[StepResults, ...]:
+def read_steps(
+    path: Path, model: StructuralModel, steps: Sequence[Step], unit: float = 1.0
+) -> tuple[StepResults, ...]:
     """The same for other ``steps`` of the model. Where the program stopped, the last results are those of the
-    ``share`` of the step that it reached; steps that it did not begin are left out.
+    ``share`` of the step that it reached; steps that it did not begin are left out. A length of 1 in the file
+    is ``unit`` in the model.
     """
     check_regular(path)
     suffix_of(path, (".dat",), "a result of CalculiX")
     try:
-        tables = read(path.read_text(encoding="ascii"))
+        tables = _in_model_units(read(path.read_text(encoding="ascii")), unit)
         _check(tables, model, steps)
     except OSError as error:
         raise system_error(path, "read", error) from None
@@ -112,6 +115,18 @@ def read_steps(path: Path, model: StructuralModel, steps: Sequence[Step]) -> tup
     except FileError as error:
         raise error.in_file(path, what=str(path)) from None
     return tuple(_results(model, steps, k, tables) for k in range(len(tables)))
+
+
+def _in_model_units(tables: list[Tables], unit: float) -> list[Tables]:
+    """Tables of a file in which a length of 1 is ``unit``; forces are the same."""
+    factors = {"displacements": unit, "stresses": unit**-2, "cables": unit**-2}
+    return [
+        {
+            kind: [block._replace(values=factors.get(kind, 1.0) * block.values) for block in blocks]
+            for kind, blocks in table.items()
+        }
+        for table in tables
+    ]
 
 
 def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list[Tables]) -> StepResults:

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,10 +11,12 @@ from starts import spherical_cap
 from structures import model_of, square
 
 import pcmc
-from pcmc import Circle, Material
+from pcmc import Circle, Material, SelfWeight, Snow
 from pcmc.base.units import Units
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan, circle, polyline
 from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure.inp import text_of
 from pcmc.structure.member_forces import (
     member_tables,
     members_at_rest,
@@ -148,6 +151,51 @@ def test_a_ring_around_a_hole_is_in_tension():
     analysis = analyse(model)
     assert analysis.members.loc[0, ["least_N", "largest_N"]].tolist() == pytest.approx([2.0, 2.0], rel=0.05)
     assert analysis.members["moved"][0] < 1e-4
+
+
+@cache
+def roof_with_ring():
+    """Two bays with a wall and an opening; in metres and kilonewtons."""
+    bays = {name: {"tension": 1.5, "pressure": 0.3} for name in ("west", "east")}
+    line, opening = {"curve": [[6, 0], [6, 8]], "wall": 0.6}, circle([3, 4], 1.2)
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [line], [opening], edge_length=1.2, patches=bays)
+    return pcmc.solve(plan.surface()).surface
+
+
+def ring_and_arch(metre, density=0.0):
+    """A model of that roof with a ring and an arch, in a unit of which ``metre`` are one metre."""
+    per_area = metre**-2
+    ring_profile, tube = Profile.rectangle(0.1 * metre, 0.2 * metre), Profile.tube(0.1 * metre, 0.005 * metre)
+    steel = Material(2.1e8 * per_area, 0.2, density * metre**-4)
+    members = [Member(circle([3 * metre, 4 * metre], 1.2 * metre), ring_profile, steel)]
+    members += [Member("wall 1", tube, steel)]
+    cloth = Material(5e5 * per_area, density=density * metre**-4, weft=4e5 * per_area, shear=2e4 * per_area)
+    loads = [SelfWeight(9.81 * metre)] * bool(density) + [Snow(0.15 * per_area)]
+    surface = scaled_surface(roof_with_ring(), metre)
+    return model_of(surface, material=cloth, thickness=0.001 * metre, loads=loads, members=members)
+
+
+@needs_ccx
+def test_the_program_finds_in_mm_what_it_finds_in_m():
+    """Where beams meet it compares terms of 1/length with fixed numbers; in mm it stopped at 71 % here."""
+    found = []
+    for metre in (1.0, 1000.0):
+        analysis = analyse(ring_and_arch(metre), remedy=False)
+        assert analysis.carried
+        lengths = analysis.table[["down", "up"]].to_numpy().ravel() / metre
+        forces = [*analysis.members["largest_N"], *analysis.table["largest_force"] * metre]
+        found.append([*lengths, *forces])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-5, atol=1e-8)
+
+
+def test_a_file_in_another_unit_has_the_numbers_of_a_model_in_that_unit():
+    numbers = [
+        np.array(
+            re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?", text_of(model, model.steps, unit=unit)), dtype=float
+        )
+        for model, unit in ((ring_and_arch(1.0, 1.2), 1.0), (ring_and_arch(1000.0, 1.2), 1000.0))
+    ]
+    np.testing.assert_allclose(numbers[1], numbers[0], rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.parametrize("closed", [False, True])
