@@ -200,8 +200,8 @@ def supports_with_members(results: StepResults) -> pd.DataFrame:
     table = support_table(acting)[["support", "name", "kind", "length", *"xyz", *FORCE]]
     beside = model.held.copy()
     beside[ends] = False
-    there = [beside[on].any() or alone[on].any() for on in support_vertices(acting).values()]
-    table = table[there if model.lines else [True] * len(table)]
+    there = np.array([beside[on].any() for on in support_vertices(acting).values()], dtype=bool)
+    table = table[there | table[[*FORCE]].any(axis=1) | (not model.lines)]
     rows = list[list[object]]()
     for k, v in enumerate(ends, 1):
         numbers = 0.0, *standing.vertices[v], *(reactions - alone)[v]

@@ -11,8 +11,8 @@ from structures import model_of
 import pcmc
 from generators import joined_caps
 from pcmc import Material, StructuralModel, cli
-from pcmc.plan import Plan
-from pcmc.structure import Member, Profile, calculix
+from pcmc.plan import CableLine, Plan
+from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import (
     forces_on_members,
     members_at_rest,
@@ -77,6 +77,22 @@ def test_the_supports_have_the_ends_of_a_member_and_no_foot_of_its_wall():
             of_bar = 0.5 * (beam.within[place] + beam.within[next_to])[:3]
             left = np.linalg.norm(forces[row] + beam.pulls[place])
             assert left == pytest.approx(np.linalg.norm(of_bar), rel=0.01)
+
+
+@needs_ccx
+def test_a_cable_that_ends_at_the_foot_of_a_wall_leaves_no_row_for_that_wall():
+    plan = Plan(
+        [[0, 0], [9, 0], [9, 8], [0, 8]],
+        [{"curve": [[5, 0], [5, 8]], "wall": 0.3}],
+        edge_length=1.2,
+        patches={"west": {"tension": 1.5, "pressure": 0.3}, "east": {"tension": 1.5, "pressure": 0.0}},
+        cables=[CableLine([[5, 0], [9, 0]], 12.0)],
+    )
+    model = hall_with(of=pcmc.solve(plan.surface()).surface, cable_area=2e-4)
+    table = analyse(model, remedy=False).supports
+    assert "wall 1" not in table["name"][table["kind"] == "line"].tolist()
+    assert table["kind"].tolist().count("cable end") == 2
+    np.testing.assert_allclose(table.groupby("case")[["force_z"]].sum(), [[-12.0]], rtol=0.05)
 
 
 @pytest.mark.parametrize("of", [{}, {"scale": 0.05, "east": 0.15}], ids=["even", "wall under pressure"])
