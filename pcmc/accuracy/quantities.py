@@ -70,8 +70,9 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
         add("pressure", room.name, pressure, share * tension / size)
     add("energy", "", certificate.energy, share * tension * whole)
     pull = share * tension * size
-    add("reaction", "", certificate.support, pull, -certificate.load)
-    alone = -certificate.load if len(certificate.supports) == 1 else None
+    against = 0.0 - certificate.load  # never -0
+    add("reaction", "", certificate.support, pull, against)
+    alone = against if len(certificate.supports) == 1 else None
     for curve, name, force, most in _boundaries(surface, certificate):
         old = np.sort(curve.vertices[curve.vertices < vertices]).tobytes()
         up, along = force @ np.array(surface.plane.normal), np.linalg.norm(surface.plane.along(force))

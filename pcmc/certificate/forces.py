@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
-from ..base.tolerances import EXCESS
+from ..base.tolerances import EXCESS, FORCE_ROUNDING
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
@@ -65,8 +65,10 @@ def load(surface: Surface) -> float:
 
 
 def along_normal(surface: Surface, forces: Floats) -> float:
-    """The sum of forces (k,3) along Π's normal."""
-    return float((forces @ np.array(surface.plane.normal)).sum())
+    """The sum of forces (k,3) along Π's normal; 0 where rounding alone is left of them."""
+    parts = forces @ np.array(surface.plane.normal)
+    total = float(parts.sum())
+    return total if abs(total) > FORCE_ROUNDING * float(np.abs(parts).sum()) else 0.0
 
 
 def reactions(surface: Surface) -> Floats:

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.tolerances import PARALLEL, SAME_PLACE
+from ..base.tolerances import FORCE_ROUNDING, PARALLEL, SAME_PLACE
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from ..surface.pieces import point_text
 from ..surface.topology import POINT, EdgeCurve, vertex_kind
 from .forces import Forces, at_both_ends, held_boundary, load_places, sheet_pulls
 from .tables import middle, names_of
@@ -132,6 +133,7 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     if acting.surface.periodic:  # the forces across the seam have moments, and no resultant
         parts[2, 1] = np.nan
     shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
+    parts[np.abs(parts) <= FORCE_ROUNDING * scale[:, None]] = 0.0
     values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
     columns = ["of", *columns, "force_share", "moment_share"]
     return pd.DataFrame(dict(zip(columns, [["loads", "supports", "remainder"], *values], strict=True)))
@@ -147,10 +149,10 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     share += f", and to {moment:.1g} in moments"
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
-    place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")
+    place = point_text(left[[*"xyz"]].to_numpy(float))
     whose = " of the piece between the mirror planes" if mirrors else ""
     hint = "; the rest is what the mesh leaves along its sheets: refine it" if force > COARSE else ""
-    return f"the supports carry the loads{whose} {share} about ({place}){hint}"
+    return f"the supports carry the loads{whose} {share} about {place}{hint}"
 
 
 def held_curves(surface: Surface) -> tuple[EdgeCurve, ...]:

@@ -46,8 +46,8 @@ ABOUT_COLUMNS = (
 ABOUT_CLOTH = (
     "Each strip is laid flat with the least strain for which the sides of every seam are equally long. Strain"
     " is that of the cloth on the roof beside the strain from its tension; its mean is the root mean square"
-    " over the area. Lengths and widths are those of the cut strip, shortened by the compensation, without"
-    " allowances."
+    " over the area. Lengths, widths and cut areas are those of the cut strip, shortened by the"
+    " compensation, without allowances."
 )
 
 
@@ -127,8 +127,8 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
     yield text_table("Members", words, columns)
     kinds = {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length}
     columns = columns_in(table, kinds)
-    columns["span over it"] = [f"{over:.3g}" if over < 1e4 else f"{over:.0f}" for over in table["span_over"]]
-    columns["buckling"] = [f"{factor:.3g}" if factor < 1e4 else "" for factor in table["buckling"]]
+    columns["span over it"] = [f"{over:.3g}" if over < 1e3 else f"{over:.0f}" for over in table["span_over"]]
+    columns["buckling"] = [f"{factor:.4g}" if factor < 1e4 else "" for factor in table["buckling"]]
     yield text_table("Forces of members", table[["case", "member"]], columns)
     yield SIGNS
     yield from (Picture("", picture) for picture in pictures)
@@ -144,7 +144,7 @@ def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     yield Heading(f"Cutting pattern, scale {sheet.scale}, lengths in {units.length}", new_page=True)
     yield on_paper(sheet.scale, *sheet.drawn())
     area, long = one(float(table["cut_area"].sum())), one(float(sewn["length"].sum()))
-    yield f"{len(table)} strips of {area} {units.area} of cloth, {long} {units.length} of seams between them."
+    yield f"{len(table)} strips, together {area} {units.area}; {long} {units.length} of seams between them."
     yield ABOUT_CLOTH
     yield Picture("Strain of the cloth", png(strains(pattern, width=PIXELS)))
     heads = {"strain_min": "strain_from", "strain_max": "to", "strain_rms": "mean"}

@@ -133,7 +133,7 @@ def test_the_sentence_of_balance_tells_whether_there_are_loads():
     """Of a film without loads the forces of its supports cancel, up to what the solver leaves of them."""
     film = pcmc.solve(catenoid(0.4, half_distance=0.5), tolerance=1e-6).certificate
     table = film.balance
-    assert table.iloc[1][FORCE].any()
+    assert table["force_share"].iloc[1] > 0.0
     sentence = balance_sentence(table)
     assert sentence.startswith("the forces of the supports cancel to ")
     assert sentence.endswith(f" of them in x, y and z, and to {table.moment_share.iloc[-1]:.1g} in moments")
@@ -143,7 +143,7 @@ def test_the_sentence_of_balance_tells_whether_there_are_loads():
 def test_the_sentence_of_balance_names_the_place_of_moments_without_signs_of_zero():
     table = pcmc.certify(hall_of_upright_walls()).balance
     table[["x", "y", "z"]] = [-0.0, 2.0, -0.0]
-    assert " in moments about (0, 2, 0)" in balance_sentence(table)
+    assert " in moments about (0, 2)" in balance_sentence(table)
     assert "loads of the piece between the mirror planes to" in balance_sentence(table, ["plane x = 0"])
 
 

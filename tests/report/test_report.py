@@ -276,3 +276,28 @@ def test_upright_and_leaning_walls_and_the_balance(tmp_path):
         assert re.search(rf"^ *{wall} +{lean[wall]:.1f} ", text, re.M)
     assert "The supports carry the loads" in " ".join(text.split())
     assert {"B1", "B7"} <= {label.text for label in report.plan.texts}
+
+
+def test_what_rounding_leaves_of_forces_and_of_a_flat_curvature_is_0():
+    """A sail of tension alone: its reactions cancel, and its mean curvature is rounding."""
+    corners = [[0, 0, 4], [10, 0, 0], [10, 10, 4], [0, 10, 0]]
+    plan = Plan(
+        [[0, 0], [10, 0], [10, 10], [0, 10]],
+        edge="cable",
+        cable=9.0,
+        supports=corners,
+        edge_length=2.0,
+        tension=1.0,
+        pressure=0.0,
+    )
+    sail = pcmc.solve(plan.surface()).surface
+    certificate = pcmc.certify(sail)
+    assert (certificate.support, certificate.load) == (0.0, 0.0)
+    assert not certificate.balance[[*FORCES, "moment_x", "moment_y", "moment_z"]].to_numpy().any()
+    assert 0.0 < certificate.balance["force_share"].iloc[-1] < 1e-14
+    figures = dict(
+        tables.key_figures(sail, pcmc.certificate.quantities.figures(sail, certificate), UNITS).rows
+    )
+    assert figures["all reactions, upwards"] == "0 kN"
+    patches = tables.table_of_patches(sail, certificate, UNITS)
+    assert patches.rows[0][patches.head.index("mean curvature, 1/m")] == "0"
