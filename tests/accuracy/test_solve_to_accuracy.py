@@ -14,7 +14,7 @@ from pcmc.accuracy import adaptive, check_mesh, estimator
 from pcmc.accuracy.adaptive import AccuracyStatus, goals_in
 from pcmc.accuracy.estimator import _along, _edge_shares, _held_vertices, _slope, error_shares, size_field
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
-from pcmc.certificate.forces import reactions
+from pcmc.certificate.forces import support_forces
 from pcmc.design.targets import measure
 from pcmc.forces.functional import energy, volume
 from pcmc.forces.second_variation import hessian
@@ -115,7 +115,7 @@ def test_slopes_of_reactions_are_derivatives(roof, quantity):
     motion[held] = 0.0  # so that the lengths of held edges stay
 
     def value(surface: Surface) -> float:
-        forces = reactions(surface)
+        forces = support_forces(surface)
         if quantity == "reaction":
             return float(forces[held, 2].sum())
         return float(np.linalg.norm(forces[held].sum(axis=0)[:2]))
