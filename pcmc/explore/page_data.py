@@ -23,12 +23,12 @@ from ..design.targets import MEASURES, NAMED
 from ..equilibria import Equilibria
 from ..equilibria.found import INCOMPLETE
 from ..forces.curvature import curvature_error, mean_curvature
-from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import changeable_values
 from ..structure import PlacedMember
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.distance import difference
 from ..surface.symmetry import Whole, unfolded
 from .session import SessionState, figures_data
 

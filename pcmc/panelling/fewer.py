@@ -24,9 +24,9 @@ from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import compare, worst_quality
 from ..solvers import solve_once
 from ..surface import Surface
+from ..surface.distance import distances
 from ..surface.geometry import edge_vectors
 from ..surface.supports import onto_circles
-from .distance import distances
 from .families import triangle_families
 from .schedule import Panels, panels
 

@@ -17,10 +17,10 @@ from pcmc import Patch, Surface
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.panelling.distance import distances
 from pcmc.panelling.families import triangle_families
 from pcmc.report.tables import MOST_FAMILIES
 from pcmc.report.words import panel_text
+from pcmc.surface.distance import distances
 from pcmc.surface.geometry import edge_vectors, face_areas
 from studies.questions import panel_families
 from studies.study import perform
