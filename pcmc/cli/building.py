@@ -132,7 +132,7 @@ def panels_(
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
     with working() as progress:
-        roof = build.roof(arguments.load(file), progress)
+        roof = build.roof(arguments.load_project(file), progress)
         progress("sorting panels")
         if change is None:
             schedule = roof.panels(tolerance, **options)
@@ -180,7 +180,7 @@ def _net(
     check_outputs(outputs, inputs=files_of(file))
     size, pattern, direction = wanted
     with working() as progress:
-        roof = build.roof(arguments.load(file, units), progress)
+        roof = build.roof(arguments.load_project(file, units), progress)
         progress("laying out panels")
         net = roof.panel_net(size, pattern, direction, build.allow_uncertified)
         works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name)
@@ -216,7 +216,7 @@ def draw_(
     points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
     lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
-        roof = build.roof(arguments.load(file, units), progress)
+        roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
         documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets)
         options = {"scale": scale, "heights": heights, "lines": lines}
@@ -247,7 +247,7 @@ def report_(
     arguments.output_of(file, report=output)
     anyway = build.allow_uncertified
     with working() as progress:
-        project = arguments.load(file, units)
+        project = arguments.load_project(file, units)
         own = project.units.force
         if force and own and force != own:
             text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
@@ -309,7 +309,7 @@ def structure(
     """
     arguments.output_of(file, structure=output)
     with working() as progress:
-        project = arguments.load(file)
+        project = arguments.load_project(file)
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
         thick = arguments.by_name(patches, given.thickness, "--thickness")
