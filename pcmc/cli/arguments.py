@@ -185,7 +185,7 @@ def with_groups(function: Callable[..., int]) -> Callable[..., int]:
     return run
 
 
-def load(file: Path, units: str = "") -> Project:
+def load_project(file: Path, units: str = "") -> Project:
     """The project in a file, which may be a mesh or a drawing alone."""
     check_suffix(file)
     return projects.load(file, units=units)

@@ -135,7 +135,7 @@ def panels_(
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     options["anyway"] = build.allow_uncertified
     with working() as progress:
-        roof = build.roof(arguments.load(file), progress)
+        roof = build.roof(arguments.load_project(file), progress)
         progress("sorting panels")
         if change is None:
             schedule = roof.panels(tolerance, **options)
@@ -184,7 +184,7 @@ def _net(
     outputs += [one for path in files for one in table_paths(path, TABLES)]
     check_outputs(outputs, inputs=files_of(file))
     with working() as progress:
-        roof = build.roof(arguments.load(file, units), progress)
+        roof = build.roof(arguments.load_project(file, units), progress)
         progress("laying out panels")
         net = roof.panel_net(size, pattern, direction, build.allow_uncertified)
         works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name)
@@ -220,7 +220,7 @@ def draw_(
     points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
     lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
-        roof = build.roof(arguments.load(file, units), progress)
+        roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
         documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets or None)
         options = {"scale": scale, "heights": heights, "lines": lines}
@@ -251,7 +251,7 @@ def report_(
     arguments.output_of(file, report=output)
     anyway = build.allow_uncertified
     with working() as progress:
-        project = arguments.load(file, units)
+        project = arguments.load_project(file, units)
         roof = build.roof(project, progress)
         if force and roof.units.force not in ("", force):
             own = roof.units.force
@@ -313,7 +313,7 @@ def structure(
     """
     arguments.output_of(file, structure=output)
     with working() as progress:
-        project = arguments.load(file)
+        project = arguments.load_project(file)
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
         thick = arguments.by_name(patches, given.thickness, "--thickness")

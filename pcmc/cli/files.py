@@ -36,7 +36,7 @@ from .arguments import (
     Whole,
     amount,
     count,
-    load,
+    load_project,
     option,
     switch,
 )
@@ -79,7 +79,7 @@ def convert(
 def _good(file: Path, what: Shown, whole: bool, units: str = "") -> Outcome | None:
     """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
     with working() as progress:
-        roof = what.roof(load(file, units), progress, whole)
+        roof = what.roof(load_project(file, units), progress, whole)
     if roof.result is not None:
         reports.report(roof)
     if roof.result is None or roof.good:

@@ -11,7 +11,7 @@ from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
 from . import OK, arguments
-from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load, option, switch
+from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load_project, option, switch
 from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
@@ -23,7 +23,7 @@ VERTICAL = "Vertical axis of the diagram: height, energy or volume."
 PICTURES, TABLE = (".png", ".svg", ".pdf"), ".csv"
 
 
-def equilibria(
+def equilibria_(
     *,
     file: Input,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
@@ -59,7 +59,7 @@ def equilibria(
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
-        roof = what.roof(load(file, units), progress, whole=False)
+        roof = what.roof(load_project(file, units), progress, whole=False)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}
         found = find_equilibria(roof.surface, along or "pressure", callback=progress, span=ends, **options)
         jobs: list[Any] = []

@@ -23,7 +23,7 @@ TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types 
 PLAIN = str.maketrans(dict(zip(SIGNS, TYPED.split("|"), strict=True)))
 
 
-def run(arguments: list[str]) -> int:
+def run_command(arguments: list[str]) -> int:
     """Run the command; an error becomes one line on stderr; return the exit code."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -38,7 +38,7 @@ from .arguments import (
     Whole,
     amount,
     count,
-    load,
+    load_project,
     named_values,
     option,
     output_of,
@@ -101,7 +101,7 @@ def solve_(
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
-    project = load(file, units).in_folder(file.parent if folder is None else folder)
+    project = load_project(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
     if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
@@ -166,7 +166,7 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        roof = what.roof(load(file), progress, whole)
+        roof = what.roof(load_project(file), progress, whole)
         progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
@@ -205,7 +205,7 @@ def remesh_(
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
     written = output_of(file, files=output)
     with working() as progress:
-        project = replace(load(file, units), output=written)
+        project = replace(load_project(file, units), output=written)
         if solve:
             check = bool(project.mesh_check)
             project = replace(project, folder=file.parent, remeshing=(stage,), mesh_check=check)

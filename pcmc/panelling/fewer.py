@@ -24,10 +24,10 @@ from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import compare, worst_quality
 from ..solvers import solve_once
 from ..surface import Surface
+from ..surface.distance import distances
 from ..surface.geometry import edge_vectors
 from ..surface.supports import onto_circles
-from .distance import distances
-from .families import families
+from .families import triangle_families
 from .schedule import Panels, panels
 
 WIDER = (1.25, 1.12, 1.6, 2.2)  # times the tolerance: families within it are joined
@@ -164,7 +164,7 @@ class _Search:
             count = self.count
             if surface is not None:
                 lengths = self._lengths(surface.vertices)
-                count = int(families(lengths, self.tolerance, self.apart).family.max()) + 1
+                count = int(triangle_families(lengths, self.tolerance, self.apart).family.max()) + 1
             if surface is not None and count < self.count:
                 self.best, self.count, misses = surface, count, 0
                 self.steps.append((count, self.leaves(surface.vertices)))
@@ -186,7 +186,7 @@ class _Search:
         in families within a wider tolerance; None where that fails."""
         X = self.best.vertices
         lengths = self._lengths(X)
-        family, order, _ = families(lengths, wider * self.tolerance, self.apart)
+        family, order, _ = triangle_families(lengths, wider * self.tolerance, self.apart)
         aligned = np.take_along_axis(lengths, order, axis=1)
         low, high = np.full((2, family.max() + 1, 3), np.inf)
         np.minimum.at(low, family, aligned)

@@ -19,10 +19,10 @@ from ..certificate.certificate import certified
 from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
+from ..surface.distance import distances
 from ..surface.geometry import cross_2d, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
-from .distance import distances
 from .isothermic import curvature_coordinates
 from .net import INSIDE, Net, SheetNet, net, nudged, tidied, without_flat
 from .planar import before, convex, planarised, planarity, polygon_areas, torsion, torsion_free_axes

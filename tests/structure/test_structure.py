@@ -18,7 +18,7 @@ from generators import hypar_roof
 from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
-from pcmc.certificate.forces import load
+from pcmc.certificate.forces import total_load
 from pcmc.forces.functional import patch_areas
 from pcmc.project import Structure
 from pcmc.surface.geometry import face_areas
@@ -78,9 +78,9 @@ def test_loads_balance_their_totals():
     model = model_of(surface, loads=LOADS)
     form, weight, snow, both = model.steps
     assert [step.name for step in model.steps] == ["form pressure", "self-weight", "snow", "snow and wind"]
-    assert model.nodal_loads(form).sum(axis=0) == pytest.approx([0, 0, load(surface)])
+    assert model.nodal_loads(form).sum(axis=0) == pytest.approx([0, 0, total_load(surface)])
     own = 0.1 * 1e-3 * 9.81 * face_areas(surface.vertices[surface.faces]).sum()
-    assert model.nodal_loads(weight).sum(axis=0) == pytest.approx([0, 0, load(surface) - own])
+    assert model.nodal_loads(weight).sum(axis=0) == pytest.approx([0, 0, total_load(surface) - own])
     assert model.nodal_loads(snow).sum(axis=0) == pytest.approx([0, 0, 4.0 - own - 0.5 * 4.0])
     assert model.nodal_loads(both).sum(axis=0) == pytest.approx([0, 0, 1.3 * 4.0 - own - 0.2 * 4.0])
     np.testing.assert_allclose(model.nodal_loads(form)[4], [0, 0, 4 / 3])
