@@ -317,7 +317,9 @@ def sweep(
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    good = table["verdict"].isin(["stable", "neutral"])
+    for wish in ("targets_met", "accuracy_reached"):
+        good &= table.get(wish, True)
     return OK if good.all() else NOT_CERTIFIED
 
 

@@ -36,6 +36,7 @@ from .strokes import (
 )
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
+MOST_GAP = 0.1  # of the diagonal: longer ones take lines for gaps
 LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
 ALONG = 2e-3  # of that diagonal: lines on an edge are compared with it at points so far apart
 
@@ -99,7 +100,8 @@ class _Reader:
         points = np.concatenate([s.curve.at(s.curve.dense) for s in self.edge if s.curve is not None])
         self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
         if gap is not None:
-            validate.number("gap", gap, least=LEAST_GAP * self.size, hint="or leave it out")
+            least, most = LEAST_GAP * self.size, MOST_GAP * self.size
+            validate.number("gap", gap, least=least, most=most, hint="or leave it out")
         self.gap = GAP * self.size if gap is None else gap
         self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= EXACT * self.size else 0.0
 
