@@ -172,7 +172,8 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     outline = PlanLine("the outline", Kind.OUTLINE, drawing.outline)
     tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
-    cable = cable_for(drawing.outline, max(tensions))
+    points = [support for support in drawing.supports if not isinstance(support, Curve)]
+    cable = cable_for(drawing.outline, max(tensions), points)
     if drawing.loose and values.setdefault("edge", "cable") == "cable":
         values.setdefault("cable", cable)
     cables = _changed(drawing.cables, values.pop("cables", []), "cable", CableLine)

@@ -57,6 +57,14 @@ def test_tensions_and_walls_that_are_chosen_for_a_drawing_are_printed(tmp_path):
     assert text.startswith("walls balanced with their neighbours: 'seam'")
 
 
+def test_a_sail_with_slender_corners_gets_cables_that_fit_in_them(tmp_path, capsys):
+    """At 1.5 α × the size, arcs of radius 15 needed 47° of a corner of 45°: no sail was at rest."""
+    masts = [("point", "mast", place) for place in ((0, 0, 1), (10, 0, 4), (10, 10, 1))]
+    edge = ("lwpolyline", "outline", [(0, 0), (10, 0), (10, 10), (0, 0)])
+    assert cli.main(["solve", str(drawing(tmp_path, edge, *masts, outline=False)), "--no-mesh-check"]) == 0
+    assert "stable" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("size", [0.01, 1.0, 1000.0])
 def test_a_project_without_edge_length_gets_the_mesh_that_its_drawing_would(tmp_path, size):
     """Edges of 1, whatever the unit, made three triangles of a small plan and millions of one in mm."""
