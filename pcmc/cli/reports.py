@@ -51,6 +51,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         leaning = lean_texts(certificate.leaning, outcome.surface.size, FAR)
         if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {_against_lean(outcome)}")
+        if certificate.certified and outcome.shown.certificate.cuts_itself:
+            print(f"not to be built as it is: {outcome.shown.certificate.cuts_itself}")
     if outcome.under_load is not None:
         print(outcome.under_load.text() if verdict else outcome.under_load)
     if outcome.advice:
@@ -80,7 +82,7 @@ def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False
         if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
         return
-    sys.stdout.flush()
+    print(end="", flush=True)
     with working() as progress:
         check = roof.check_mesh(progress)
     if check is None:  # the surface and its files are good without it
@@ -92,7 +94,7 @@ def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False
 def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:
     """Find and print the margins wanted; of a certified roof also those that its project asks for."""
     own = roof.project.margin if roof.project is not None and roof.certified else ()
-    sys.stdout.flush()
+    print(end="", flush=True)
     for what in dict.fromkeys([*wanted, *own]):
         with working() as progress:
             found = roof.margin(what, progress)
