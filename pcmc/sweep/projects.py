@@ -85,7 +85,8 @@ def solve_varied(
     Returns numbers as ``solve_case``, but none of a shape that is not at rest; for each name in the
     project's ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and
     ``targets_met`` and ``accuracy_reached``, if targets or an accuracy are asked for.
-    With mirror planes they are those of the whole roof if the project has ``whole = true``, otherwise of the part between them; ``extent`` says which.
+    With mirror planes they are those of the whole roof if the project has ``whole = true``, otherwise of the
+    part between them; ``extent`` says which.
     """
     digest = projects.digest(project)
     if digest != project_digest:
