@@ -52,6 +52,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         leaning = lean_texts(certificate.leaning, outcome.surface.size, FAR)
         if leaning and certificate.certified:
             print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
+        if certificate.certified and outcome.shown.certificate.cuts_itself:
+            print(f"not to be built as it is: {outcome.shown.certificate.cuts_itself}")
     if outcome.under_load is not None:
         print(outcome.under_load.text() if verdict else outcome.under_load)
     if outcome.advice:

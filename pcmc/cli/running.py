@@ -7,8 +7,6 @@ import gc
 import os
 import sys
 import warnings
-from collections.abc import Callable
-from typing import Any
 
 from ..base import errors
 from ..base.errors import MissingExtra, PcmcError
@@ -23,7 +21,7 @@ TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types 
 PLAIN = str.maketrans(dict(zip(SIGNS, TYPED.split("|"), strict=True)))
 
 
-def run(arguments: list[str]) -> int:
+def run_command(arguments: list[str]) -> int:
     """Run the command; an error becomes one line on stderr; return the exit code."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -41,7 +39,16 @@ def run(arguments: list[str]) -> int:
 
 def _run(arguments: list[str]) -> int:
     try:
-        command = _command()
+        for library in ("typer", "rich"):
+            require(library, extra="cli")
+        import typer
+
+        from .app import app
+
+        if not gc.isenabled():  # ``main`` pauses it
+            gc.freeze()
+            gc.enable()
+        command = typer.main.get_command(app)
         arguments = ["--allow-uncertified" if one == "--anyway" else one for one in arguments]
         code = command(args=arguments or ["--help"], prog_name="pcmc", standalone_mode=False)
         if sys.stdout is not None:  # None if the shell closed it
@@ -73,20 +80,6 @@ def _run(arguments: list[str]) -> int:
         path = getattr(getattr(error, "ctx", None), "command_path", "pcmc")
         _say(f"error: {error.format_message()} (see {path} --help)")
         return BAD_INPUT
-
-
-def _command() -> Callable[..., Any]:
-    """The command line."""
-    for library in ("typer", "rich"):
-        require(library, extra="cli")
-    import typer
-
-    from .app import app
-
-    if not gc.isenabled():  # ``main`` pauses it
-        gc.freeze()
-        gc.enable()
-    return typer.main.get_command(app)
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
