@@ -173,21 +173,9 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
         force = share @ acting.along + (halves.sum(axis=1) * size) @ acting.pulls
         direction = surface.plane.along(force) / (np.linalg.norm(surface.plane.along(force)) or 1.0)
     freed = apply_supports(surface, np.tile(direction, (surface.n, 1)))
-    slope = _reaction_slope(surface, share[:, None] * (direction - freed))
-    some = np.flatnonzero(halves.any(axis=1))
-    along = np.einsum("es,esd->ed", halves[some], (direction - freed)[ends[some, ::-1]])
-    sides, slopes = pull_slopes(surface, ends[some], along)
-    stretch = sides.tension / sides.height * np.einsum("sd,sd->s", sides.out, along[sides.edge])[:, None]
-    longer = np.stack([0.0 * sides.tangent, -sides.tangent, sides.tangent], axis=1)
-    np.add.at(slope, sides.corners, sides.length[:, None] * slopes + stretch[:, None] * longer)
-    return slope
-
-
-def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
-    """(n,3) the derivative of Σ ⟨pull, f⟩ over the vertices, f = Σ α ∂A - ⅓ Σ p A_T ν_T the forces there.
-
-    A_T ν_T changes along u by (q - r) × u / 2 as the corner opposite the side q, r moves.
-    """
+    # of Σ ⟨pull, f⟩ with f = Σ α ∂A - ⅓ Σ p A_T ν_T; A_T ν_T changes along u by (q - r) × u / 2, as the
+    # corner opposite the side q, r moves
+    pull = share[:, None] * (direction - freed)
     X, F = surface.vertices, surface.faces
     none = dict.fromkeys((p.name for p in surface.patches), 0.0)
     weights = surface.retensioned(pressures=none, snows=none)
@@ -195,6 +183,12 @@ def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
     sixth = surface.net_pressures[surface.patch_of_face][:, None] / 6.0 * pull[F].sum(axis=1)
     for c in range(3):
         np.add.at(slope, F[:, c], -np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], sixth))
+    some = np.flatnonzero(halves.any(axis=1))
+    along = np.einsum("es,esd->ed", halves[some], (direction - freed)[ends[some, ::-1]])
+    sides, slopes = pull_slopes(surface, ends[some], along)
+    stretch = sides.tension / sides.height * np.einsum("sd,sd->s", sides.out, along[sides.edge])[:, None]
+    longer = np.stack([0.0 * sides.tangent, -sides.tangent, sides.tangent], axis=1)
+    np.add.at(slope, sides.corners, sides.length[:, None] * slopes + stretch[:, None] * longer)
     return slope
 
 

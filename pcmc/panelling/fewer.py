@@ -18,7 +18,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import compare, worst_quality
@@ -223,7 +223,17 @@ class _Search:
         surface = self.best
         part = standing_part(surface)
         space = motion_space(part.surface, part.classes, X)
-        frame, damping = self._frames(space.basis, space.dimension, part.resting | part.walls.held)
+        # the directions (n,3,3) in which each vertex may move, rows, zero for none; their damping (n,3)
+        basis, dimension = space.basis, space.dimension
+        free = self.start.free & ~(part.resting | part.walls.held)
+        frame, damping = np.zeros_like(basis), np.full((*dimension.shape, 3), STIFF)
+        sheet, curve = free & (dimension == 1), free & (dimension == 2)
+        frame[sheet, 0], frame[sheet, 1] = perpendicular(basis[sheet, 0])
+        frame[curve, 0] = np.cross(basis[curve, 0], basis[curve, 1])
+        damping[sheet, :2] = damping[curve, :1] = DAMPING
+        if not self.at_rest:
+            frame[sheet, 2] = basis[sheet, 0]
+            frame[curve, 1:] = basis[curve, :2]
         unit = edges[face, side] / lengths[face, side][:, None]
         tail, head = self.faces[face, (side + 1) % 3], self.faces[face, (side + 2) % 3]
         towards = np.einsum("ej,ekj->ek", unit, frame[head]), -np.einsum("ej,ekj->ek", unit, frame[tail])
@@ -243,16 +253,3 @@ class _Search:
                 return Y
             share *= 0.5
         return None
-
-    def _frames(self, basis: Floats, dimension: Ints, held: Bools) -> tuple[Floats, Floats]:
-        """The directions (n,3,3) in which each vertex may move, rows, zero for none; their damping (n,3)."""
-        free = self.start.free & ~held
-        frame, damping = np.zeros_like(basis), np.full((*dimension.shape, 3), STIFF)
-        sheet, curve = free & (dimension == 1), free & (dimension == 2)
-        frame[sheet, 0], frame[sheet, 1] = perpendicular(basis[sheet, 0])
-        frame[curve, 0] = np.cross(basis[curve, 0], basis[curve, 1])
-        damping[sheet, :2] = damping[curve, :1] = DAMPING
-        if not self.at_rest:
-            frame[sheet, 2] = basis[sheet, 0]
-            frame[curve, 1:] = basis[curve, :2]
-        return frame, damping
