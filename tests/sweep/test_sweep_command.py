@@ -127,6 +127,19 @@ def test_the_store_of_another_project_is_refused_and_kept(roof, capsys):
     assert (roof.parent / "s.sqlite").read_bytes() == kept
 
 
+def test_the_store_of_a_generator_that_has_changed_is_refused(roof, capsys, monkeypatch):
+    code = "import generators\ndef hall(alpha):\n    return generators.two_squares({}, alpha_aux=alpha)\n"
+    module = roof.with_name("own_hall.py")
+    module.write_text(code.format(2))
+    monkeypatch.syspath_prepend(roof.parent)
+    given = ["sweep", "own_hall:hall", "alpha=1,0.5", "--store", "s.sqlite", "--workers", "1"]
+    assert cli.main(given) == 0
+    module.write_text(code.format(3))
+    capsys.readouterr()
+    assert cli.main(given) == 2
+    assert "s.sqlite: written for another sweep (its fixed 'generator_digest' is " in capsys.readouterr().err
+
+
 def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch):
     monkeypatch.setattr("pcmc.sweep.running._batches", lambda *_: iter(()))
     given = ["sweep", "roof.toml", *GRID[:1], "--csv", "t.csv", "--workers", "1"]
