@@ -24,17 +24,18 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..certificate.forces import Forces, held_boundary
-from ..certificate.measures import MEASURES, largest_pull
-from ..certificate.tables import names_of
+from ..certificate.measures import MEASURES, largest_pull, pull_slopes
+from ..certificate.supports import boundary_shares
 from ..forces.functional import energy_and_gradient
 from ..meshing.curve_cutting import limit_growth, triangles_for
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from ..surface import Surface
-from ..surface.geometry import face_areas
+from ..surface.geometry import face_areas, segment_lengths
+from ..surface.supports import apply_supports
 from .quantities import summit
 
 GROWTH = 1.5  # of neighbouring edges
@@ -158,31 +159,23 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
         return slope
     if quantity in ("area", "volume"):
         return MEASURES[quantity].measure(surface, of or None).by_position
-    acting, vertices = Forces.of(surface), _held_vertices(surface, of)
+    acting = Forces.of(surface)
+    share, edges = boundary_shares(acting, of.split(" near (")[0])
     if quantity == "reaction per length":
-        inside = np.isin(surface.topology.edges, vertices).all(axis=1)
-        return largest_pull(acting, inside & acting.along_patch(None)).by_position
-    pull = np.zeros_like(surface.vertices)
-    pull[vertices] = surface.plane.normal
+        own = np.isin(np.arange(len(surface.topology.edges)), edges)
+        return largest_pull(acting, own & acting.along_patch(None)).by_position
+    # at its ends a curve has half the pulls on its own edges, and its share of the rest
+    ends, size = surface.topology.edges, segment_lengths(surface.vertices, surface.topology.sides)
+    halves = 0.5 * (np.isin(np.arange(len(ends)), edges)[:, None] - share[ends])
+    halves[~held_boundary(surface)] = 0.0
+    direction = np.array(surface.plane.normal)
     if quantity == "thrust":
-        total = surface.plane.along(acting.along[vertices].sum(axis=0))
-        pull[vertices] = total / (np.linalg.norm(total) or 1.0)
-    return _reaction_slope(surface, pull)
-
-
-def _held_vertices(surface: Surface, of: str) -> Ints:
-    """The vertices of the held boundary, or of its curves with the name of a patch."""
-    topo, patch = surface.topology, of.split(" near (")[0]
-    held = np.unique(topo.edges[held_boundary(surface)])
-    curves = [c.vertices for c in topo.boundary_loops if names_of(surface, c.sheets) == patch]
-    return np.intersect1d(held, np.concatenate(curves)) if curves else held
-
-
-def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
-    """(n,3) the derivative of Σ ⟨pull, f⟩ over the vertices, f = Σ α ∂A - ⅓ Σ p A_T ν_T the forces there.
-
-    A_T ν_T changes along u by (q - r) × u / 2 as the corner opposite the side q, r moves.
-    """
+        force = share @ acting.along + (halves.sum(axis=1) * size) @ acting.pulls
+        direction = surface.plane.along(force) / (np.linalg.norm(surface.plane.along(force)) or 1.0)
+    freed = apply_supports(surface, np.tile(direction, (surface.n, 1)))
+    # of Σ ⟨pull, f⟩ with f = Σ α ∂A - ⅓ Σ p A_T ν_T; A_T ν_T changes along u by (q - r) × u / 2, as the
+    # corner opposite the side q, r moves
+    pull = share[:, None] * (direction - freed)
     X, F = surface.vertices, surface.faces
     none = dict.fromkeys((p.name for p in surface.patches), 0.0)
     weights = surface.retensioned(pressures=none, snows=none)
@@ -190,6 +183,12 @@ def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
     sixth = surface.net_pressures[surface.patch_of_face][:, None] / 6.0 * pull[F].sum(axis=1)
     for c in range(3):
         np.add.at(slope, F[:, c], -np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], sixth))
+    some = np.flatnonzero(halves.any(axis=1))
+    along = np.einsum("es,esd->ed", halves[some], (direction - freed)[ends[some, ::-1]])
+    sides, slopes = pull_slopes(surface, ends[some], along)
+    stretch = sides.tension / sides.height * np.einsum("sd,sd->s", sides.out, along[sides.edge])[:, None]
+    longer = np.stack([0.0 * sides.tangent, -sides.tangent, sides.tangent], axis=1)
+    np.add.at(slope, sides.corners, sides.length[:, None] * slopes + stretch[:, None] * longer)
     return slope
 
 

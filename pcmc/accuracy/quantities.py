@@ -154,7 +154,14 @@ def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float
         along = step[0, :2] - step[1, :2]
         along /= np.linalg.norm(along) or 1.0
         step = np.column_stack([step[:, :2] @ along, np.zeros(2), step[:, 2]])
-    return value, rounding, value + side * _rise(step * [1.0, 1.0, side])
+    # how far the top of the paraboloid through 0 and these points is above 0
+    x, y, z = (step * [1.0, 1.0, side]).T
+    a, b, xx, xy, yy = np.linalg.lstsq(np.column_stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), z)[0]
+    slope, bend = np.array([a, b]), np.array([[xx, xy], [xy, yy]])
+    place = -np.linalg.pinv(bend) @ slope
+    rise = 0.5 * float(slope @ place)
+    near = np.linalg.norm(place) <= np.linalg.norm(step[:, :2], axis=1).max()
+    return value, rounding, value + side * (rise if near and rise > 0.0 else 0.0)
 
 
 def summit(surface: Surface, patch: int) -> tuple[int, float]:
@@ -164,14 +171,3 @@ def summit(surface: Surface, patch: int) -> tuple[int, float]:
     height = surface.plane.height(surface.vertices[vertices])
     side = 1.0 if height.max() > ON * surface.size else -1.0
     return int(vertices[(side * height).argmax()]), side
-
-
-def _rise(step: Floats) -> float:
-    """How far the top of a paraboloid through 0 and the points ``step`` (k,3) is above 0; 0 without one."""
-    x, y, z = step.T
-    a, b, xx, xy, yy = np.linalg.lstsq(np.column_stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), z)[0]
-    slope, bend = np.array([a, b]), np.array([[xx, xy], [xy, yy]])
-    place = -np.linalg.pinv(bend) @ slope
-    rise = 0.5 * float(slope @ place)
-    near = np.linalg.norm(place) <= np.linalg.norm(step[:, :2], axis=1).max()
-    return rise if near and rise > 0.0 else 0.0

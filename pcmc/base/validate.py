@@ -109,10 +109,10 @@ def flag(name: str, value: object) -> bool:
     return value
 
 
-def vector(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tuple[float, float, float]:
+def triple(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tuple[float, float, float]:
     """Three finite numbers.
 
-    >>> vector("normal", [0, 0, 1])
+    >>> triple("normal", [0, 0, 1])
     (0.0, 0.0, 1.0)
     """
     try:
@@ -138,7 +138,7 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
     return str(value)
 
 
-def build(kind: type[Options], method: str, given: dict[str, Any]) -> Options:
+def options_from(kind: type[Options], method: str, given: dict[str, Any]) -> Options:
     """The options dataclass of a method from keyword arguments."""
     names = [f.name for f in fields(kind)]
     for name in given:

@@ -50,7 +50,7 @@ def times(a: Ball, b: Ball) -> Ball:
 
 
 @inlined
-def inverse(a: Ball) -> Ball:
+def reciprocal(a: Ball) -> Ball:
     """1 / a; a radius of infinity where zero is not far enough."""
     size, value = abs(a[0]), 1.0 / a[0] if a[0] != 0.0 else 0.0
     if not a[1] <= 0.5 * size or size < 1e-150:
@@ -59,7 +59,7 @@ def inverse(a: Ball) -> Ball:
 
 
 @inlined
-def root(a: Ball) -> Ball:
+def square_root(a: Ball) -> Ball:
     """√a; a radius of infinity where a is not surely positive."""
     if not a[1] <= 0.5 * a[0]:
         return 0.0, inf
@@ -79,27 +79,27 @@ def of(a: Vector) -> Balls:
 
 
 @inlined
-def add(a: Balls, b: Balls) -> Balls:
+def plus3(a: Balls, b: Balls) -> Balls:
     return plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2])
 
 
 @inlined
-def sub(a: Balls, b: Balls) -> Balls:
+def minus3(a: Balls, b: Balls) -> Balls:
     return minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2])
 
 
 @inlined
-def scaled(s: Ball, a: Balls) -> Balls:
+def times3(s: Ball, a: Balls) -> Balls:
     return times(s, a[0]), times(s, a[1]), times(s, a[2])
 
 
 @inlined
-def dot(a: Balls, b: Balls) -> Ball:
+def dot3(a: Balls, b: Balls) -> Ball:
     return plus(plus(times(a[0], b[0]), times(a[1], b[1])), times(a[2], b[2]))
 
 
 @inlined
-def cross(a: Balls, b: Balls) -> Balls:
+def cross3(a: Balls, b: Balls) -> Balls:
     return (
         minus(times(a[1], b[2]), times(a[2], b[1])),
         minus(times(a[2], b[0]), times(a[0], b[2])),

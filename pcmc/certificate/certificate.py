@@ -30,6 +30,7 @@ from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.topology import SHEET
 from . import tables
 from .balance import load_ratio, pressures_left_over
+from .crossings import crossing_table, crossing_texts
 from .forces import Forces, along_normal
 from .proof import Attempt, Proof
 from .supports import FORCE, MOMENT, balance_sentence, balance_table, boundary_view, pull_table, support_table
@@ -79,7 +80,7 @@ class Certificate:
         *("verdict", "detail", "residual", "scale", "energy", "volume", "index", "eigenvalues", "modes"),
         *("curvature_error", "quality", "walls_quality", "patches", "junctions", "load", "support"),
         *("pinched", "load_ratio", "proofs", "tried", "cables", "cable_ends", "rooms", "symmetric_in"),
-        *("leaning", "supports", "balance", "reactions"),
+        *("leaning", "crossings", "supports", "balance", "reactions"),
     )
 
     @cached_property
@@ -154,6 +155,17 @@ class Certificate:
     def leaning(self) -> pd.DataFrame:
         """A row per wall: its largest angle from the vertical of Π, degrees, and the place."""
         return tables.lean_table(self.acting.standing)
+
+    @cached_property
+    def crossings(self) -> pd.DataFrame:
+        """A row per two patches that cut each other, or one that cuts itself, as an equilibrium may; see
+        ``pcmc.certificate.crossings.crossing_table``."""
+        return crossing_table(self.acting.standing)
+
+    @property
+    def cuts_itself(self) -> str:
+        """Where the surface cuts itself; empty where it does not."""
+        return "; ".join(crossing_texts(self.crossings, self.acting.surface.size))
 
     @cached_property
     def supports(self) -> pd.DataFrame:
@@ -236,6 +248,7 @@ class Certificate:
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
             ("walls lean", ", ".join(tables.lean_texts(self.leaning, self.acting.surface.size))),
+            ("cuts itself", self.cuts_itself),
             ("load over capacity", f"{self.load_ratio:.3f}"),
             ("load, reactions", ", ".join(f"{x:.6g}{force}" for x in sums) + " along the plane's normal"),
             ("balance", balance_sentence(self.balance, self.symmetric_in)),

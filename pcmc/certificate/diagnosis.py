@@ -28,10 +28,15 @@ class Neck:
 
     girth: float  # its length
     place: Floats  # (3,) its middle
-    ratio: float  # girth over the length of the shorter of the two curves
+    curve: float  # length of the shorter of the two curves
+
+    @property
+    def ratio(self) -> float:
+        """The girth over that length."""
+        return self.girth / self.curve
 
     def __str__(self) -> str:
-        place = point_text(self.place, self.girth / self.ratio)
+        place = point_text(self.place, self.curve)
         around = f"{self.girth:.2g} around, {self.ratio:.2g} of the shorter curve that holds it"
         return f"a neck pinches off near {place}: {around}"
 
@@ -93,7 +98,8 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
 
 
 def _cut(surface: Surface, groups: Ints, lengths: Floats, number: int) -> Neck | None:
-    """The shortest cut between one held curve and the others on its part; None if all only slide."""
+    """The shortest cut between one held curve and the others on its part; None if all only slide, or if no
+    edge joins them."""
     topo, X = surface.topology, surface.vertices
     source = groups == number
     others = (groups >= 0) & ~source & np.isin(topo.components, topo.components[source])
@@ -103,9 +109,11 @@ def _cut(surface: Surface, groups: Ints, lengths: Floats, number: int) -> Neck |
         return None
     inner = np.flatnonzero(topo.valence > 1)
     cut = inner[_minimal_cut(topo.edge_of_face, inner, segment_lengths(X, topo.sides[inner]), starts, ends)]
+    if not len(cut):  # the parts share vertices, but no edge
+        return None
     girth = segment_lengths(X, topo.sides[cut])
     place = (girth @ X[topo.sides[cut]].mean(axis=1)) / (girth.sum() or 1.0)
-    return Neck(float(girth.sum()), place, float(girth.sum()) / shorter)
+    return Neck(float(girth.sum()), place, shorter)
 
 
 def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints, ends: Ints) -> Bools:

@@ -99,44 +99,44 @@ def _triangle(items: MeshArrays, f: int) -> tuple[Balls, Balls, Balls]:
 @inlined
 def _bent(items: MeshArrays, f: int, a: Balls, b: Balls, c: Balls) -> tuple[Ball, Ball, Ball, Balls]:
     """2A, 1/(2A), τ and ν of triangle f with the corners a, b, c."""
-    area_vector = balls.cross(balls.sub(b, a), balls.sub(c, a))
-    twice = balls.root(balls.dot(area_vector, area_vector))
-    one = balls.inverse(twice)
+    area_vector = balls.cross3(balls.minus3(b, a), balls.minus3(c, a))
+    twice = balls.square_root(balls.dot3(area_vector, area_vector))
+    one = balls.reciprocal(twice)
     tension = exact(items.tension[f])
     if items.weight[f] != 0.0:
         P, n = balls.of(vector(items.point)), balls.of(vector(items.normal))
-        third = balls.times(exact(items.weight[f]), balls.inverse(exact(3.0)))
-        away = balls.add(balls.add(balls.sub(a, P), balls.sub(b, P)), balls.sub(c, P))
-        tension = plus(tension, times(third, balls.dot(away, n)))
-    return twice, one, tension, balls.scaled(one, area_vector)
+        third = times(exact(items.weight[f]), balls.reciprocal(exact(3.0)))
+        away = balls.plus3(balls.plus3(balls.minus3(a, P), balls.minus3(b, P)), balls.minus3(c, P))
+        tension = plus(tension, times(third, balls.dot3(away, n)))
+    return twice, one, tension, balls.times3(one, area_vector)
 
 
 @compiled
 def _add_forces(items: MeshArrays, value: Floats, radius: Floats) -> None:
     F, n, half = items.faces, balls.of(vector(items.normal)), exact(0.5)
     origin = balls.of(vector(items.origin))
-    sixth = balls.inverse(exact(6.0))
+    sixth = balls.reciprocal(exact(6.0))
     for f in range(len(F)):
         x = _triangle(items, f)
-        y = (balls.sub(x[0], origin), balls.sub(x[1], origin), balls.sub(x[2], origin))
+        y = (balls.minus3(x[0], origin), balls.minus3(x[1], origin), balls.minus3(x[2], origin))
         press = times(exact(items.pressure[f]), sixth)
         pulls = items.tension[f] != 0.0 or items.weight[f] != 0.0
         if pulls:
             twice, _, tension, nu = _bent(items, f, x[0], x[1], x[2])
-            half_nu = balls.scaled(times(half, tension), nu)
-            down = balls.scaled(times(times(exact(items.weight[f]), sixth), twice), n)
+            half_nu = balls.times3(times(half, tension), nu)
+            down = balls.times3(times(times(exact(items.weight[f]), sixth), twice), n)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            force = balls.scaled(press, balls.cross(y[k], y[j]))
+            force = balls.times3(press, balls.cross3(y[k], y[j]))
             if pulls:
-                force = balls.add(force, balls.add(balls.cross(half_nu, balls.sub(x[k], x[j])), down))
+                force = balls.plus3(force, balls.plus3(balls.cross3(half_nu, balls.minus3(x[k], x[j])), down))
             for d in range(3):
                 gather(value[F[f, i]], radius[F[f, i]], d, force[d])
     for e in range(len(items.ends)):
         i, j = items.ends[e, 0], items.ends[e, 1]
-        side = balls.sub(balls.row(items.X, j), balls.row(items.X, i))
-        one = balls.inverse(balls.root(balls.dot(side, side)))
-        force = balls.scaled(times(exact(items.pull[e]), one), side)
+        side = balls.minus3(balls.row(items.X, j), balls.row(items.X, i))
+        one = balls.reciprocal(balls.square_root(balls.dot3(side, side)))
+        force = balls.times3(times(exact(items.pull[e]), one), side)
         for d in range(3):
             gather(value[j], radius[j], d, force[d])
             gather(value[i], radius[i], d, (-force[d][0], force[d][1]))
@@ -151,7 +151,7 @@ def coordinates(space: MotionSpace, value: Floats, radius: Floats) -> tuple[Floa
         force = ((x[0], r[0]), (x[1], r[1]), (x[2], r[2]))
         for c in range(space.dimension[v]):
             at = space.start[v] + c
-            out[at], error[at] = balls.dot(balls.row(space.basis[v], c), force)
+            out[at], error[at] = balls.dot3(balls.row(space.basis[v], c), force)
     return out, error
 
 
@@ -161,38 +161,39 @@ def second_variation(items: MeshArrays, space: MotionSpace, pattern: Pattern) ->
     value, radius = np.zeros(len(pattern.indices)), np.zeros(len(pattern.indices))
     F, dimension, half = items.faces, np.append(space.dimension, np.zeros(len(items.X), np.int64)), exact(0.5)
     origin, n = balls.of(vector(items.origin)), balls.of(vector(items.normal))
-    sixth, third = balls.inverse(exact(6.0)), balls.inverse(exact(3.0))
+    sixth, third = balls.reciprocal(exact(6.0)), balls.reciprocal(exact(3.0))
     for f in range(len(F)):
         x = _triangle(items, f)
-        edge = (balls.sub(x[2], x[1]), balls.sub(x[0], x[2]), balls.sub(x[1], x[0]))
+        edge = (balls.minus3(x[2], x[1]), balls.minus3(x[0], x[2]), balls.minus3(x[1], x[0]))
         press, heavy = times(exact(items.pressure[f]), sixth), times(exact(items.weight[f]), third)
         pulls = items.tension[f] != 0.0 or items.weight[f] != 0.0
         bend, nu, half_nu = exact(0.0), edge[0], edge[0]
         if pulls:
             _, one, tension, nu = _bent(items, f, x[0], x[1], x[2])
-            half_nu = balls.scaled(times(half, tension), nu)
+            half_nu = balls.times3(times(half, tension), nu)
             bend = times(half, times(tension, one))
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             v, w = F[f, i], F[f, j]
-            q = balls.scaled(press, balls.sub(x[k], origin))
+            q = balls.times3(press, balls.minus3(x[k], origin))
             if pulls:
-                q = balls.sub(q, half_nu)
-            along, across = times(bend, balls.dot(edge[i], edge[i])), times(bend, balls.dot(edge[i], edge[j]))
+                q = balls.minus3(q, half_nu)
+            along = times(bend, balls.dot3(edge[i], edge[i]))
+            across = times(bend, balls.dot3(edge[i], edge[j]))
             for r in range(dimension[v]):
                 b = balls.row(space.basis[v], r)
-                lean = balls.dot(b, nu) if pulls else exact(0.0)
+                lean = balls.dot3(b, nu) if pulls else exact(0.0)
                 for s in range(r, dimension[v]):
                     c = balls.row(space.basis[v], s)
-                    entry = times(times(along, lean), balls.dot(c, nu)) if pulls else exact(0.0)
+                    entry = times(times(along, lean), balls.dot3(c, nu)) if pulls else exact(0.0)
                     if heavy[0] != 0.0:
                         entry = plus(entry, times(heavy, _slope(b, c, nu, edge[i], edge[i], n)))
                     gather(value, radius, row_place(space, pattern, v, r) + s, entry)
                 for s in range(dimension[w]):
                     c = balls.row(space.basis[w], s)
-                    entry = balls.dot(q, balls.cross(c, b))
+                    entry = balls.dot3(q, balls.cross3(c, b))
                     if pulls:
-                        entry = plus(entry, times(times(across, lean), balls.dot(c, nu)))
+                        entry = plus(entry, times(times(across, lean), balls.dot3(c, nu)))
                     if heavy[0] != 0.0:
                         entry = plus(entry, times(heavy, _slope(b, c, nu, edge[i], edge[j], n)))
                     at = pair_place(space, pattern, v, r, w, s, items.offset[f, i])
@@ -204,8 +205,8 @@ def second_variation(items: MeshArrays, space: MotionSpace, pattern: Pattern) ->
 @inlined
 def _slope(b: Balls, c: Balls, nu: Balls, e_i: Balls, e_j: Balls, n: Balls) -> Ball:
     """⟨b, g_i⟩⟨n, c⟩ + ⟨b, n⟩⟨g_j, c⟩, g = ½ ν × e."""
-    first = times(balls.dot(b, balls.cross(nu, e_i)), balls.dot(n, c))
-    return times(exact(0.5), plus(first, times(balls.dot(c, balls.cross(nu, e_j)), balls.dot(b, n))))
+    first = times(balls.dot3(b, balls.cross3(nu, e_i)), balls.dot3(n, c))
+    return times(exact(0.5), plus(first, times(balls.dot3(c, balls.cross3(nu, e_j)), balls.dot3(b, n))))
 
 
 @compiled
@@ -215,9 +216,9 @@ def _add_cables(
     dimension, start, indptr = space.dimension, space.start, pattern.indptr
     for e in range(len(items.ends)):
         i, j = min(items.ends[e, 0], items.ends[e, 1]), max(items.ends[e, 0], items.ends[e, 1])
-        side = balls.sub(balls.row(items.X, j), balls.row(items.X, i))
-        one = balls.inverse(balls.root(balls.dot(side, side)))
-        t, stiff = balls.scaled(one, side), times(exact(items.pull[e]), one)
+        side = balls.minus3(balls.row(items.X, j), balls.row(items.X, i))
+        one = balls.reciprocal(balls.square_root(balls.dot3(side, side)))
+        t, stiff = balls.times3(one, side), times(exact(items.pull[e]), one)
         for v, w, sign in ((i, i, 1.0), (j, j, 1.0), (i, j, -1.0)):
             for r in range(dimension[v]):
                 at = row_place(space, pattern, v, r)
@@ -227,12 +228,12 @@ def _add_cables(
                 b = balls.row(space.basis[v], r)
                 for s in range(r if v == w else 0, dimension[w]):
                     c = balls.row(space.basis[w], s)
-                    turn = minus(balls.dot(b, c), times(balls.dot(b, t), balls.dot(c, t)))
+                    turn = minus(balls.dot3(b, c), times(balls.dot3(b, t), balls.dot3(c, t)))
                     entry = times(stiff, turn)
                     gather(value, radius, at + s, (sign * entry[0], entry[1]))
 
 
-def volume(items: MeshArrays, signs: Floats, patch_of_end: Ints) -> tuple[Floats, Floats]:
+def signed_volumes(items: MeshArrays, signs: Floats, patch_of_end: Ints) -> tuple[Floats, Floats]:
     """(r,) Σ s_i V_i for each row of signs (r,k), flat pieces included, and its radius."""
     value, radius = np.zeros(len(signs)), np.zeros(len(signs))
     for r, row in enumerate(signs):
@@ -242,13 +243,13 @@ def volume(items: MeshArrays, signs: Floats, patch_of_end: Ints) -> tuple[Floats
 
 @compiled
 def _add_volume(items: MeshArrays, sign: Floats, end_sign: Floats, value: Floats, radius: Floats) -> None:
-    origin, sixth = balls.of(vector(items.origin)), balls.inverse(exact(6.0))
+    origin, sixth = balls.of(vector(items.origin)), balls.reciprocal(exact(6.0))
     for f in range(len(items.faces)):
         if sign[f] != 0.0:
             x = _triangle(items, f)
-            y = (balls.sub(x[0], origin), balls.sub(x[1], origin), balls.sub(x[2], origin))
-            cone = times(sixth, balls.dot(y[0], balls.cross(y[1], y[2])))
+            y = (balls.minus3(x[0], origin), balls.minus3(x[1], origin), balls.minus3(x[2], origin))
+            cone = times(sixth, balls.dot3(y[0], balls.cross3(y[1], y[2])))
             gather(value, radius, 0, times(exact(sign[f]), cone))
     for e in range(len(items.corner)):
-        v = balls.sub(balls.row(items.X, items.corner[e]), origin)
-        gather(value, radius, 0, times(exact(end_sign[e]), balls.dot(v, balls.row(items.push, e))))
+        v = balls.minus3(balls.row(items.X, items.corner[e]), origin)
+        gather(value, radius, 0, times(exact(end_sign[e]), balls.dot3(v, balls.row(items.push, e))))

@@ -24,7 +24,7 @@ from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
 from ..forces.pinching import standing_part
-from ..forces.triangles import add_weights, measure
+from ..forces.triangles import add_weights, totals_and_gradient
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import segment_lengths
@@ -59,7 +59,7 @@ def load_places(surface: Surface) -> Floats:
 
 
 @kept_with_owner
-def load(surface: Surface) -> float:
+def total_load(surface: Surface) -> float:
     """The force of pressure, snow and weight along Π's normal."""
     return along_normal(surface, loads(surface))
 
@@ -71,7 +71,7 @@ def along_normal(surface: Surface, forces: Floats) -> float:
     return total if abs(total) > FORCE_ROUNDING * float(np.abs(parts).sum()) else 0.0
 
 
-def reactions(surface: Surface) -> Floats:
+def support_forces(surface: Surface) -> Floats:
     """(n,3) forces of the supports: the whole force where fixed, its part normal to the plane where sliding.
 
     In a mirror plane this part is the pull of the image. The force of tension is -Σ α ∂A, that of pressure
@@ -79,7 +79,7 @@ def reactions(surface: Surface) -> Floats:
     cone to the point of Π, whose side is under no pressure.
     """
     X, mesh = surface.vertices, energy_mesh(surface)
-    tension = measure(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
+    tension = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
     cable, weight, pressure = np.zeros((3, *X.shape))
     add_values(cables.elements(surface, X), cable)
     add_values(cable_weights.elements(surface, X), weight)
@@ -133,7 +133,7 @@ class Forces:
         ([-1.0, 1.0], [0.0, 1.0, 0.0])
         """
         standing = standing_part(surface).surface if standing is None else standing
-        forces = reactions(standing) if given is None else given
+        forces = support_forces(standing) if given is None else given
         topo, cables = surface.topology, cable_ends(standing) if at_ends is None else at_ends
         ends = np.zeros_like(forces)
         for _, vertex, force in cables:

@@ -159,34 +159,40 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
 
 
 def largest_pull(acting: Forces, edges: Bools) -> Measurement:
-    """The largest pull along some of the edges (e,) of a surface, force/length.
-
-    A side from a to b of length L, with the unit tangent t, has in a triangle of normal ν the co-normal n;
-    the foot of its corner c, at the distance h, is s of the way along. While the corners move by d,
-
-        dn = -⟨n, d_b - d_a⟩/L t + ⟨ν, (1 - s) d_a + s d_b - d_c⟩/h ν.
-    """
+    """The largest pull along some of the edges (e,) of a surface, force/length."""
     surface, numbers = acting.standing, np.flatnonzero(edges)
-    pulls = acting.pulls[numbers]
+    pulls, patches = acting.pulls[numbers], len(surface.patches)
     sizes = np.linalg.norm(pulls, axis=1)
-    up, patches = np.array(surface.plane.normal), len(surface.patches)
 
     def branches(near: Ints) -> Branches:
-        s = SheetSides.at(surface, acting.surface.topology.edges[numbers[near]])
-        pull = (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near][s.edge]
-        normal = s.out / s.height
-        turn, tilt = s.tension * _dot(pull, s.tangent) / s.length * normal, np.cross(s.tangent, normal)
-        tilt = s.tension * _dot(pull, tilt) / s.height * tilt
-        rise, foot = 0.5 * surface.weights[s.patch, None] * _dot(pull, normal) * up, s.foot / s.length
-        slopes = np.stack([-tilt, turn + (1.0 - foot) * tilt + rise, foot * tilt - turn + rise], axis=1)
-        sheet, one = Branches.of(s.corners, slopes, surface.n).by_position, np.arange(len(pull))
-        together = csr_array((np.ones(len(pull)), (s.edge, one)), shape=(len(near), len(pull)))
-        along = csr_array((_dot(pull, normal)[:, 0], (one, s.patch)), shape=(len(pull), patches))
+        ends = acting.surface.topology.edges[numbers[near]]
+        unit = (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near]
+        s, slopes = pull_slopes(surface, ends, unit)
+        sheet, one = Branches.of(s.corners, slopes, surface.n).by_position, np.arange(len(s.edge))
+        together = csr_array((np.ones(len(one)), (s.edge, one)), shape=(len(near), len(one)))
+        along = csr_array((_dot(unit[s.edge], s.out / s.height)[:, 0], (one, s.patch)), (len(one), patches))
         raised = csr_array(along.multiply(s.z))
         by = {kind: (together @ m).toarray() for kind, m in (("tensions", along), ("weights", raised))}
         return Branches(csr_array(together @ sheet), by)
 
     return largest(sizes, float(surface.tensions.max()), branches)
+
+
+def pull_slopes(surface: Surface, ends: Ints, along: Floats) -> tuple[SheetSides, Floats]:
+    """The sides at edges, and the derivatives (s,3,3) of their pulls ⟨(α + w z) n, u⟩ by the corners c, a, b.
+
+    The edges are given by their ends (k,2), each with a vector u (k,3). A side from a to b of length L, with
+    the unit tangent t, has in a triangle of normal ν the co-normal n; the foot of its corner c, at the
+    distance h, is s of the way along. While the corners move by d,
+
+        dn = -⟨n, d_b - d_a⟩/L t + ⟨ν, (1 - s) d_a + s d_b - d_c⟩/h ν.
+    """
+    s, up = SheetSides.at(surface, ends), np.array(surface.plane.normal)
+    u, normal, foot = along[s.edge], s.out / s.height, s.foot / s.length
+    turn, tilt = s.tension * _dot(u, s.tangent) / s.length * normal, np.cross(s.tangent, normal)
+    tilt = s.tension * _dot(u, tilt) / s.height * tilt
+    rise = 0.5 * surface.weights[s.patch, None] * _dot(u, normal) * up
+    return s, np.stack([-tilt, turn + (1.0 - foot) * tilt + rise, foot * tilt - turn + rise], axis=1)
 
 
 def _dot(u: Floats, v: Floats) -> Floats:

@@ -100,6 +100,21 @@ def support_vertices(acting: Forces) -> dict[str, Ints]:
     return {part.label: part.vertices for part in _labelled(acting)}
 
 
+def boundary_shares(acting: Forces, name: str) -> tuple[Floats, Ints]:
+    """(n,) what the held boundary with a name takes of the forces that it shares, and its edges (j,).
+
+    With the share s the table's force is Σ s f + Σ ½ L (δ - s) q over the vertices, and over the ends of the
+    edges of length L under the pulls q; δ is 1 on its own edges. Without that name it is the whole boundary.
+    """
+    parts, taken = next(_sources(acting)).parts, np.zeros((2, acting.surface.n))
+    chosen = [part for part in parts if part.name == name] or parts
+    for row, some in enumerate((chosen, parts)):
+        for part in some:
+            taken[row, part.vertices] += _weights(acting, part)
+    share = np.divide(taken[0], taken[1], out=np.zeros(acting.surface.n), where=taken[1] > 0.0)
+    return share, np.concatenate([NONE, *(part.edges for part in chosen)])
+
+
 def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
     """The rows of a table of supports that are as long as a curve, as ``Certificate.boundaries`` has them."""
     names = {"name": "boundary"} | {f"force_{c}": f"reaction_{c}" for c in "xyz"}

@@ -31,7 +31,7 @@ from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.pinching import StandingPart
 from ..forces.rooms import closing_volumes, prescribed_volumes
 from .balls import SAFE, U
-from .enclosures import MeshArrays, coordinates, forces, mesh_arrays, second_variation, volume
+from .enclosures import MeshArrays, coordinates, forces, mesh_arrays, second_variation, signed_volumes
 from .lipschitz import lipschitz
 
 CUBIC = 1.0 / np.sqrt(27.0)  # |det(d_0, d_1, d_2)| ≤ this times |d|³
@@ -102,7 +102,7 @@ def system(part: StandingPart, space: MotionSpace, rigid: Floats) -> System:
             form, form_error = second_variation(room, space, pattern)
             forms.append(scale * _norm(pattern, np.abs(form) + form_error))
         coupling = float(np.linalg.norm(forms) * SAFE)
-        found, off = volume(items, np.array(surface.room_signs), patch_of_end)
+        found, off = signed_volumes(items, np.array(surface.room_signs), patch_of_end)
         off += U * (np.abs(found) + 2.0 * np.abs(found + closing_volumes(surface)))
         found = found + closing_volumes(surface)
         lacking = scales * (prescribed_volumes(surface) - found)

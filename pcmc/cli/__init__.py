@@ -35,12 +35,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if own_process:
         signal.signal(signal.SIGINT, _exit)  # a library that is half imported may lose an exception
         gc.disable()  # until all is imported; what lives to the end is not worth searching
-    from .running import run
+    from .running import run_command
 
     try:
         if own_process:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        return run(sys.argv[1:] if arguments is None else list(arguments))
+        return run_command(sys.argv[1:] if arguments is None else list(arguments))
     except KeyboardInterrupt:
         return _stopped()
     finally:

@@ -11,7 +11,7 @@ from .arguments import with_groups
 from .building import draw_, panels_, report_, structure
 from .cutting import pattern
 from .files import cache_, convert, explore, plan, plot, repair_, schema
-from .finding import equilibria
+from .finding import equilibria_
 from .solving import certify_, remesh_, solve_, sweep
 
 app = typer.Typer(
@@ -58,7 +58,7 @@ for name, command, summary in (
     ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
     ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("report", report_, "Write a report with pictures, plan, verdict, forces and panels."),
-    ("equilibria", equilibria, "Search for all equilibria of a roof, and the barriers between them."),
+    ("equilibria", equilibria_, "Search for all equilibria of a roof, and the barriers between them."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),

@@ -87,7 +87,7 @@ def pattern(
     seen, files = arguments.parsed_view(view), output or []
     arguments.output_of(file, pattern=files, picture=picture, view=seen)
     with working() as progress:
-        project = arguments.load(file, units)
+        project = arguments.load_project(file, units)
         wanted, own = given.of(project.pattern), project.output
         own = replace(own, pattern=files, sheet=sheet or own.sheet)
         start = start_of(project)

@@ -11,7 +11,7 @@ from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
 from . import OK, arguments
-from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load, option, switch
+from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, count, load_project, option, switch
 from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
@@ -23,7 +23,7 @@ VERTICAL = "Vertical axis of the diagram: height, energy or volume."
 PICTURES, TABLE = (".png", ".svg", ".pdf"), ".csv"
 
 
-def equilibria(
+def equilibria_(
     *,
     file: Input,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
@@ -35,6 +35,7 @@ def equilibria(
     mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,
     what: Shown,
     units: FileUnits = "",
+    whole: Whole = False,
 ) -> int:
     """Search for all equilibria of a roof, stable or not, and for the energy barriers between them.
 
@@ -54,13 +55,16 @@ def equilibria(
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format
-    check_outputs(files, inputs=files_of(file))
+    numbered = [_numbered(path, k) for path in surfaces for k in range(1, 100)]  # as many as may be found
+    check_outputs([*files, *numbered], inputs=files_of(file))
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
-        roof = what.roof(load(file, units), progress, whole=False)
+        roof = what.roof(load_project(file, units), progress, whole)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}
-        found = find_equilibria(roof.surface, along or "pressure", callback=progress, span=ends, **options)
+        found = find_equilibria(
+            roof.shown.surface, along or "pressure", callback=progress, span=ends, **options
+        )
         jobs: list[Any] = []
         for path in files:
             if path.suffix.lower() in PICTURES:
@@ -70,10 +74,14 @@ def equilibria(
             else:
                 warn_of_members(roof, path.name)
                 for k, one in enumerate(found.found, 1):
-                    place = path.with_name(f"{path.stem}-{k}{path.suffix}")
-                    jobs += certified_files(one.surface, one.certificate, [place], roof.units)
+                    jobs += certified_files(one.surface, one.certificate, [_numbered(path, k)], roof.units)
         written = write_all(jobs, progress)
     print(found.text(roof.units))
     if written:
         print(f"written: {', '.join(map(str, written))}")
     return OK
+
+
+def _numbered(path: Path, number: int) -> Path:
+    """The file of an equilibrium."""
+    return path.with_name(f"{path.stem}-{number}{path.suffix}")

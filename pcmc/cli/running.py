@@ -7,8 +7,7 @@ import gc
 import os
 import sys
 import warnings
-from collections.abc import Callable
-from typing import Any
+from itertools import repeat
 
 from ..base import errors
 from ..base.errors import MissingExtra, PcmcError
@@ -23,7 +22,7 @@ TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types 
 PLAIN = str.maketrans(dict(zip(SIGNS, TYPED.split("|"), strict=True)))
 
 
-def run(arguments: list[str]) -> int:
+def run_command(arguments: list[str]) -> int:
     """Run the command; an error becomes one line on stderr; return the exit code."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -41,7 +40,16 @@ def run(arguments: list[str]) -> int:
 
 def _run(arguments: list[str]) -> int:
     try:
-        command = _command()
+        for library in ("typer", "rich"):
+            require(library, extra="cli")
+        import typer
+
+        from .app import app
+
+        if not gc.isenabled():  # ``main`` pauses it
+            gc.freeze()
+            gc.enable()
+        command = typer.main.get_command(app)
         arguments = ["--allow-uncertified" if one == "--anyway" else one for one in arguments]
         code = command(args=arguments or ["--help"], prog_name="pcmc", standalone_mode=False)
         if sys.stdout is not None:  # None if the shell closed it
@@ -75,26 +83,13 @@ def _run(arguments: list[str]) -> int:
         return BAD_INPUT
 
 
-def _command() -> Callable[..., Any]:
-    """The command line."""
-    for library in ("typer", "rich"):
-        require(library, extra="cli")
-    import typer
-
-    from .app import app
-
-    if not gc.isenabled():  # ``main`` pauses it
-        gc.freeze()
-        gc.enable()
-    return typer.main.get_command(app)
-
-
-def _plain(error: UnicodeError) -> tuple[str, int]:
-    """The letters that cannot be encoded, in ASCII, and where to go on."""
+def _plain(error: UnicodeError) -> tuple[bytes, int]:
+    """The letters that cannot be encoded, in ASCII, or the bytes of a file's name; and where to go on."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = error.object[error.start : error.end].translate(PLAIN)
-    return letters.encode("ascii", "backslashreplace").decode(), error.end
+    raw = ("surrogateescape" if "\udc80" <= one <= "\udcff" else "backslashreplace" for one in letters)
+    return b"".join(map(str.encode, letters, repeat("ascii"), raw)), error.end
 
 
 def _interrupted() -> int:

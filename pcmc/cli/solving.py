@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +16,7 @@ from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.libraries import require
 from ..io import FORMATS, READ_ONLY
+from ..project import Outcome, Project
 from ..project.drawn import files_of
 from ..project.file import with_rise
 from ..project.planning import proposal_text
@@ -37,7 +37,7 @@ from .arguments import (
     Whole,
     amount,
     count,
-    load,
+    load_project,
     named_values,
     option,
     output_of,
@@ -100,9 +100,14 @@ def solve_(
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
-    project = load(file, units).in_folder(file.parent if folder is None else folder)
+    project = load_project(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
+    if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
+        text = (
+            f"--folder: {file.name} writes nothing there by itself; name the files, as -o {folder}/roof.obj"
+        )
+        raise OptionError(text, what="--folder", found=str(folder))
     project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
@@ -123,14 +128,19 @@ def solve_(
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, progress, changed=loads.change, **how)
+    _print_solved(outcome, project, "--allow-uncertified to write it")
+    return OK if outcome.good else NOT_CERTIFIED
+
+
+def _print_solved(outcome: Outcome, project: Project, otherwise: str) -> None:
+    """Print a roof that was solved, and what its project wants to know; make the mesh check last."""
     reports.report(outcome)
     if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
-        print("nothing written (use --allow-uncertified to write it)")
+        print(f"nothing written (use {otherwise})")
     reports.mesh_check(outcome, brief=True)
     reports.margins(outcome)
-    return OK if outcome.good else NOT_CERTIFIED
 
 
 def certify_(
@@ -155,7 +165,7 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        roof = what.roof(load(file), progress, whole)
+        roof = what.roof(load_project(file), progress, whole)
         progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
@@ -164,8 +174,10 @@ def certify_(
     reports.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
+    if meshes is None and roof.project is not None and roof.project.mesh_check:
+        meshes = 3
     if meshes is not None and certificate.index is not None:
-        sys.stdout.flush()
+        print(end="", flush=True)
         with working() as progress:
             progress("checking the mesh")
             check = check_mesh(surface, meshes, corners=roof.corners)
@@ -192,10 +204,12 @@ def remesh_(
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
     written = output_of(file, files=output)
     with working() as progress:
-        project = replace(load(file, units), output=written)
+        project = load_project(file, units)
+        project = replace(project, output=replace(written, whole=project.output.whole))
         if solve:
-            project = replace(project, folder=file.parent, remeshing=(stage,))
-            outcome = projects.run_project(project, progress)
+            check = bool(project.mesh_check)
+            project = replace(project, folder=file.parent, remeshing=(stage,), mesh_check=check)
+            outcome = projects.run_project(project, progress, check_after=False)
         else:
             progress("remeshing")
             roof = projects.start_of(project)
@@ -206,9 +220,7 @@ def remesh_(
             print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
-    reports.report(outcome)
-    if not outcome.files:
-        print("nothing written (use --no-solve to write the new mesh)")
+    _print_solved(outcome, project, "--no-solve to write the new mesh")
     return OK if outcome.files else NOT_CERTIFIED
 
 
@@ -266,6 +278,8 @@ def sweep(
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
         require("pyarrow")
     check_names((), plot)
+    if retry_failed and store is None:
+        raise OptionError("--retry-failed: is of stored cases; name their --store", what="--retry-failed")
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
     options = {"mesh_check": mesh_check, "search": search}
@@ -304,7 +318,9 @@ def sweep(
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    good = table["verdict"].isin(["stable", "neutral"])
+    for wish in ("targets_met", "accuracy_reached"):
+        good &= table.get(wish, True)
     return OK if good.all() else NOT_CERTIFIED
 
 
@@ -312,6 +328,7 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
     """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
+    from ..sweep.solving import digest_of
 
     given: dict[str, list[Any]] = {}
     for name, listed in map(named_values, values):
@@ -327,4 +344,5 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
     about: dict[str, Any] = {name: True for name, wanted in options.items() if wanted}
-    return Sweep(solve_case, grid, about | {"generator": what, "method": method or "newton"} | fixed)
+    about |= {"generator": what, "generator_digest": digest_of(what), "method": method or "newton"}
+    return Sweep(solve_case, grid, about | fixed)

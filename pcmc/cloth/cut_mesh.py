@@ -82,17 +82,8 @@ class CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
         number = len(self.X) + np.arange(len(ends))
         X = np.concatenate([self.X, points])
-        F, source = cut_triangles(self.F, self.source, ends, number, self._corner_cut_off(X, ends, number))
-        split = edge_places(self.cuts, ends)
-        halved = split >= 0
-        halves = [np.stack([self.cuts[halved, side], number[split[halved]]], axis=1) for side in (0, 1)]
-        cuts = np.concatenate([self.cuts[~halved], *halves])
-        seam = np.concatenate([self.seam[~halved], self.seam[halved], self.seam[halved]])
-        return CutMesh(X, F, source, cuts, seam)
-
-    def _corner_cut_off(self, X: Floats, ends: Ints, number: Ints) -> Ints:
-        """(m,) the corner that a line is to lead from where two sides of a triangle are cut,
-        so that the smallest angle is largest: two points of a seam and a corner may lie on a line."""
+        # where two sides of a triangle are cut, a line leads from one corner, so that the smallest angle is
+        # largest: two points of a seam and a corner may lie on a line
         place = edge_places(self.F[:, SIDES], ends)
         two = np.flatnonzero((place >= 0).sum(axis=1) == 2)
         cut = place[two] >= 0
@@ -106,7 +97,13 @@ class CutMesh:
         )
         first = np.zeros(len(self.F), dtype=np.int64)
         first[two] = np.where(from_b > from_a, (turn + 1) % 3, turn)
-        return first
+        F, source = cut_triangles(self.F, self.source, ends, number, first)
+        split = edge_places(self.cuts, ends)
+        halved = split >= 0
+        halves = [np.stack([self.cuts[halved, side], number[split[halved]]], axis=1) for side in (0, 1)]
+        cuts = np.concatenate([self.cuts[~halved], *halves])
+        seam = np.concatenate([self.seam[~halved], self.seam[halved], self.seam[halved]])
+        return CutMesh(X, F, source, cuts, seam)
 
     def with_vertex(self, point: Floats, faces: Bools) -> tuple[CutMesh, int]:
         """The mesh with a vertex nearest to a point (3,) on chosen faces (m,), and its number."""
@@ -150,10 +147,6 @@ class CutMesh:
                 path = np.asarray(solver.find_geodesic_path(*ends))
                 found.append((float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), path, piece))
         _, path, piece = min(found, key=lambda one: one[0])
-        return self._along(*self._on_edges(path, piece), path, number, name)
-
-    def _on_edges(self, path: Floats, piece: int) -> tuple[Ints, Floats]:
-        """(k,2) the edge of the piece that each point of a path is on, and (k,) where: 0 to 1."""
         sides = self.topology.edges_of(self.pieces.piece == piece)
         edges = self.topology.edges[sides]
         middle, length = self.X[edges].mean(axis=1), segment_lengths(self.X, edges)
@@ -162,7 +155,7 @@ class CutMesh:
         for k, point in enumerate(path):
             weights, away = nearest_places(self.X[edges[near][:, [0, 1, 1]]], point)
             place[k], share[k] = edges[near][away.argmin()], 1.0 - weights[away.argmin(), 0]
-        return place, share
+        return self._along(place, share, path, number, name)
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
         """The mesh with the points of a path as vertices, and the edges between them cut.

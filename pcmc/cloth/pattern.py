@@ -83,7 +83,14 @@ def cutting_pattern_of(
     expect_flat(surface, "the cutting pattern")
     options.check(surface)
     certificate = certified(surface, anyway, certificate)
-    base = with_lines(cut_mesh(surface, _narrowest(surface, options) / ACROSS), options.lines, surface.plane)
+    areas = face_areas(surface.vertices[surface.faces])
+    area = surface.roof * np.bincount(surface.patch_of_face, areas, len(surface.patches))
+    widths = [] if options.net_width is None else [options.net_width]
+    counts = [options.of_patch("strips", patch.name) or np.inf for patch in surface.patches]
+    widths += [float(width) for width in area**0.5 / counts if width > 0.0]
+    if drawn := sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in options.lines):
+        widths.append(float(area.sum()) / drawn)
+    base = with_lines(cut_mesh(surface, min(widths, default=np.inf) / ACROSS), options.lines, surface.plane)
     if not len(base.F):
         text = "surface: it has no roof to be cut: every patch is a wall"
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
@@ -105,18 +112,6 @@ def cutting_pattern_of(
         sheets = moved
     strips = _strips(cloth, points, options)
     return CuttingPattern(surface, certificate, options, strips, seams_of(cloth))
-
-
-def _narrowest(surface: Surface, options: CuttingOptions) -> float:
-    """About the width of the narrowest strips, length."""
-    areas = face_areas(surface.vertices[surface.faces])
-    area = surface.roof * np.bincount(surface.patch_of_face, areas, len(surface.patches))
-    widths = [] if options.net_width is None else [options.net_width]
-    counts = [options.of_patch("strips", patch.name) or np.inf for patch in surface.patches]
-    widths += [float(width) for width in area**0.5 / counts if width > 0.0]
-    if drawn := sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in options.lines):
-        widths.append(float(area.sum()) / drawn)
-    return min(widths, default=np.inf)
 
 
 def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[ClothSheet]:

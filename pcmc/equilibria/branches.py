@@ -57,7 +57,7 @@ class TracedParameter:
     def trace(self, surface: Surface, watch: Callable[[Progress], None]) -> Branch | None:
         """The branch through a surface, both ways to the ends of the span; None if none starts there."""
         try:
-            return joined(*(self._half(surface, sign, watch) for sign in (-1.0, 1.0)))
+            return join_branches(*(self._half(surface, sign, watch) for sign in (-1.0, 1.0)))
         except NoBranch:
             return None
 
@@ -144,7 +144,7 @@ def _from_event(branch: Branch, other: Branch, row: int) -> Branch:
     )
 
 
-def joined(back: Branch, forth: Branch) -> Branch:
+def join_branches(back: Branch, forth: Branch) -> Branch:
     """Two branches from one surface as one, the first backwards."""
     last = len(back.points) - 1
     points = back.points.assign(arclength=-back.points.arclength, slope=-back.points.slope)[::-1]

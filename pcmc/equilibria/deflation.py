@@ -60,22 +60,17 @@ def _approach(state: SolverState, known: Sequence[Shape]) -> Surface | None:
         if second is None:
             return None
         d, pressures, _ = stepper.direction(second)
-        d, share = _deflated(state, d, known)
+        F = state.at.classes.faces
+        here, ahead = (_repulsion(Shape(state.at.X + t * d, F), known, state.size) for t in (0.0, DIFFERENCE))
+        slope = (ahead - here) / DIFFERENCE
+        share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
+        longest = float(np.linalg.norm(d, axis=1).max())
+        share = float(np.clip(share, -LONGEST * state.size / longest, LONGEST * state.size / longest))
+        d = share * d
         if not _move(state, d, share * pressures):
             return None
         state.maintain_mesh()
     return None
-
-
-def _deflated(state: SolverState, d: Floats, known: Sequence[Shape]) -> tuple[Floats, float]:
-    """The step c d (n,3), shortened where it is long, and what it is of d."""
-    F = state.at.classes.faces
-    here, ahead = (_repulsion(Shape(state.at.X + t * d, F), known, state.size) for t in (0.0, DIFFERENCE))
-    slope = (ahead - here) / DIFFERENCE
-    share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
-    longest = float(np.linalg.norm(d, axis=1).max())
-    share = float(np.clip(share, -LONGEST * state.size / longest, LONGEST * state.size / longest))
-    return share * d, share
 
 
 def _repulsion(shape: Shape, known: Sequence[Shape], size: float) -> float:

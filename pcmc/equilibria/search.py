@@ -137,7 +137,7 @@ def find_equilibria(
     expect_flat(given, "find_equilibria")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a sentence")
-    chosen = validate.build(SearchOptions, "find_equilibria", options)
+    chosen = validate.options_from(SearchOptions, "find_equilibria", options)
     every = [along] if isinstance(along, str | Direction | BoundaryMotion) else list(along)
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
     search = _Search(given, lines, chosen, callback)

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
-from ..surface.geometry import edge_vectors, point, to_triangle, vertex_area_vectors
+from ..surface.distance import distances
+from ..surface.geometry import edge_vectors, vertex_area_vectors
 
 SAME = 0.25  # of the mean edge: two shapes nowhere farther apart are one, as far as the mesh can tell
 # Caps of three rings and Enneper's surface of five, at rest with other triangles after other ways, are up to
@@ -42,18 +40,9 @@ class Shape:
         """(n,) the area around each vertex."""
         return vertex_area_vectors(self.X, self.F)[1]
 
-    @cached_property
-    def _search(self) -> tuple[cKDTree, Ints, Ints, Ints]:
-        """A tree of the vertices that triangles use, their numbers, and the triangles around each vertex."""
-        used = np.unique(self.F)
-        order = np.argsort(self.F.ravel(), kind="stable")
-        starts = np.searchsorted(self.F.ravel()[order], np.arange(len(self.X) + 1))
-        return cKDTree(self.X[used]), used, order // 3, starts
-
     def distances(self, points: Floats) -> Floats:
-        """(k,) from points (k,3) to the triangles around the nearest vertex."""
-        tree, used, around, starts = self._search
-        return _distances(points, used[tree.query(points)[1]], self.X, self.F, around, starts)
+        """(k,) distance of points (k,3) from the nearest triangle."""
+        return distances(points, self.X, self.F)
 
     @cached_property
     def edge(self) -> float:
@@ -92,15 +81,3 @@ def shape_distance(one: Surface, other: Surface) -> float:
     for surface in (one, other):
         expect_surface(surface)
     return Shape.of(one).distance(Shape.of(other))
-
-
-@compiled
-def _distances(points: Floats, nearest: Ints, X: Floats, F: Ints, around: Ints, starts: Ints) -> Floats:
-    out = np.empty(len(points))
-    for i in range(len(points)):
-        p, best = point(points, i), inf
-        for k in range(starts[nearest[i]], starts[nearest[i] + 1]):
-            f = around[k]
-            best = min(best, to_triangle(p, point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])))
-        out[i] = best
-    return out

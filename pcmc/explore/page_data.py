@@ -23,12 +23,12 @@ from ..design.targets import MEASURES, NAMED
 from ..equilibria import Equilibria
 from ..equilibria.found import INCOMPLETE
 from ..forces.curvature import curvature_error, mean_curvature
-from ..panelling.distance import difference
 from ..panelling.families import family_of_face
 from ..project.values import changeable_values
 from ..structure import PlacedMember
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.distance import difference
 from ..surface.symmetry import Whole, unfolded
 from .session import SessionState, figures_data
 
@@ -127,7 +127,7 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
     return {
         "mesh": crc32(surface.faces.tobytes() + origin.tobytes() + names.encode()),  # that ``outline`` has
         "values": {"asked": changeable_values(state.wanted), "shown": changeable_values(surface)},
-        "verdict": _verdict(state.failure or certificate),
+        "verdict": _verdict(state.failure or certificate, "" if moving else certificate.cuts_itself),
         "at_rest": state.failure is None,
         "findings": _findings(certificate, moving),
         "figures": figures_data(surface, certificate),

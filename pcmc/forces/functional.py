@@ -30,7 +30,7 @@ from ..surface.supports import apply_supports
 from . import cable_weights, cables, flat_pieces
 from .elements import Elements, add_values, energy_mesh
 from .flat_pieces import add_plane_volumes
-from .triangles import add_weights, areas_and_volumes, measure, moments
+from .triangles import add_weights, areas_and_volumes, moments, totals_and_gradient
 
 FORCES = (cables.elements, cable_weights.elements, flat_pieces.elements)
 Rates = Mapping[str, Floats]
@@ -96,7 +96,7 @@ def energy_and_gradient(
     [0.0, 0.0, 0.0]
     """
     X = surface.vertices if X is None else X
-    areas, volumes, gradient = measure(energy_mesh(surface), X, workers)
+    areas, volumes, gradient = totals_and_gradient(energy_mesh(surface), X, workers)
     further = add_forces(surface, X, gradient)
     surface.folded(gradient)
     if supports:
@@ -128,7 +128,7 @@ def weighted(
     """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
     alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
     X = surface.vertices if X is None else X
-    areas, volumes, forces = measure(energy_mesh(surface, alpha, p), X)
+    areas, volumes, forces = totals_and_gradient(energy_mesh(surface, alpha, p), X)
     add_values(flat_pieces.elements(surface, X, p), forces)
     return areas, add_plane_volumes(surface, X, volumes), surface.folded(forces)
 

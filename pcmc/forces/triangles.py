@@ -80,7 +80,7 @@ def _measure_areas(mesh: Mesh, X: Floats, first: int, last: int, area: Floats, v
         volume[patch[f]] += dot(a, cross(b, c)) / 6.0
 
 
-def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, Floats, Floats]:
+def totals_and_gradient(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, Floats, Floats]:
     """Areas (k,), volumes (k,) of the k patches and the gradient (n,3) of Σ αA - pV in one pass.
 
     Each block sums into arrays of its own, added in order: the same number of workers gives the

@@ -156,7 +156,16 @@ def _bodies(surface: Surface) -> str:
     bodies: list[tuple[Ints, str]] = []
     if surface.rooms:
         multipliers = room_pressures(surface)
-        pressures = _beside_rooms(surface, multipliers)
+        left = surface.pressures - multipliers @ signs
+        left[np.abs(left) <= ROUNDING * np.abs(surface.pressures).max(initial=0.0)] = 0.0
+        left -= surface.snows
+        both = np.flatnonzero((signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0) & (left != 0.0))
+        if len(both):
+            name = surface.patches[both[0]].name
+            text = f"patch {name!r} has a net pressure of {left[both[0]]:g} beside that of its rooms, and a"
+            text += " datafile has one body on each side of a face; give all patches of its rooms its load"
+            raise FileError(text, where=name, found=float(left[both[0]]))
+        pressures = left  # as of snow, beside those of the rooms
         beyond = room_volumes(surface) - signs @ _cones(surface)
         for k, room in enumerate(surface.rooms):
             members = signs[k, surface.patch_of_face].astype(int) * _count(surface.faces)
@@ -179,18 +188,3 @@ def _cones(surface: Surface) -> Floats:
     volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
     of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches)).astype(float)
     return add_plane_volumes(surface, surface.vertices, of_patch)
-
-
-def _beside_rooms(surface: Surface, multipliers: Floats) -> Floats:
-    """(k,) the net pressures of the patches, as of snow, beside the pressures (r,) of the rooms."""
-    signs = surface.room_signs
-    left = surface.pressures - multipliers @ signs
-    left[np.abs(left) <= ROUNDING * np.abs(surface.pressures).max(initial=0.0)] = 0.0
-    left -= surface.snows
-    both = np.flatnonzero((signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0) & (left != 0.0))
-    if len(both):
-        name = surface.patches[both[0]].name
-        text = f"patch {name!r} has a net pressure of {left[both[0]]:g} beside that of its rooms, and a"
-        text += " datafile has one body on each side of a face; give all patches of its rooms its load"
-        raise FileError(text, where=name, found=float(left[both[0]]))
-    return left

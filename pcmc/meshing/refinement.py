@@ -131,16 +131,9 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
         boundary = boundary.copy()
         boundary[topo.edge_numbers(surface.cable_edges.ends)] = False
     both_fixed = drawn | (fixed[start] & fixed[end] & (boundary | inner | inside))
-    both_fixed |= _last_edges(surface, both_fixed & inside, fixed)
-    height = surface.plane.height(surface.vertices)
-    resting = sliding | (fixed & (np.abs(height) <= ON * surface.size))
-    slides = topo.boundary_edge & resting[start] & resting[end] & (sliding[start] | sliding[end])
-    return both_fixed, slides
-
-
-def _last_edges(surface: Surface, inside: Bools, fixed: Bools) -> Bools:
-    """(e,) the edges by which lines of held edges ``inside`` a patch go on to the boundary, turning least."""
-    topo, X, more = surface.topology, surface.vertices, np.zeros(len(inside), dtype=bool)
+    # lines of held edges inside a patch go on to the boundary by the edge along which they turn least
+    inside &= both_fixed
+    X = surface.vertices
     ends = np.bincount(topo.edges[inside].ravel(), minlength=surface.n) == 1
     before = np.zeros(surface.n, dtype=np.int64)
     line = np.concatenate([topo.edges[inside], topo.edges[inside][:, ::-1]])
@@ -153,8 +146,11 @@ def _last_edges(surface: Surface, inside: Bools, fixed: Bools) -> Bools:
     cosine = np.einsum("ij,ij->i", along, on) / np.maximum(lengths, 1e-300)
     order = np.lexsort((-cosine, here))
     best = order[np.unique(here[order], return_index=True)[1]]
-    more[number[best[cosine[best] >= np.cos(np.radians(CORNER))]]] = True
-    return more
+    both_fixed[number[best[cosine[best] >= np.cos(np.radians(CORNER))]]] = True
+    height = surface.plane.height(X)
+    resting = sliding | (fixed & (np.abs(height) <= ON * surface.size))
+    slides = topo.boundary_edge & resting[start] & resting[end] & (sliding[start] | sliding[end])
+    return both_fixed, slides
 
 
 def edge_columns(surface: Surface) -> Bools:

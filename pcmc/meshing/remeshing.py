@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import lift, standing_part
@@ -263,7 +263,14 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)
     X = np.concatenate([mesh.X for mesh in meshes])[used]
     support = np.concatenate([mesh.support for mesh in meshes])[used]
-    _onto_planes(surface, X, F, patch_of_face, used >= len(old.X), support)
+    for column, (plane, before) in enumerate(surface.on_planes, start=2):
+        off = ~before[surface.faces].all(axis=1)
+        lies = np.bincount(surface.patch_of_face, off, len(surface.patches)) == 0  # such as an upright wall
+        inside = np.zeros(len(X), dtype=bool)
+        inside[F[lies[patch_of_face]]] = True
+        inside &= used >= len(old.X)
+        X[inside] = plane.nearest(X[inside])
+        support[inside, column] = True
     ends = np.searchsorted(used, old.curves)
     cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
     return surface.with_mesh(
@@ -274,16 +281,3 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
         cables=cables,
         curves=old.on.joined(ends),
     )
-
-
-def _onto_planes(surface: Surface, X: Floats, F: Ints, patch: Ints, new: Bools, support: Bools) -> None:
-    """Put new vertices of patches that lie in a plane, such as upright walls, on it, in place."""
-    count = len(surface.patches)
-    for column, (plane, before) in enumerate(surface.on_planes, start=2):
-        off = ~before[surface.faces].all(axis=1)
-        lies = (np.bincount(surface.patch_of_face, off, count) == 0) & np.isin(np.arange(count), patch)
-        inside = np.zeros(len(X), dtype=bool)
-        inside[F[lies[patch]]] = True
-        inside &= new
-        X[inside] = plane.nearest(X[inside])
-        support[inside, column] = True

@@ -31,7 +31,7 @@ class Families(NamedTuple):
     at_least: int  # no partition has fewer families
 
 
-def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families:
+def triangle_families(lengths: Floats, tolerance: float, apart: bool = False) -> Families:
     """Families of triangles with edge lengths (m,3), counter-clockwise, length.
 
     In a family, corresponding edges of every two triangles differ in length by at most ``tolerance``.
@@ -41,9 +41,9 @@ def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families
     ``at_least`` counts triangles of which no two can share a family.
 
     >>> triangles = np.array([[3, 4, 5.0], [4, 5, 3.001], [5, 4, 3.0]])
-    >>> families(triangles, 0.01).family.tolist()
+    >>> triangle_families(triangles, 0.01).family.tolist()
     [0, 0, 0]
-    >>> families(triangles, 0.01, apart=True).family.tolist()
+    >>> triangle_families(triangles, 0.01, apart=True).family.tolist()
     [0, 0, 1]
     """
     orders = np.argsort(lengths, axis=1, kind="stable")[:, None]  # (m,w,3) that are tried: these differ least
@@ -78,7 +78,7 @@ def family_of_face(surface: Surface) -> Floats:
     family = np.full(surface.m, np.nan)
     if roof.any():
         lengths = np.linalg.norm(edge_vectors(surface.vertices[surface.faces[roof]]), axis=2)
-        family[roof] = 1 + families(lengths, ALIKE * float(lengths.mean())).family
+        family[roof] = 1 + triangle_families(lengths, ALIKE * float(lengths.mean())).family
     return family
 
 

@@ -18,16 +18,16 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import compare, worst_quality
 from ..solvers import solve_once
 from ..surface import Surface
+from ..surface.distance import distances
 from ..surface.geometry import edge_vectors
 from ..surface.supports import onto_circles
-from .distance import distances
-from .families import families
+from .families import triangle_families
 from .schedule import Panels, panels
 
 WIDER = (1.25, 1.12, 1.6, 2.2)  # times the tolerance: families within it are joined
@@ -164,7 +164,7 @@ class _Search:
             count = self.count
             if surface is not None:
                 lengths = self._lengths(surface.vertices)
-                count = int(families(lengths, self.tolerance, self.apart).family.max()) + 1
+                count = int(triangle_families(lengths, self.tolerance, self.apart).family.max()) + 1
             if surface is not None and count < self.count:
                 self.best, self.count, misses = surface, count, 0
                 self.steps.append((count, self.leaves(surface.vertices)))
@@ -186,7 +186,7 @@ class _Search:
         in families within a wider tolerance; None where that fails."""
         X = self.best.vertices
         lengths = self._lengths(X)
-        family, order, _ = families(lengths, wider * self.tolerance, self.apart)
+        family, order, _ = triangle_families(lengths, wider * self.tolerance, self.apart)
         aligned = np.take_along_axis(lengths, order, axis=1)
         low, high = np.full((2, family.max() + 1, 3), np.inf)
         np.minimum.at(low, family, aligned)
@@ -223,7 +223,17 @@ class _Search:
         surface = self.best
         part = standing_part(surface)
         space = motion_space(part.surface, part.classes, X)
-        frame, damping = self._frames(space.basis, space.dimension, part.resting | part.walls.held)
+        # the directions (n,3,3) in which each vertex may move, rows, zero for none; their damping (n,3)
+        basis, dimension = space.basis, space.dimension
+        free = self.start.free & ~(part.resting | part.walls.held)
+        frame, damping = np.zeros_like(basis), np.full((*dimension.shape, 3), STIFF)
+        sheet, curve = free & (dimension == 1), free & (dimension == 2)
+        frame[sheet, 0], frame[sheet, 1] = perpendicular(basis[sheet, 0])
+        frame[curve, 0] = np.cross(basis[curve, 0], basis[curve, 1])
+        damping[sheet, :2] = damping[curve, :1] = DAMPING
+        if not self.at_rest:
+            frame[sheet, 2] = basis[sheet, 0]
+            frame[curve, 1:] = basis[curve, :2]
         unit = edges[face, side] / lengths[face, side][:, None]
         tail, head = self.faces[face, (side + 1) % 3], self.faces[face, (side + 2) % 3]
         towards = np.einsum("ej,ekj->ek", unit, frame[head]), -np.einsum("ej,ekj->ek", unit, frame[tail])
@@ -243,16 +253,3 @@ class _Search:
                 return Y
             share *= 0.5
         return None
-
-    def _frames(self, basis: Floats, dimension: Ints, held: Bools) -> tuple[Floats, Floats]:
-        """The directions (n,3,3) in which each vertex may move, rows, zero for none; their damping (n,3)."""
-        free = self.start.free & ~held
-        frame, damping = np.zeros_like(basis), np.full((*dimension.shape, 3), STIFF)
-        sheet, curve = free & (dimension == 1), free & (dimension == 2)
-        frame[sheet, 0], frame[sheet, 1] = perpendicular(basis[sheet, 0])
-        frame[curve, 0] = np.cross(basis[curve, 0], basis[curve, 1])
-        damping[sheet, :2] = damping[curve, :1] = DAMPING
-        if not self.at_rest:
-            frame[sheet, 2] = basis[sheet, 0]
-            frame[curve, 1:] = basis[curve, :2]
-        return frame, damping

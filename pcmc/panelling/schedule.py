@@ -16,7 +16,7 @@ from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
-from .families import families
+from .families import triangle_families
 from .flat import joints, laid_flat
 
 MIRROR_IMAGES = ("alike", "apart")
@@ -174,7 +174,7 @@ def panels(
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
     corners = surface.vertices[surface.faces[faces]]
     lengths = np.linalg.norm(edge_vectors(corners), axis=2)
-    parts = families(lengths, tolerance, mirror_images == "apart")
+    parts = triangle_families(lengths, tolerance, mirror_images == "apart")
     table = _panel_table(surface, faces, lengths, parts.family, parts.order)
     groups = table.groupby("family")
     least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()

@@ -80,27 +80,22 @@ def arrange(
     chains, points = _chains(lines, nodes, along_lines, edge_length)
     chains = _inside_plan(tree, chains, points[:, :2], edge_length)
     vertex = of_cut[len(cuts) - len(passing) :]
-    alone, own = _merged(required_points, np.flatnonzero([not places for places in passing]), snap)
+    alone = np.flatnonzero([not places for places in passing])  # points on no line, supports first
+    near: Ints = np.zeros((0, 2), dtype=np.int64)
+    if len(alone):
+        near = cKDTree(required_points[alone, :2]).query_pairs(snap, output_type="ndarray")
+    for at, (low, high) in zip(alone[near[:, 0]], required_points[alone[near], 2], strict=True):
+        if abs(high - low) > snap:  # False without a height of its own
+            place = required_points[at, :2]
+            problem = f"two supports at {point_text(place)} have the heights {low:.6g} and {high:.6g}"
+            raise PlanError(f"{problem}: leave one out", what="supports", where=tuple(place.tolist()))
+    own = components(near, len(alone))  # one vertex for those nearer than ``snap``
     vertex[alone] = len(points) + own
     points = np.concatenate([points, required_points[alone[np.unique(own, return_index=True)[1]]]])
     used = np.unique(np.concatenate([vertex, *(chain.vertices for chain in chains)]))
     chains = [replace(chain, vertices=np.searchsorted(used, chain.vertices)) for chain in chains]
     required = np.searchsorted(used, vertex)
     return Arrangement(points[used, :2], points[used, 2], tuple(chains), required)
-
-
-def _merged(required: Floats, alone: Ints, snap: float) -> tuple[Ints, Ints]:
-    """Points (p,3) on no line, supports first: their numbers, and that of the vertex of each: one vertex for
-    those nearer than ``snap``, such as a support and the name of its place."""
-    near: Ints = np.zeros((0, 2), dtype=np.int64)
-    if len(alone):
-        near = cKDTree(required[alone, :2]).query_pairs(snap, output_type="ndarray")
-    for at, (low, high) in zip(alone[near[:, 0]], required[alone[near], 2], strict=True):
-        if abs(high - low) > snap:  # False without a height of its own
-            place = required[at, :2]
-            problem = f"two supports at {point_text(place)} have the heights {low:.6g} and {high:.6g}"
-            raise PlanError(f"{problem}: leave one out", what="supports", where=tuple(place.tolist()))
-    return alone, components(near, len(alone))
 
 
 def hole_points(drawn: Arrangement, lines: Sequence[PlanLine]) -> list[tuple[float, float]]:

@@ -115,7 +115,30 @@ def panel(
     may be one for all. ``one_scale`` draws a length equally long everywhere; without it each surface
     fills its place. The rest is as in ``draw``.
     """
-    drawings = _drawings(surfaces, views, titles, scalars, numbers, patches)
+    count = len(surfaces)
+    if not count:
+        validate.refuse("surfaces", 0, "at least one surface")
+    angles = isinstance(views, Sequence) and len(views) == 2 and not isinstance(views[0], str | Sequence)
+    given: dict[str, Any] = {
+        "views": [views] * count if angles or isinstance(views, str) else views,
+        "titles": titles or [""] * count,
+        "scalars": [None] * count if scalars is None else scalars,
+        "numbers": [None] * count if numbers is None else numbers,
+        "patches": patches,
+    }
+    if patches is None or all(isinstance(entry, str) for entry in patches):
+        given["patches"] = [patches] * count
+    for name, entries in given.items():
+        if len(entries) != count:
+            validate.refuse(name, len(entries), f"{count}, one per surface")
+    drawings = []
+    for surface, view, title, *arrays, names in zip(surfaces, *given.values(), strict=True):
+        shapes = {"scalars": [(surface.n,), (surface.m,)], "numbers": [(surface.n,)]}
+        values = [None if array is None else np.asarray(array, dtype=float) for array in arrays]
+        for (name, allowed), array in zip(shapes.items(), values, strict=True):
+            if array is not None and array.shape not in allowed:
+                validate.refuse(name, array.shape, f"shape {' or '.join(map(str, allowed))}")
+        drawings.append(Rendering(surface, view_of(surface, view), title, values[0], values[1], names))
     columns = min(columns or (3 if len(drawings) not in (1, 2, 4) else 2), len(drawings))
     return compose(drawings, path, columns, width, **options)
 
@@ -295,37 +318,6 @@ def reactions(
         raise OptionError("nothing holds the surface: no reactions to draw", what="surface")
     labels = {"label": f"{units.tension} along lines", "points_label": f"{units.force or 'force'} at points"}
     return vectors(surface, np.nan_to_num(lines), path, points=acting.points, **labels | options)
-
-
-def _drawings(
-    surfaces: Sequence[Surface], views: Any, titles: Any, scalars: Any, numbers: Any, patches: Any
-) -> list[Rendering]:
-    """One for each surface, from the arguments of ``panel``."""
-    count = len(surfaces)
-    if not count:
-        validate.refuse("surfaces", 0, "at least one surface")
-    angles = isinstance(views, Sequence) and len(views) == 2 and not isinstance(views[0], str | Sequence)
-    given = {
-        "views": [views] * count if angles or isinstance(views, str) else views,
-        "titles": titles or [""] * count,
-        "scalars": [None] * count if scalars is None else scalars,
-        "numbers": [None] * count if numbers is None else numbers,
-        "patches": patches,
-    }
-    if patches is None or all(isinstance(entry, str) for entry in patches):
-        given["patches"] = [patches] * count
-    for name, entries in given.items():
-        if len(entries) != count:
-            validate.refuse(name, len(entries), f"{count}, one per surface")
-    drawings = []
-    for surface, view, title, *arrays, names in zip(surfaces, *given.values(), strict=True):
-        shapes = {"scalars": [(surface.n,), (surface.m,)], "numbers": [(surface.n,)]}
-        values = [None if array is None else np.asarray(array, dtype=float) for array in arrays]
-        for (name, allowed), array in zip(shapes.items(), values, strict=True):
-            if array is not None and array.shape not in allowed:
-                validate.refuse(name, array.shape, f"shape {' or '.join(map(str, allowed))}")
-        drawings.append(Rendering(surface, view_of(surface, view), title, values[0], values[1], names))
-    return drawings
 
 
 def _print_numbers(axes: Any, surface: Surface, view: Camera, numbers: Floats, form: str) -> None:

@@ -108,6 +108,8 @@ class Outcome:
         lines = [certificate.verdict.value]
         if not certificate.certified and certificate.detail:
             lines.append(certificate.detail)
+        if certificate.certified and certificate.cuts_itself:
+            lines.append(certificate.cuts_itself)
         if self.design is not None:
             lines.append(f"targets {self.design.text(self.units)}")
         if self.files:

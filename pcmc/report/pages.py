@@ -100,7 +100,25 @@ def _flowables(block: Block) -> list[Any]:
         return [_Plan(block)]
     title = [_paragraph(block.title, TITLE)] if block.title else []
     if isinstance(block, Table):
-        return [*title, _grid(block)]
+        headed = bool(block.head)
+        size, rows = CELL, [block.head, *block.rows] if headed else block.rows
+        widths = _widths(rows, size)
+        if sum(widths) > WIDTH:
+            size = max(5.0, size * WIDTH / sum(widths))
+            widths = _widths(rows, size)
+        cells = []
+        for k, row in enumerate(rows):
+            styles = [_style(BOLD if headed and not k else FONT, size, right) for right in (False, headed)]
+            cells.append([_paragraph(text, styles[j >= block.words]) for j, text in enumerate(row)])
+        everywhere = (0, 0), (-1, -1)
+        look = [("VALIGN", *everywhere, "TOP"), ("LINEBELOW", *everywhere, 0.25, HexColor("#D8D8D8"))]
+        look += [(f"{side}PADDING", *everywhere, 2.0) for side in ("TOP", "BOTTOM")]
+        look += [(f"{side}PADDING", *everywhere, 3.0) for side in ("LEFT", "RIGHT")]
+        if headed:
+            look.append(("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK)))
+        widths = [width * min(WIDTH / sum(widths), 1.0) for width in widths]
+        place = {"hAlign": "LEFT", "spaceBefore": 4.0, "spaceAfter": 8.0}
+        return [*title, Grid(cells, colWidths=widths, repeatRows=int(headed), style=look, **place)]
     image = Image(io.BytesIO(block.png))
     share = min(WIDTH / image.imageWidth, TALLEST / image.imageHeight)
     image.drawWidth, image.drawHeight = share * image.imageWidth, share * image.imageHeight
@@ -121,29 +139,6 @@ class _Plan(Flowable):
 
     def draw(self) -> None:
         paint_sheet(self.canv, self.plan.lines, self.plan.texts, boxed=True)
-
-
-def _grid(table: Table) -> Any:
-    """A table that goes on overleaf with its head; a wide one has smaller letters."""
-    headed = bool(table.head)
-    size, rows = CELL, [table.head, *table.rows] if headed else table.rows
-    widths = _widths(rows, size)
-    if sum(widths) > WIDTH:
-        size = max(5.0, size * WIDTH / sum(widths))
-        widths = _widths(rows, size)
-    cells = []
-    for k, row in enumerate(rows):
-        styles = [_style(BOLD if headed and not k else FONT, size, right) for right in (False, headed)]
-        cells.append([_paragraph(text, styles[j >= table.words]) for j, text in enumerate(row)])
-    everywhere = (0, 0), (-1, -1)
-    look = [("VALIGN", *everywhere, "TOP"), ("LINEBELOW", *everywhere, 0.25, HexColor("#D8D8D8"))]
-    look += [(f"{side}PADDING", *everywhere, 2.0) for side in ("TOP", "BOTTOM")]
-    look += [(f"{side}PADDING", *everywhere, 3.0) for side in ("LEFT", "RIGHT")]
-    if headed:
-        look.append(("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK)))
-    widths = [width * min(WIDTH / sum(widths), 1.0) for width in widths]
-    place = {"hAlign": "LEFT", "spaceBefore": 4.0, "spaceAfter": 8.0}
-    return Grid(cells, colWidths=widths, repeatRows=int(headed), style=look, **place)
 
 
 def _widths(rows: Sequence[Sequence[str]], size: float) -> list[float]:

@@ -86,6 +86,8 @@ def verdict_sentences(
             f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
             " changes of shape that are symmetric in them."
         )
+    if certificate.cuts_itself:
+        sentences.append(f"It cannot be built as it is: {certificate.cuts_itself}.")
     if len(certificate.pinched):
         sentences.append(f"The ridge rests on the plane at {len(certificate.pinched)} vertices.")
     return sentences

@@ -90,7 +90,7 @@ class Evaluator:
             (area, volume), G = np.zeros((2, len(tension))), np.zeros(X.shape)
             triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), area, volume, G)
         else:
-            area, volume, G = triangles.measure(self._mesh, X)
+            area, volume, G = triangles.totals_and_gradient(self._mesh, X)
         further = add_forces(self._surface, X, G) if self._more else 0.0
         for plane, mask in self._others:
             G[mask] = plane.along(G[mask])

@@ -10,7 +10,7 @@ from ..base.arrays import Bools
 from ..base.tolerances import AT_REST
 from ..certificate.balance import growing_part, hardly_balanced, load_name, load_ratio, overload
 from ..certificate.diagnosis import pinched_neck
-from ..certificate.proof import Attempt, Proof
+from ..certificate.proof import Attempt
 from ..certificate.verdict import theorems
 from ..forces.pinching import standing_part
 from ..forces.rooms import room_volumes
@@ -77,9 +77,20 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result:
         tried.append(outcome.attempt or Attempt(outcome.way, _name(result)))
         if tried[-1].folds:
             break
-    failed = _failed(first, (*filter(None, [load]), *proofs), tried)
-    note = "; ".join(filter(None, [failed.note, _far_volume(start)]))
-    return replace(failed, evaluations=solves.evaluations, note=note)
+    proofs = (*filter(None, [load]), *proofs)
+    neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
+    if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
+        proofs = ()
+    status, folds = first.status, [attempt for attempt in tried if attempt.folds]
+    if proofs:
+        status = Status.NO_EQUILIBRIUM
+    elif folds or neck is not None or status in (Status.DIVERGED, Status.VANISHED):
+        status = Status.NONE_FOUND
+    growing = growing_part(first.surface) if status is Status.NONE_FOUND else ""
+    reasons = (*proofs, *(folds if proofs else tried), first.note, neck or "")
+    note = "; ".join(filter(None, [growing, *map(str, reasons), _far_volume(start)]))
+    failed = replace(first, status=status, note=note, proofs=proofs, tried=tuple(tried))
+    return replace(failed, evaluations=solves.evaluations)
 
 
 def _far_volume(start: Surface) -> str:
@@ -116,19 +127,3 @@ def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome 
 def _name(result: Result) -> str:
     """The status as in Attempt."""
     return result.status.name.lower()
-
-
-def _failed(first: Result, proofs: tuple[Proof, ...], tried: list[Attempt]) -> Result:
-    """The first result, with the proofs or what was tried."""
-    neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
-    if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
-        proofs = ()
-    status, folds = first.status, [attempt for attempt in tried if attempt.folds]
-    if proofs:
-        status = Status.NO_EQUILIBRIUM
-    elif folds or neck is not None or status in (Status.DIVERGED, Status.VANISHED):
-        status = Status.NONE_FOUND
-    growing = growing_part(first.surface) if status is Status.NONE_FOUND else ""
-    reasons = (*proofs, *(folds if proofs else tried), first.note, neck or "")
-    note = "; ".join(filter(None, [growing, *map(str, reasons)]))
-    return replace(first, status=status, note=note, proofs=proofs, tried=tuple(tried))

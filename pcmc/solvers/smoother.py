@@ -35,7 +35,11 @@ class Smoother:
     """
 
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
-        floor = FLOOR * _largest_around(surface)
+        part = surface.topology.components[surface.topology.faces[:, 0]]  # a patch may be in several
+        of_part, of_patch = np.zeros(part.max() + 1), np.zeros(len(surface.patches))
+        np.maximum.at(of_part, part, surface.tensions[surface.patch_of_face])
+        np.maximum.at(of_patch, surface.patch_of_face, of_part[part])
+        floor = FLOOR * of_patch
         tensions = {p.name: max(p.tension, least) for p, least in zip(surface.patches, floor, strict=True)}
         self._moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
@@ -105,15 +109,6 @@ def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list
     number = [next(k for k in range(3) if np.array_equal(masks[k], mask)) for mask in masks]
     distinct = sorted(set(number))
     return [masks[k] for k in distinct], np.array([distinct.index(k) for k in number])
-
-
-def _largest_around(surface: Surface) -> Floats:
-    """(patches,) the largest tension in the connected parts of the surface that a patch belongs to."""
-    part = surface.topology.components[surface.topology.faces[:, 0]]
-    of_part, of_patch = np.zeros(part.max() + 1), np.zeros(len(surface.patches))
-    np.maximum.at(of_part, part, surface.tensions[surface.patch_of_face])
-    np.maximum.at(of_patch, surface.patch_of_face, of_part[part])
-    return of_patch
 
 
 def _one_unknown_each(vertices: Bools) -> MotionSpace:

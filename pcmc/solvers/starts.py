@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.tolerances import FAILED, ON, PARALLEL
-from ..certificate.forces import load
+from ..certificate.forces import total_load
 from ..forces.pinching import place_wall_rows
 from ..forces.wall_rows import find_walls
 from ..meshing.quality import in_the_middle, triangle_quality
@@ -55,7 +55,7 @@ def low_start(surface: Surface) -> Surface | None:
     above = place[:, 2] - low[:, 2] if kept else in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
         domed = _at(surface, low + above[:, None] * [0.0, 0.0, 1.0])
-        above *= np.sign(load(domed)) or 1.0
+        above *= np.sign(total_load(domed)) or 1.0
     rise, most = RISE * span, float(np.abs(above[roof]).max())
     if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)

@@ -169,7 +169,19 @@ class SolverState:
         Of curved elements the insides follow the edges: where junctions bend, their maps stay smooth.
         """
         if self.at.surface.order > 1:
-            return self._blend_elements()
+            surface, X, kind = self.at.surface, self.at.X, self.at.classes.kind
+            if surface.order == 2 or self.at.residual < 1e-7:
+                return False
+
+            def slide(d: Floats) -> Floats:
+                return apply_supports(surface, d - self.at.space.project(d), X)
+
+            even = X + slide(np.where((kind == CURVE)[:, None], flat_places(surface, X) - X, 0.0))
+            d = slide(blended(surface, even, (kind != SHEET) | (self.at.space.dimension == 0)) - X)
+            if np.abs(d).max() <= BLENDED * np.median(edge_lengths(self.at.shape)):
+                return False
+            self.go_to(X + d)
+            return True
         if self.at.surface.periodic:
             return False
         start, residual = self.quality, self.at.residual
@@ -182,21 +194,6 @@ class SolverState:
             self._poor_quality, self._small_residual = RETRY * self.min_quality, 0.1 * residual
             return False
         self.go_to(X)
-        return True
-
-    def _blend_elements(self) -> bool:
-        surface, X, kind = self.at.surface, self.at.X, self.at.classes.kind
-        if surface.order == 2 or self.at.residual < 1e-7:
-            return False
-
-        def slide(d: Floats) -> Floats:
-            return apply_supports(surface, d - self.at.space.project(d), X)
-
-        even = X + slide(np.where((kind == CURVE)[:, None], flat_places(surface, X) - X, 0.0))
-        d = slide(blended(surface, even, (kind != SHEET) | (self.at.space.dimension == 0)) - X)
-        if np.abs(d).max() <= BLENDED * np.median(edge_lengths(self.at.shape)):
-            return False
-        self.go_to(X + d)
         return True
 
     def update_walls(self) -> bool:

@@ -69,19 +69,15 @@ def count_negative(matrix: csc_array, lu: Any, factorise: Callable[[csc_array], 
         except RuntimeError:
             break
         if not _doubt(stronger, now):
-            return int(np.count_nonzero(now.U.diagonal() < 0.0)) + _correction(now, weak, delta, reason)
+            columns = np.zeros((now.shape[0], len(weak)))
+            columns[weak, np.arange(len(weak))] = np.sqrt(np.abs(delta))
+            small = np.diag(np.sign(delta)) - columns.T @ now.solve(columns)
+            values = np.linalg.eigvalsh(0.5 * (small + small.T))
+            if np.abs(values).min() <= CLOSE * max(1.0, np.abs(values).max()):
+                raise SingularMatrix(reason)
+            of_b, of_small, of_sigma = (int((x < 0.0).sum()) for x in (now.U.diagonal(), values, delta))
+            return of_b + of_small - of_sigma
     raise SingularMatrix(reason)
-
-
-def _correction(lu: Any, rows: Ints, delta: Floats, reason: str) -> int:
-    """neg(Σ - CᵀB⁻¹C) - neg Σ."""
-    columns = np.zeros((lu.shape[0], len(rows)))
-    columns[rows, np.arange(len(rows))] = np.sqrt(np.abs(delta))
-    small = np.diag(np.sign(delta)) - columns.T @ lu.solve(columns)
-    values = np.linalg.eigvalsh(0.5 * (small + small.T))
-    if np.abs(values).min() <= CLOSE * max(1.0, np.abs(values).max()):
-        raise SingularMatrix(reason)
-    return int(np.count_nonzero(values < 0.0)) - int(np.count_nonzero(delta < 0.0))
 
 
 def _doubt(matrix: csc_array, lu: Any) -> str:

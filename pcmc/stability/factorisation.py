@@ -32,7 +32,7 @@ from ..base.errors import MissingExtra, PcmcError
 from ..forces.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
-__all__ = ("BACKENDS", "Factor", "Factoriser", "Inverse", "SingularMatrix", "available", "factoriser")
+__all__ = ("BACKENDS", "Factor", "Factoriser", "Inverse", "SingularMatrix", "factoriser", "installed")
 Ordering = Literal["MMD_AT_PLUS_A", "NATURAL"]
 BACKENDS = ("pardiso", "superlu")
 OUTDATED = (
@@ -80,7 +80,7 @@ class Factoriser(Protocol):
 
 
 @cache
-def available() -> tuple[str, ...]:
+def installed() -> tuple[str, ...]:
     """Backends that are installed here, fastest first."""
     return BACKENDS if importlib.util.find_spec("pypardiso") is not None else ("superlu",)
 
@@ -98,8 +98,8 @@ def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | Non
     >>> factor.negative, factor.solve(np.array([3.0, 3.0])).round(12).tolist()
     (1, [1.0, 1.0])
     """
-    chosen = validate.choice("backend", backend or available()[0], BACKENDS)
-    if chosen not in available():
+    chosen = validate.choice("backend", backend or installed()[0], BACKENDS)
+    if chosen not in installed():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows
     plain = _Pardiso(pattern) if chosen == "pardiso" and pattern.size else _SuperLU(pattern)

@@ -20,7 +20,6 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from ..base.arrays import Floats
 from ..base.tolerances import NEAR_NEUTRAL, SAME_EIGENVALUE
-from ..forces.motion_space import MotionSpace
 from ..surface import Surface
 from .equilibrium import Equilibrium, SecondVariation
 from .factorisation import SingularMatrix
@@ -116,24 +115,6 @@ def _dense(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
     return values[:k], across @ vectors[:, :k]
 
 
-def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) -> Floats:
-    """The eigenvectors (s,k), those of equal eigenvalues as the projections of fixed displacements.
-
-    Rounding alone would choose a basis of their space, another one on each processor. ``root`` (s,) are the
-    roots of the masses.
-    """
-    vectors = vectors.copy()
-    ends = np.flatnonzero(np.diff(values) > SAME_EIGENVALUE * np.abs(values).max(initial=0.0)) + 1
-    for group in np.split(np.arange(len(values)), ends):
-        if len(group) > 1:
-            wave = np.arange(3 * len(space.dimension)).reshape(-1, 3)
-            fixed = [space.to_coordinates(np.cos((1.618 + k) * wave)) for k in range(len(group))]
-            shares = vectors[:, group].T @ (root * np.array(fixed)).T
-            basis, upper = np.linalg.qr(shares)
-            vectors[:, group] = vectors[:, group] @ (basis * np.where(np.diag(upper) < 0.0, -1.0, 1.0))
-    return vectors
-
-
 def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
@@ -151,9 +132,19 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
         if len(values) < k or (whole and np.count_nonzero(values < 0.0) >= system.negative):
             break
         k *= 2
-    vectors = _settled(values, root[:, None] * vectors, system.of.space, root)
-    fields = [system.of.space.to_vectors(vector / root) for vector in vectors.T[:count]]
-    return values[:count], np.array(fields).reshape(len(fields), len(system.of.space.dimension), 3)
+    # of equal eigenvalues the modes are the projections of fixed displacements: rounding alone would choose a
+    # basis of their space, another one on each processor
+    space, vectors = system.of.space, root[:, None] * vectors
+    ends = np.flatnonzero(np.diff(values) > SAME_EIGENVALUE * np.abs(values).max(initial=0.0)) + 1
+    for group in np.split(np.arange(len(values)), ends):
+        if len(group) > 1:
+            wave = np.arange(3 * len(space.dimension)).reshape(-1, 3)
+            fixed = [space.to_coordinates(np.cos((1.618 + k) * wave)) for k in range(len(group))]
+            shares = vectors[:, group].T @ (root * np.array(fixed)).T
+            basis, upper = np.linalg.qr(shares)
+            vectors[:, group] = vectors[:, group] @ (basis * np.where(np.diag(upper) < 0.0, -1.0, 1.0))
+    fields = [space.to_vectors(vector / root) for vector in vectors.T[:count]]
+    return values[:count], np.array(fields).reshape(len(fields), len(space.dimension), 3)
 
 
 def _nearest(system: SecondVariation, k: int) -> tuple[Floats, Floats]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..surface.pieces import point_text
 from .calculix import CalculixError, expect_program, run_as_far
 from .columns import column_table, column_text
 from .gas import balanced_pressure
-from .loads import Step
+from .loads import FORM, Step
 from .member_forces import (
     MemberForces,
     cable_offers,
@@ -295,6 +296,8 @@ def analyse(
     say = progress or (lambda words: None)
     permanent, others = _permanent(model)
     steps = [model.steps[0], *permanent]
+    if model.gas is not None:  # whose pressure follows the volume under self-weight, too
+        steps, others = steps[:1], [*permanent, *others]
     start = run_as_far(model, steps, timeout)
     cases = [_case_of(model, step.name, start[:k], k) for k, step in enumerate(steps, 1)]
     one = partial(analyse_step, model, permanent, timeout=timeout)
@@ -308,18 +311,22 @@ def analyse_step(
     model: StructuralModel, permanent: Sequence[Step], step: Step, timeout: float | None = None
 ) -> Case:
     """One case, after the form-finding load and the ``permanent`` steps; with the gas in balance."""
-    before, gas = [model.steps[0], *permanent], model.gas
+    form, gas = model.steps[0], model.gas
+    before = list(takewhile(lambda other: other is not step, permanent))
     if gas is None:
-        return _case_of(model, step.name, run_as_far(model, [*before, step], timeout), len(before) + 1)
+        return _case_of(model, step.name, run_as_far(model, [form, *before, step], timeout), len(before) + 2)
     standing, outside = model.standing, gas.outside(model.units)
     first, volume = gas.pressure(standing), gas.first_volume(standing)
+    filled = first * model.combinations.get(step.name, {}).get(FORM, 1.0)
+    wanted = [(other, first) for other in before] + [(step, filled)]
     signs = gas.signs(standing)[standing.patch_of_face]
 
     def law(pressure: float) -> tuple[Case, float | None]:
-        acting = replace(step, pressures=step.pressures + (pressure - first) * signs)
-        found = run_as_far(model, [*before, acting], timeout)
-        case = _case_of(model, step.name, found, len(before) + 1, pressure)
-        return case, (outside + first) * volume / case.volume - outside if case.carried else None
+        acting = [replace(one, pressures=one.pressures + (pressure - own) * signs) for one, own in wanted]
+        found = run_as_far(model, [form, *acting], timeout)
+        case = _case_of(model, step.name, found, len(acting) + 1, pressure)
+        enclosed = case.carried and case.volume > 0.0
+        return case, (outside + filled) * volume / case.volume - outside if enclosed else None
 
     case, _, agreed = balanced_pressure(first, law, outside)
     if case.carried and not agreed:

@@ -112,13 +112,13 @@ def balanced_pressure(
     """The pressure p with which the gas and the structure agree, by a secant that is kept in bounds.
 
     ``law(p)`` is the answer under the pressure p and the pressure that the gas has then; None where the
-    structure does not carry the load at p: the gas is compressed until it does, so that p is taken as too
-    low. Returned are the last answer, its pressure, and whether both agree.
+    structure does not carry the load at p, or leaves the gas no volume: it is compressed until it does, so
+    that p is taken as too low. Returned are the last answer, its pressure, and whether both agree.
 
     >>> balanced_pressure(1.0, lambda p: ("", 3.0 - p), outside=100.0)[1:]
     (1.5, True)
     """
-    low, high, known, p = -np.inf, np.inf, list[tuple[float, float]](), first
+    low, high, known, p = -outside, np.inf, list[tuple[float, float]](), first
     for _ in range(MOST_RUNS):
         answer, then = law(p)
         gap = np.inf if then is None else then - p

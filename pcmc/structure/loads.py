@@ -68,7 +68,7 @@ class Snow:
     patches: Sequence[str] = ()  # names of those that carry it; by default all ``in_the_open``
     name: str = "snow"  # of its step
     slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies where the slope is between these
-    area: Sequence[Sequence[float]] = ()  # points [x, y]: it lies within their polygon; empty: everywhere
+    area: Sequence[Sequence[float]] = ()  # points [x, y] of Π: it lies in their polygon; empty: everywhere
     slides: Sequence[float] = ()  # degrees: whole up to the first slope, none from the second, linear between
 
     def __post_init__(self) -> None:
@@ -107,7 +107,7 @@ class Wind:
     pressures: Mapping[str, float]  # force per area by patch name
     name: str = "wind"  # of its step
     slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it acts where the slope is between these
-    area: Sequence[Sequence[float]] = ()  # points [x, y]: it acts within their polygon; empty: everywhere
+    area: Sequence[Sequence[float]] = ()  # points [x, y] of Π: it acts in their polygon; empty: everywhere
 
     def __post_init__(self) -> None:
         if not isinstance(self.pressures, Mapping) or not self.pressures:
@@ -287,7 +287,7 @@ def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
     slope = roof_slopes(surface)
     chosen: Bools = (slope >= least - 1e-9) & (slope <= most + 1e-9)
     if len(load.area):
-        x, y = surface.vertices[surface.faces].mean(axis=1)[:, :2].T[:, :, None]
+        x, y = surface.plane.to_local(surface.vertices[surface.faces].mean(axis=1)).T[:2, :, None]
         a, b = (corners := np.array(load.area, dtype=float)).T
         c, d = np.roll(corners, -1, axis=0).T
         crossed = (b > y) != (d > y)  # (m,k) by the line from the point along x

@@ -50,7 +50,7 @@ class Material:
         if self.weft is not None and self.poisson**2 * self.weft >= self.young:
             text = f"Material.weft: expected less than young/poisson² = {self.young / self.poisson**2:.4g}"
             raise OptionError(f"{text}, found {self.weft:g}", what="Material.weft", found=self.weft)
-        vars(self)["warp"] = validate.vector("Material.warp", self.warp)
+        vars(self)["warp"] = validate.triple("Material.warp", self.warp)
 
     @property
     def cloth(self) -> bool:

@@ -105,7 +105,7 @@ def read_steps(
     check_regular(path)
     suffix_of(path, (".dat",), "a result of CalculiX")
     try:
-        tables = _in_model_units(read(path.read_text(encoding="ascii")), unit)
+        tables = _in_model_units(read_tables(path.read_text(encoding="ascii")), unit)
         _check(tables, model, steps)
     except OSError as error:
         raise system_error(path, "read", error) from None
@@ -227,12 +227,12 @@ Tables = dict[str, list[ResultBlock]]
 of beams; at each of its increments that was printed."""
 
 
-def read(text: str) -> list[Tables]:
+def read_tables(text: str) -> list[Tables]:
     """The tables of each step, which end at the times 1, 2, ...: the last block of an analysis that stopped
     has what it reached.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
-    >>> read(text)[0]["displacements"][-1].values.tolist()
+    >>> read_tables(text)[0]["displacements"][-1].values.tolist()
     [[0.5, 0.0, -0.001]]
     """
     steps, heads = list[Tables](), list(DAT_HEAD.finditer(text))

@@ -132,7 +132,16 @@ def mesh(
         refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
     flat = _flat(X, F)
     if flat.any():
-        flat &= ~_vanished(F, patch, patches, held, lying(height, X))
+        # a wall whose junction rests on Π has no height: it shares a vertex on Π, which no support holds,
+        # with a sheet under pressure; its faces with two vertices on Π, one of them not held, may be flat
+        low = lying(height, X)
+        wall = np.array([p.auxiliary for p in patches])[patch]
+        rests = low & ~held
+        outer = np.zeros(len(low), dtype=bool)
+        outer[F[~wall]] = True
+        pinched = np.zeros(len(patches), dtype=bool)
+        pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
+        flat &= ~(wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1))
     bad = np.flatnonzero(flat)
     if len(bad):
         fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
@@ -192,21 +201,6 @@ def _perhaps_at_fault(F: Ints, patch: Ints, edge_of_face: Ints, edge_count: int)
                 other, seen = before[other, j], seen + 1
             before[f, k], last[edge] = last[edge], f
     return False
-
-
-def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bools) -> Bools:
-    """(m,) faces of a wall without height, because its junction rests on Π.
-
-    Such a wall shares a vertex on Π, which no support holds, with a sheet under pressure. A face of it
-    may have no area if two of its vertices are on Π and one of these is not held.
-    """
-    wall = np.array([p.auxiliary for p in patches])[patch]
-    rests = low & ~held
-    outer = np.zeros(len(low), dtype=bool)
-    outer[F[~wall]] = True
-    pinched = np.zeros(len(patches), dtype=bool)
-    pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
-    return wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1)
 
 
 def lying(height: Floats, X: Floats) -> Bools:

@@ -27,7 +27,7 @@ class _Placed:
 
     def __post_init__(self) -> None:
         for key in self.KEYS:
-            vector = validate.vector(f"{type(self).__name__}.{key}", getattr(self, key), error=SurfaceError)
+            vector = validate.triple(f"{type(self).__name__}.{key}", getattr(self, key), error=SurfaceError)
             object.__setattr__(self, key, vector)
         key, axis = self.KEYS[1], getattr(self, self.KEYS[1])
         _, exponent = math.frexp(max(map(abs, axis)))

@@ -214,12 +214,7 @@ def checked_images(
     for bad, fault, hint in tests:
         if bad.any():
             checks.refuse_rows("images", pairs, np.flatnonzero(bad), fault, hint=hint)
-    _refuse_coarse(X, F, originals(pairs, len(X)), near)
-    return read_only(pairs)
-
-
-def _refuse_coarse(X: Floats, F: Ints, original: Ints, near: float) -> None:
-    """Refuse triangles with a vertex and its image, and edges that join the same two vertices in two ways."""
+    original = originals(pairs, len(X))
     G = original[F]
     own = np.flatnonzero((G[:, [1, 2, 0]] == G).any(axis=1))
     if len(own):
@@ -231,6 +226,7 @@ def _refuse_coarse(X: Floats, F: Ints, original: Ints, near: float) -> None:
     if apart.any():
         fault = "has an edge between two vertices that are joined otherwise elsewhere, by their images"
         checks.refuse_rows("faces", F, np.flatnonzero(apart), fault, hint=COARSE)
+    return read_only(pairs)
 
 
 def check_translations(before: Surface, X: Floats) -> None:

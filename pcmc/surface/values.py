@@ -170,11 +170,7 @@ def wall_patches(surface: Any) -> Bools:
         return declared
     signs = surface.room_signs
     between = (signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0)
-    return declared | open_ones & (between | _hanging(surface, carrying))
-
-
-def _hanging(surface: Any, carrying: Bools) -> Bools:
-    """(k,) bool: which patches go down below two others along most of their edges at junctions."""
+    # those that go down below two others along most of their edges at junctions
     topo, X, count = surface.topology, surface.vertices, len(surface.patches)
     of_roof = np.zeros(len(topo.edges), dtype=bool)
     of_roof[topo.edge_of_face[carrying[surface.patch_of_face]]] = True
@@ -194,7 +190,7 @@ def _hanging(surface: Any, carrying: Bools) -> Bools:
     first = np.searchsorted(edge[order], edge[order])
     below = np.arange(len(order)) - first < topo.valence[edge[order]] - 2
     lower = np.bincount(patch[order], below * length[order], count)
-    return np.asarray(2.0 * lower > np.bincount(patch, length, count))
+    return declared | open_ones & (between | (2.0 * lower > np.bincount(patch, length, count)))
 
 
 def wall_changes(surface: Any, change: Floats, named: Collection[int] = ()) -> Floats:

@@ -91,7 +91,7 @@ def answer(values: object, parameters: Mapping[str, Any]) -> dict[str, Any]:
     return fields
 
 
-def load(case: str) -> None:
+def import_case(case: str) -> None:
     """Import a case, which then runs without garbage collection once: it takes a fifth of large imports."""
     gc.disable()
     resolve(case)
@@ -99,7 +99,7 @@ def load(case: str) -> None:
     provenance()
 
 
-def run(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
+def run_case(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
     """Run one case that is loaded; its outcome. The process exits at the time limit."""
     function, process, extra = resolve(case), os.getpid(), {}
     started, begin = datetime.now(UTC).isoformat(timespec="milliseconds"), time.perf_counter()

@@ -243,24 +243,18 @@ def _records(
         try:
             if zlib.crc32((key + str(text)).encode()) != crc:
                 raise ValueError
-            records[number] = _record(number, parameters, json.loads(text))
+            record = Record(case=number, parameters=parameters, **json.loads(text))
+            words = record.status, record.verdict, record.message
+            tables = record.numbers, record.provenance
+            if {*map(type, words)} != {str} or {*map(type, tables)} != {dict}:
+                raise TypeError
+            if {*WORDS, "case"} & record.numbers.keys() or {"case", "wall_time"} & record.provenance.keys():
+                raise ValueError
+            if isinstance(record.wall_time, bool) or not isinstance(record.wall_time, int | float):
+                raise TypeError
+            answer(record.numbers, parameters)
+            records[number] = record
         except (ValueError, TypeError, RecursionError):
             text = f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
             warn(f"{text} case again", FileWarning, stacklevel=4)
     return dict(sorted(records.items()))
-
-
-def _record(number: int, parameters: dict[str, Any], fields: Mapping[str, Any]) -> Record:
-    """The record of a case; ValueError or TypeError for one that no case can have, such as one with a number
-    that would take the place of a parameter or a word in a table."""
-    record = Record(case=number, parameters=parameters, **fields)
-    words = (record.status, record.verdict, record.message)
-    tables = (record.numbers, record.provenance)
-    if not all(isinstance(word, str) for word in words) or not all(isinstance(t, dict) for t in tables):
-        raise TypeError
-    if {*WORDS, "case"} & record.numbers.keys() or {"case", "wall_time"} & record.provenance.keys():
-        raise ValueError
-    if isinstance(record.wall_time, bool) or not isinstance(record.wall_time, int | float):
-        raise TypeError
-    answer(record.numbers, parameters)
-    return record

@@ -76,7 +76,7 @@ class Team:
             self.busy.add(process)
         try:
             if new:
-                process.call(SCRIPT, "load", case)
+                process.call(SCRIPT, "import_case", case)
             yield process
         except ChildError as error:  # of the load: a case that fails is an answer
             process.close()
@@ -129,7 +129,8 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
     with mine.process(case) as process:
         started = datetime.now(UTC).isoformat(timespec="milliseconds")
         try:
-            outcome: dict[str, Any] = process.call(SCRIPT, "run", case, parameters, time_limit, limit=limit)
+            task = case, parameters, time_limit
+            outcome: dict[str, Any] = process.call(SCRIPT, "run_case", *task, limit=limit)
             return outcome
         except ChildError as death:
             status, message = "killed", f"ended its worker process ({_cause(death.code or 0)})"

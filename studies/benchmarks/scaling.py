@@ -20,7 +20,7 @@ import pandas as pd
 
 from generators import two_squares
 from pcmc import certify, solve
-from pcmc.stability.factorisation import available
+from pcmc.stability.factorisation import installed
 
 from ..folder import Folder
 from ..orders import Order, slope
@@ -51,7 +51,7 @@ FITTED = (
 
 def measure(quick: bool) -> pd.DataFrame:
     """A row per size: times and peaks of memory of the solution and of the certificate."""
-    fast = available()[0] == "pardiso"
+    fast = installed()[0] == "pardiso"
     sides = FEW if quick else SIDES if fast else SLOW_SIDES
     most = 1 if quick else 3
     return pd.DataFrame([_one_size(side, most) for side in sides])
@@ -140,7 +140,7 @@ def exponents(table: pd.DataFrame) -> dict[str, Order]:
 def rows(table: pd.DataFrame, quick: bool) -> list[Row]:
     """What is asked of the largest size and of the exponents, and the answers."""
     largest = table.iloc[table.triangles.argmax()]
-    bound = not quick and available()[0] == "pardiso"
+    bound = not quick and installed()[0] == "pardiso"
     size = f"{largest.triangles:,.0f} triangles"
     sizes = f"{len(table)} sizes, {table.triangles.min():,.0f} to {table.triangles.max():,.0f} triangles"
     fitted = {

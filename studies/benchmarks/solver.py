@@ -20,7 +20,7 @@ from pcmc.forces.functional import energy_and_gradient
 from pcmc.forces.motion_space import VertexClasses, motion_space, vertex_classes
 from pcmc.forces.pattern import Pattern, hessian_pattern
 from pcmc.forces.second_variation import assemble
-from pcmc.stability.factorisation import Factoriser, available, factoriser
+from pcmc.stability.factorisation import Factoriser, factoriser, installed
 
 from ..reference import evolver
 from .pieces import pieces
@@ -77,7 +77,7 @@ def _steps_at(squares: int, asked: dict[str, float | None], repeats: int) -> lis
     theirs = _their_step(surface, min(repeats, 3))
     rows = [Row(f"Newton step, {evolver.PROGRAM}", theirs, "s", size)]
     for backend, least in asked.items():
-        if backend not in available():
+        if backend not in installed():
             rows.append(Row(f"Newton step, {backend}", np.nan, "s", "not installed"))
             continue
         start = time.perf_counter()
@@ -132,7 +132,7 @@ def peak_memory(quick: bool) -> list[Row]:
     squares = QUICK if quick else MILLION
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         triangles, seconds, peak = pool.submit(_solve_and_weigh, squares).result()
-    remark = f"{triangles:,} triangles, {available()[0]}, imports included, {seconds:.1f} s"
+    remark = f"{triangles:,} triangles, {installed()[0]}, imports included, {seconds:.1f} s"
     return [Row("peak memory", peak / 1e9, "GB", remark, most=None if quick else 2.0)]
 
 

@@ -183,7 +183,7 @@ def conormals(surface: Surface, patch: str) -> Floats:
     tension = np.zeros(len(surface.patches))
     tension[surface.patch_index(patch)] = 1.0
     mesh = triangles.energy_mesh(surface, tension, np.zeros_like(tension))
-    return triangles.measure(mesh, surface.vertices)[2]
+    return triangles.totals_and_gradient(mesh, surface.vertices)[2]
 
 
 def turn(surface: Surface, vertex: int, patches: tuple[str, str]) -> float:

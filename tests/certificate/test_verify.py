@@ -98,7 +98,7 @@ def test_balls_of_volumes_hold_them():
     surface = volume_cases.cylinder(0.8, 2.0, "plates")
     _, _, _, items = parts(surface)
     ends = enclosures.flat_pieces(surface).end_patch
-    value, radius = enclosures.volume(items, np.array(surface.room_signs), ends)
+    value, radius = enclosures.signed_volumes(items, np.array(surface.room_signs), ends)
     assert abs(value[0] - pcmc.room_volumes(surface)[0]) <= 2.0 * radius[0] < 1e-11
 
 

@@ -15,7 +15,7 @@ from tents import tent
 import pcmc
 from generators import two_squares
 from pcmc.base.errors import FileWarning, MissingExtra, OptionError, SurfaceError
-from pcmc.certificate.forces import reactions
+from pcmc.certificate.forces import support_forces
 
 compas_data = pytest.importorskip("compas.data")
 rooms = pytest.importorskip("pcmc.compas")
@@ -109,7 +109,7 @@ def test_meshes_carry_what_the_surface_is():
     common = set(meshes[0].vertices()) & set(meshes[1].vertices())
     assert common == {0, 1, 2, 3}
     curvature = pcmc.mean_curvature(surface, "variational")
-    force = reactions(surface)
+    force = support_forces(surface)
     for mesh in meshes:
         for key in mesh.vertices():
             assert mesh.vertex_coordinates(key) == surface.vertices[key].tolist()

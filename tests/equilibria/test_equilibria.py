@@ -21,7 +21,7 @@ from generators import (
     spherical_cap_exact,
     two_squares,
 )
-from pcmc import BoundaryMotion, Direction, Room, find_equilibria, solve
+from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
@@ -243,6 +243,24 @@ def test_a_small_part_that_leans_the_other_way_is_another_shape():
 def test_other_triangles_on_a_cap_of_three_rings_are_no_other_shape():
     cap = spherical_cap(1.0 / 3.0, exact=True)
     assert all(Shape.of(cap).same_as(Shape.of(turned(cap, angle))) for angle in np.linspace(0.1, 1.0, 7))
+
+
+def test_of_two_sheets_the_nearest_vertex_may_be_on_the_wrong_one():
+    """Two flat sheets, one above the other; which of them has a vertex in its middle changes no shape."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    fan, halves = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [[0, 1, 2], [0, 2, 3]]
+    corners = np.concatenate([square, [[0.5, 0.5, 0.0]], square])
+    one, other = (
+        Surface(
+            corners + np.repeat([[0.0, 0.0, low], [0.0, 0.0, 0.1 - low]], [5, 4], axis=0),
+            np.concatenate([fan, np.array(halves) + 5]),
+            [0] * 6,
+            [Patch("film", 1.0, 0.0)],
+            fixed=[0],
+        )
+        for low in (0.0, 0.1)
+    )
+    assert shape_distance(one, other) == 0.0
 
 
 def test_the_distance_is_symmetric_and_as_long_as_the_unit():

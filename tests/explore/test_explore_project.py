@@ -19,7 +19,7 @@ from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, figures_data
-from pcmc.panelling.distance import difference
+from pcmc.surface.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
 

@@ -23,7 +23,7 @@ from pcmc.explore import roof as saving
 from pcmc.explore.listening import RequestError
 from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, solved_start
-from pcmc.panelling.distance import difference
+from pcmc.surface.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
 

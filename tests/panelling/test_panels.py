@@ -17,10 +17,10 @@ from pcmc import Patch, Surface
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.panelling.distance import distances
-from pcmc.panelling.families import families
+from pcmc.panelling.families import triangle_families
 from pcmc.report.tables import MOST_FAMILIES
 from pcmc.report.words import panel_text
+from pcmc.surface.distance import distances
 from pcmc.surface.geometry import edge_vectors, face_areas
 from studies.questions import panel_families
 from studies.study import perform
@@ -78,7 +78,7 @@ def test_the_families_of_example_1_are_the_orbits_of_its_symmetries(squares, mir
 @pytest.mark.parametrize("tolerance", [1e-6, 0.004, 0.02, 0.3, 50.0])
 def test_panels_of_a_family_differ_by_at_most_the_tolerance(caps, apart, tolerance):
     lengths = edge_lengths(caps)
-    parts = families(lengths, tolerance, apart)
+    parts = triangle_families(lengths, tolerance, apart)
     orders = {tuple(order) for order in parts.order.tolist()}
     assert orders <= {tuple(order) for order in (TURNS if apart else TURNS + TURNED_OVER)}
     aligned = np.take_along_axis(lengths, parts.order, axis=1)
@@ -98,7 +98,7 @@ def test_no_two_of_the_incompatible_triangles_could_share_a_family():
             members = [k for k in range(12) if chosen >> k & 1]
             if all(least[i, j] > 0.08 for i in members for j in members if i < j):
                 clique = max(clique, len(members))
-        parts = families(lengths, 0.08, apart)
+        parts = triangle_families(lengths, 0.08, apart)
         assert 1 < parts.at_least <= clique <= parts.family.max() + 1
 
 
@@ -108,7 +108,8 @@ def test_families_depend_neither_on_the_order_of_faces_nor_on_their_first_corner
     turn = np.random.default_rng(1).integers(3, size=len(lengths))
     turned = np.take_along_axis(lengths, (np.arange(3) + turn[:, None]) % 3, axis=1)
     for apart, tolerance in product((False, True), (0.01, 0.03, 0.1)):
-        before, after = families(lengths, tolerance, apart), families(turned[order], tolerance, apart)
+        before = triangle_families(lengths, tolerance, apart)
+        after = triangle_families(turned[order], tolerance, apart)
         assert np.array_equal(before.family[order], after.family)
         assert before.at_least == after.at_least
 
@@ -116,13 +117,13 @@ def test_families_depend_neither_on_the_order_of_faces_nor_on_their_first_corner
 def test_a_row_of_triangles_needs_as_few_families_as_intervals():
     """Along a line the fewest cubes are known: 11 lengths, 0.1 apart, in steps of 0.25, take 3 at a time."""
     lengths = np.stack([np.full(11, 3.0), np.full(11, 4.0), 5.0 + 0.1 * np.arange(11)], axis=1)
-    assert families(lengths, 0.25).family.max() + 1 == 4
+    assert triangle_families(lengths, 0.25).family.max() + 1 == 4
 
 
 def test_the_search_leaves_fewer_families_than_the_sweeps():
     """Triangles of families that are dissolved go into those that stay: 10, and 11 where none does."""
     lengths = np.random.default_rng(3).uniform(1.0, 1.4, (80, 3))
-    assert families(lengths, 0.1).family.max() + 1 == 10
+    assert triangle_families(lengths, 0.1).family.max() + 1 == 10
 
 
 def test_areas_add_up_and_flat_panels_are_congruent_to_their_faces(caps):

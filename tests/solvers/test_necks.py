@@ -6,7 +6,7 @@ from nightly import at_night
 from shapes import tube
 from starts import spherical_cap
 
-from pcmc import Circle, Patch, Verdict, solve
+from pcmc import Circle, Patch, Surface, Verdict, solve
 from pcmc.certificate.diagnosis import narrowest_neck
 from pcmc.solvers import solve_once
 from pcmc.solvers.result import Status
@@ -84,6 +84,15 @@ def test_the_neck_is_the_shortest_cut():
     assert neck.girth == pytest.approx(2 * 24 * c * np.sin(np.pi / 24), rel=1e-9)
     assert neck.place == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
     assert narrowest_neck(spherical_cap(0.25)) is None
+
+
+def test_cones_that_share_their_tip_alone_have_no_neck():
+    """No edge joins them, so no cut parts them; the words of a neck would divide by its length 0."""
+    i, ring = np.arange(6), np.exp(2j * np.pi * np.arange(6) / 6)
+    X = [[*r, z] for z in (-1.0, 1.0) for r in zip(ring.real, ring.imag, strict=True)]
+    F = [[a + k, b + k, 12] for k in (0, 6) for a, b in zip(i, np.roll(i, -1), strict=True)]
+    cones = Surface([*X, [0.0, 0.0, 0.0]], F, [0] * 12, [Patch("film", 1.0, 0.0)], fixed=range(12))
+    assert narrowest_neck(cones) is None
 
 
 def test_a_film_under_pressure_stands_farther_apart():

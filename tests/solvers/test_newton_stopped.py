@@ -13,7 +13,7 @@ from pcmc.base.errors import MissingExtra, OptionError
 from pcmc.certificate import Verdict
 from pcmc.solvers.newton import NewtonOptions
 from pcmc.solvers.result import Status
-from pcmc.stability.factorisation import BACKENDS, available
+from pcmc.stability.factorisation import BACKENDS, installed
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
@@ -179,7 +179,7 @@ def test_options_are_values(backend):
 
 @pytest.mark.parametrize("make", [partial(two_squares, 6), partial(two_caps, 0.8), partial(four_fans, 5)])
 def test_every_backend_gives_the_same(backend, make):
-    first = solve(make(), target="stationary", backend=available()[0])
+    first = solve(make(), target="stationary", backend=installed()[0])
     other = solve(make(), target="stationary", backend=backend)
     assert other.status is first.status
     assert abs(other.iterations - first.iterations) <= 1

@@ -16,11 +16,11 @@ from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pattern import Pattern, hessian_pattern
 from pcmc.forces.second_variation import assemble
 from pcmc.stability import factorisation as factor
-from pcmc.stability.factorisation import SingularMatrix, available, factoriser
+from pcmc.stability.factorisation import SingularMatrix, factoriser, installed
 
 BACKENDS = [
     pytest.param(
-        name, marks=pytest.mark.skipif(name not in available(), reason="this solver is not installed")
+        name, marks=pytest.mark.skipif(name not in installed(), reason="this solver is not installed")
     )
     for name in factor.BACKENDS
 ]
@@ -236,15 +236,15 @@ def test_unknown_and_missing_backends(monkeypatch):
     pattern, _ = upper(np.eye(2))
     with refused(OptionError, what="backend", found="superl", expected=factor.BACKENDS):
         factoriser(pattern, "superl")
-    monkeypatch.setattr(factor, "available", lambda: ("superlu",))
+    monkeypatch.setattr(factor, "installed", lambda: ("superlu",))
     with pytest.raises(MissingExtra, match=r"pypardiso is not installed.*pcmc-surfaces\[fast\]"):
         factoriser(pattern, "pardiso")
     assert factoriser(pattern).factor(np.ones(2)).negative == 0
 
 
 def test_the_fastest_backend_comes_first(monkeypatch):
-    assert available()[-1] == "superlu"
+    assert installed()[-1] == "superlu"
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert factor.available.__wrapped__() == ("superlu",)
+    assert factor.installed.__wrapped__() == ("superlu",)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: object())
-    assert factor.available.__wrapped__() == factor.BACKENDS
+    assert factor.installed.__wrapped__() == factor.BACKENDS

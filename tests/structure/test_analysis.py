@@ -12,9 +12,10 @@ from structures import model_of, pyramid, square
 from under_load import ALPHA, THICK, cap, parts, stiffness, strip
 
 import pcmc
-from pcmc import Material, SelfWeight, Snow, Wind
+from pcmc import Material, Plane, SelfWeight, Snow, Wind
 from pcmc.plan import Plan
 from pcmc.structure import analyse, analysis, calculix
+from pcmc.surface.pieces import to_space
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
@@ -170,6 +171,19 @@ def test_cloth_is_as_stiff_along_the_arc_as_its_warp_or_weft(warp, young):
     np.testing.assert_allclose(np.abs(along[:, 1]), warp[1], atol=1e-12)
     crown = -analyse(model)["snow"].results.deflections[20]
     assert crown == pytest.approx(section(young * THICK / (1.0 - 0.3**2 * 0.4), 0.4), rel=0.01)
+
+
+@pytest.mark.parametrize("plane", [Plane((10, 0, 3)), Plane((0, 0, 0), (1, 0, 0))])
+def test_a_zone_lies_where_the_plan_has_it(plane):
+    """Its points are those of Π, as all points of a plan are, wherever Π lies."""
+    film = square(8)
+    moved = film.rebuilt(vertices=to_space(film.vertices, plane), plane=plane)
+    strip = [(0.0, 0.0), (0.25, 0.0), (0.25, 1.0), (0.0, 1.0)]
+    here, there = (
+        model_of(s, loads=[Snow(0.3, ["film"], area=strip)], anyway=True).steps[1].forces
+        for s in (film, moved)
+    )
+    np.testing.assert_allclose(there @ plane.axes.T, here, atol=1e-15)
 
 
 def test_zones_carry_snow_and_wind():

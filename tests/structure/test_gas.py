@@ -1,5 +1,7 @@
 """Gas that gives way with its volume, and cushions: two sheets that enclose it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -8,7 +10,7 @@ from structures import model_of
 from under_load import ALPHA, THICK, cap, parts, stiffness, strip
 
 import pcmc
-from pcmc import Material, Patch, Snow, Surface, Wind
+from pcmc import Material, Patch, SelfWeight, Snow, Surface, Wind
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan
@@ -40,6 +42,35 @@ def test_enclosed_gas_gives_way_as_the_volume_does():
 def sphere_area():
     """Of the cap of height h = 2α - √(4α² - 1) on the unit circle: 4π α h."""
     return 4.0 * np.pi * ALPHA * (2.0 * ALPHA - np.sqrt(4.0 * ALPHA**2 - 1.0))
+
+
+@needs_ccx
+def test_p_v_is_constant_under_self_weight_and_down_to_no_pressure_outside():
+    """As under the same load as snow; without air outside, a soft cap does not turn inside out."""
+    soft, loads = Material(2e3), [SelfWeight(gravity=1.0), Snow(0.5)]
+    for outside in (0.0, 100.0):
+        model = model_of(cap(0.4), material=replace(soft, density=980.0), thickness=THICK, loads=loads)
+        table = analyse(replace(model, gas=Gas(ambient=outside))).table
+        assert (table["volume"] > 0.0).all()
+        assert table["pressure"].is_monotonic_increasing
+        product = (outside + table["pressure"]) * table["volume"]
+        assert product.to_numpy() == pytest.approx(
+            product[0], rel=1e-3
+        )  # in CalculiX the form moves a little
+
+
+@needs_ccx
+def test_a_factor_on_the_form_is_one_on_the_pressure_to_which_the_gas_is_filled():
+    outside, loads = 10.0, [Snow(0.2)]
+    model = model_of(
+        cap(0.15), material=Material(2e4), thickness=THICK, loads=loads, gas=Gas(ambient=outside)
+    )
+    found = analyse(replace(model, combinations={"uls": {"form": 1.5, "snow": 1.0}}))
+    case, form = found["uls"], found.cases[0]
+    assert (outside + case.pressure) * case.volume == pytest.approx((outside + 1.5) * form.volume, rel=1e-3)
+    acting = [(Snow(0.2), Wind({"cap": case.pressure - 1.0}))]
+    held = analyse(replace(model, loads=acting, gas=None)).cases[1]
+    np.testing.assert_allclose(case.results.deflections, held.results.deflections, atol=1e-6)
 
 
 def bay_of_a_cushion(n):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from refusals import refused
 from shapes import rotation
+from small_project import HALL_WITH_ARCH
 from starts import stationary, two_squares
 from structures import FABRIC, LOADS, model_of, pyramid, square
 
@@ -17,7 +18,7 @@ from generators import hypar_roof
 from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
-from pcmc.certificate.forces import load
+from pcmc.certificate.forces import total_load
 from pcmc.forces.functional import patch_areas
 from pcmc.project import Structure
 from pcmc.surface.geometry import face_areas
@@ -77,9 +78,9 @@ def test_loads_balance_their_totals():
     model = model_of(surface, loads=LOADS)
     form, weight, snow, both = model.steps
     assert [step.name for step in model.steps] == ["form pressure", "self-weight", "snow", "snow and wind"]
-    assert model.nodal_loads(form).sum(axis=0) == pytest.approx([0, 0, load(surface)])
+    assert model.nodal_loads(form).sum(axis=0) == pytest.approx([0, 0, total_load(surface)])
     own = 0.1 * 1e-3 * 9.81 * face_areas(surface.vertices[surface.faces]).sum()
-    assert model.nodal_loads(weight).sum(axis=0) == pytest.approx([0, 0, load(surface) - own])
+    assert model.nodal_loads(weight).sum(axis=0) == pytest.approx([0, 0, total_load(surface) - own])
     assert model.nodal_loads(snow).sum(axis=0) == pytest.approx([0, 0, 4.0 - own - 0.5 * 4.0])
     assert model.nodal_loads(both).sum(axis=0) == pytest.approx([0, 0, 1.3 * 4.0 - own - 0.2 * 4.0])
     np.testing.assert_allclose(model.nodal_loads(form)[4], [0, 0, 4 / 3])
@@ -363,6 +364,20 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     assert "young" in capsys.readouterr().err
     (tmp_path / "roof.toml").write_text(PROJECT.replace("1e6", "-1.0"))
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+
+
+def test_a_member_alone_has_a_weight_too(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    given = ["structure", "hall.toml", "-o", "hall.inp"]
+    (tmp_path / "hall.toml").write_text(
+        HALL_WITH_ARCH.replace("young = 2.1e8", "young = 2.1e8\ndensity = 7.85")
+    )
+    assert cli.main([*given, "--gravity", "10"]) == 0
+    assert "form pressure, self-weight" in capsys.readouterr().out
+    assert "MEMBER_1,GRAV,10" in (tmp_path / "hall.inp").read_text()
+    (tmp_path / "hall.toml").write_text(HALL_WITH_ARCH)
+    assert cli.main([*given, "--gravity", "10"]) == 2
+    assert "gravity: nothing has a weight; give a density, too" in capsys.readouterr().err
 
 
 def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys):

@@ -6,7 +6,7 @@ from structures import LOADS, dat_text, model_of, pyramid, square
 
 import pcmc
 from pcmc.base.errors import FileError
-from pcmc.certificate.forces import reactions
+from pcmc.certificate.forces import support_forces
 
 
 def test_results_are_read_exactly(tmp_path):
@@ -81,14 +81,14 @@ def test_results_of_another_surface_or_analysis_are_refused(tmp_path):
 
 def test_numbers_with_long_exponents_are_read():
     text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\n\n 1 -1.5-120 0. 2.0E+00\n"
-    found = pcmc.structure.results.read(text)[0]["displacements"][-1]
+    found = pcmc.structure.results.read_tables(text)[0]["displacements"][-1]
     assert found.values.tolist() == [[-1.5e-120, 0.0, 2.0]]
 
 
 def test_reactions_of_an_exact_answer_are_ours(tmp_path):
     """The elements' force at a held node, Σ α ∂A, less the load on the node itself is the reaction."""
     surface = pyramid()
-    model, ours = model_of(surface), reactions(surface)
+    model, ours = model_of(surface), support_forces(surface)
     blocks = ours + model.nodal_loads(model.steps[0])
     text = dat_text(model)[0]
     head, tail = text.index(" forces"), text.index(" stresses")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from pcmc.stability.factorisation import available
+from pcmc.stability.factorisation import installed
 
-DEFAULT, *OTHERS = available()
+DEFAULT, *OTHERS = installed()
 BACKENDS = [DEFAULT, *(pytest.param(name, marks=pytest.mark.nightly) for name in OTHERS)]
 every_backend = pytest.mark.parametrize("backend", BACKENDS)

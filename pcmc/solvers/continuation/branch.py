@@ -143,7 +143,7 @@ class Branch:
         (True, True)
         """
         row, goals = self._bifurcation(event), _goals(stop, until)
-        chosen = validate.build(FollowOptions, "switch", vars(self._options) | options)
+        chosen = validate.options_from(FollowOptions, "switch", vars(self._options) | options)
         line = replace(self._known_line("switch"), value=float(self.events.parameter[row]))
         surface = self.event_surfaces[row]
         one, other = (
@@ -297,7 +297,7 @@ def follow(
     expect_flat(surface, "follow")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")
-    chosen = validate.build(FollowOptions, "follow", options)
+    chosen = validate.options_from(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
     goals = _goals(stop, until)

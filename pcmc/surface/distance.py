@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
-from ..surface import Surface
-from ..surface.geometry import area_vectors, point, to_triangle, vertex_sums
+from .geometry import area_vectors, point, to_triangle, vertex_sums
+from .surface import Surface
 
 
 def distances(points: Floats, X: Floats, F: Ints) -> Floats:
