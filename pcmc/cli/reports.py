@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 FAR = 10.0  # degrees: walls that lean less are not reported
-UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -51,7 +50,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
         leaning = lean_texts(certificate.leaning, outcome.surface.size, FAR)
         if leaning and certificate.certified:
-            print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
+            print(f"walls lean from the vertical: {', '.join(leaning)}; {_against_lean(outcome)}")
         if certificate.certified and outcome.shown.certificate.cuts_itself:
             print(f"not to be built as it is: {outcome.shown.certificate.cuts_itself}")
     if outcome.under_load is not None:
@@ -59,6 +58,22 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     if outcome.advice:
         print("\n  ".join(outcome.advice))
     ended(outcome.good, outcome.files)
+
+
+def _against_lean(outcome: Outcome) -> str:
+    """What limits the lean of the walls that lean far; only a straight divider can hold its wall upright."""
+    limit = 'a target "lean" limits it'
+    plan = None if outcome.project is None else outcome.project.plan
+    if plan is None:
+        return limit
+    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
+
+    table = outcome.certificate.leaning
+    far = set(table["wall"][table["lean"] >= FAR])
+    dividers = {d.name: d.curve.local(plan.plane) for d in plan.dividers if d.name in far}
+    straight = [repr(name) for name, curve in dividers.items() if is_straight(curve, SNAP * plan.edge_length)]
+    upright = f"upright = true under divider {' or '.join(straight)} keeps its wall in its plane, "
+    return f"{upright if straight else ''}{limit}"
 
 
 def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False) -> None:
