@@ -254,8 +254,9 @@ class Certificate:
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         supports = self.supports.drop(columns=[*MOMENT])
-        least = EXCESS * supports[[*FORCE]].abs().max(axis=None)  # less than that is rounding
-        supports[[*FORCE]] = supports[[*FORCE]].where(supports[[*FORCE]].abs() > least, 0.0)
+        forces = supports[[*FORCE]].to_numpy(float)
+        rounding = np.abs(forces) <= EXCESS * np.abs(forces).max(initial=0.0)
+        supports[[*FORCE]] = np.where(rounding, 0.0, forces)
         shown = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
         texts = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in shown if len(t)]
         return "\n\n".join([head, *texts])
