@@ -72,8 +72,8 @@ def parsed_integer(text: str | int) -> int:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
 
 
-EVERY = "A bare VALUE applies to every patch"
-LOADED = f"{EVERY} under pressure"
+EVERY = "A bare VALUE applies to every patch that is not named"
+LOADED = "A bare VALUE applies to every patch under pressure that is not named"
 UPDATED = "wall pressures are updated"
 MESH_CHECK = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
 START = "The start shape of a project, before it is solved, instead of its designed roof."
@@ -105,7 +105,9 @@ class Loads:
     pressure: Annotated[list[str] | None, by_part(f"Pressure on a patch. {LOADED}; {UPDATED}.")] = None
     weight: Annotated[list[str] | None, by_part(f"Weight of a patch per area. {EVERY}.")] = None
     snow: Annotated[list[str] | None, by_part(f"Snow on a patch, per area of the plan. {LOADED}.")] = None
-    cable: Annotated[list[str] | None, by_part("Tension of a cable. A bare VALUE applies to all.")] = None
+    cable: Annotated[
+        list[str] | None, by_part("Tension of a cable. A bare VALUE applies to all that are not named.")
+    ] = None
     cable_weight: Annotated[list[str] | None, by_part("Weight of a cable per length.")] = None
     volume: Annotated[list[str] | None, by_part("Volume of a room that has one already.")] = None
 
@@ -205,8 +207,12 @@ def check_suffix(file: Path) -> None:
 
 
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
-    """Value by name, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
-    values: dict[str, float] = {}
+    """Value by name, from NAME=VALUE, and VALUE for all other ``names``.
+
+    >>> by_name(["west", "east"], ["east=2", "3"], "--tension")
+    {'west': 3.0, 'east': 2.0}
+    """
+    values: dict[bool, dict[str, float]] = {False: {}, True: {}}  # by whether each is named
     for text in given or ():
         name, sign, value = text.rpartition("=")
         try:
@@ -218,8 +224,13 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
         if not (name or names):
             message = f"{flag} {text}: the surface has no {flag.removeprefix('--')} that this could replace"
             raise OptionError(message, what=flag, found=text)
-        values |= {name: amount} if name else dict.fromkeys(names, amount)
-    return values
+        new = {name: amount} if name else dict.fromkeys(names, amount)
+        if new.keys() & values[bool(name)].keys():
+            raise OptionError(
+                f"{flag}: {name or 'a bare value'} is given twice; keep one", what=flag, found=text
+            )
+        values[bool(name)] |= new
+    return values[False] | values[True]
 
 
 def named_values(text: str) -> tuple[str, list[Any]]:

@@ -17,6 +17,7 @@ from ..drawings.drawing_set import table_paths
 from ..drawings.net_drawings import SUFFIXES as NETS
 from ..drawings.net_drawings import TABLES, net_files
 from ..io import FORMATS, write
+from ..panelling.panel_net import check_grid
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
 from ..project.settings import Output, Structure, cost_paths, schedule_paths
@@ -56,7 +57,7 @@ TOLERANCE = (
 HEIGHT = "Section at this height; may be repeated."
 TWO = "two numbers FAMILY,PANEL, 0 or more"
 LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
-TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
+TRUE_SIZE = "Draw every panel at true size, as a project may say, too; needs --tolerance."
 FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
 DATE = "Date to print; by default the project's. No clock is read."
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
@@ -119,8 +120,10 @@ def panels_(
     if change is not None:
         validate.positive("--change", change)
     prices = None if cost is None else arguments.numbers(cost, "--cost", TWO, 2)
-    if prices is not None and (min(prices) < 0.0 or change is None):
-        validate.refuse("--cost", cost, TWO, hint="; it needs --change" if change is None else "")
+    if prices is not None and change is None:
+        raise OptionError("--cost: is of the surfaces that --change gives; give --change, too", what="--cost")
+    for price in prices or ():
+        validate.number("--cost", price, least=0.0)
     outputs = Output(picture=picture, view=seen).paths
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
@@ -175,10 +178,11 @@ def _net(
     """Lay out quads or hexagons and write them."""
     for path in files:
         suffix_of(path, NETS, "a net of panels")
-    outputs = Output(picture=picture, view=seen).paths
+    size, pattern, direction = wanted
+    check_grid(pattern, direction)
+    outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, TABLES)]
     check_outputs(outputs, inputs=files_of(file))
-    size, pattern, direction = wanted
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("laying out panels")
@@ -218,7 +222,7 @@ def draw_(
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
-        documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets)
+        documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets or None)
         options = {"scale": scale, "heights": heights, "lines": lines}
         drawings = roof.drawing_set(documents, anyway=build.allow_uncertified, **options)
         written = write_all(drawings.files(*output), progress)
@@ -248,11 +252,11 @@ def report_(
     anyway = build.allow_uncertified
     with working() as progress:
         project = arguments.load_project(file, units)
-        own = project.units.force
-        if force and own and force != own:
+        roof = build.roof(project, progress)
+        if force and roof.units.force not in ("", force):
+            own = roof.units.force
             text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
             raise OptionError(text, what="--force", found=force, expected=own)
-        roof = build.roof(project, progress)
         progress("certifying")
         roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
         require_certified(roof.shown.certificate, anyway)

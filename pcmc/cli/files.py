@@ -138,8 +138,13 @@ def explore(
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
-    if watch and file is None:
-        raise OptionError("explore: --watch needs a file", what="--watch")
+    for flag, given, wanted, needs in (
+        ("--watch", watch, file, "a file"),
+        ("--start", start_shape, file, "a file"),
+        ("--set", parameter, example, "an --example"),
+    ):
+        if given and wanted is None:
+            raise OptionError(f"explore: {flag} needs {needs}", what=flag)
     again = None
     with working() as progress:
         progress("building")
@@ -148,7 +153,11 @@ def explore(
             read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
             roof, again = read(progress=progress, report=reports.report), read if watch else None
         else:
-            values = {name: listed[0] for name, listed in map(arguments.named_values, parameter or ())}
+            values = dict[str, Any]()
+            for name, listed in map(arguments.named_values, parameter or ()):
+                if name in values or len(listed) > 1:
+                    raise OptionError(f"--set {name}: give one value", what="--set", where=name)
+                values[name] = listed[0]
             roof = ShownRoof.of(_example(str(example), values), str(example))
         progress("solving")
         explorer = start(roof, host, port, watch=again)

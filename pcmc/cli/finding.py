@@ -54,7 +54,8 @@ def equilibria_(
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format
-    check_outputs(files, inputs=files_of(file))
+    numbered = [_numbered(path, k) for path in surfaces for k in range(1, 100)]  # as many as may be found
+    check_outputs([*files, *numbered], inputs=files_of(file))
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
@@ -70,10 +71,14 @@ def equilibria_(
             else:
                 warn_of_members(roof, path.name)
                 for k, one in enumerate(found.found, 1):
-                    place = path.with_name(f"{path.stem}-{k}{path.suffix}")
-                    jobs += certified_files(one.surface, one.certificate, [place], roof.units)
+                    jobs += certified_files(one.surface, one.certificate, [_numbered(path, k)], roof.units)
         written = write_all(jobs, progress)
     print(found.text(roof.units))
     if written:
         print(f"written: {', '.join(map(str, written))}")
     return OK
+
+
+def _numbered(path: Path, number: int) -> Path:
+    """The file of an equilibrium."""
+    return path.with_name(f"{path.stem}-{number}{path.suffix}")

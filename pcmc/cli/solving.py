@@ -17,6 +17,7 @@ from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.libraries import require
 from ..io import FORMATS, READ_ONLY
+from ..project import Outcome, Project
 from ..project.drawn import files_of
 from ..project.file import with_rise
 from ..project.planning import proposal_text
@@ -103,6 +104,11 @@ def solve_(
     project = load_project(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
+    if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
+        text = (
+            f"--folder: {file.name} writes nothing there by itself; name the files, as -o {folder}/roof.obj"
+        )
+        raise OptionError(text, what="--folder", found=str(folder))
     project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
@@ -123,14 +129,19 @@ def solve_(
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, progress, changed=loads.change, **how)
+    _print_solved(outcome, project, "--allow-uncertified to write it")
+    return OK if outcome.good else NOT_CERTIFIED
+
+
+def _print_solved(outcome: Outcome, project: Project, otherwise: str) -> None:
+    """Print a roof that was solved, and what its project wants to know; make the mesh check last."""
     reports.report(outcome)
     if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
-        print("nothing written (use --allow-uncertified to write it)")
+        print(f"nothing written (use {otherwise})")
     reports.mesh_check(outcome, brief=True)
     reports.margins(outcome)
-    return OK if outcome.good else NOT_CERTIFIED
 
 
 def certify_(
@@ -164,6 +175,8 @@ def certify_(
     reports.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
+    if meshes is None and roof.project is not None and roof.project.mesh_check:
+        meshes = 3
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as progress:
@@ -194,8 +207,9 @@ def remesh_(
     with working() as progress:
         project = replace(load_project(file, units), output=written)
         if solve:
-            project = replace(project, folder=file.parent, remeshing=(stage,))
-            outcome = projects.run_project(project, progress)
+            check = bool(project.mesh_check)
+            project = replace(project, folder=file.parent, remeshing=(stage,), mesh_check=check)
+            outcome = projects.run_project(project, progress, check_after=False)
         else:
             progress("remeshing")
             roof = projects.start_of(project)
@@ -206,9 +220,7 @@ def remesh_(
             print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
-    reports.report(outcome)
-    if not outcome.files:
-        print("nothing written (use --no-solve to write the new mesh)")
+    _print_solved(outcome, project, "--no-solve to write the new mesh")
     return OK if outcome.files else NOT_CERTIFIED
 
 
@@ -266,6 +278,8 @@ def sweep(
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
         require("pyarrow")
     check_names((), plot)
+    if retry_failed and store is None:
+        raise OptionError("--retry-failed: is of stored cases; name their --store", what="--retry-failed")
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
     options = {"mesh_check": mesh_check, "search": search}

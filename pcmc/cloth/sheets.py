@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
+from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..drawings import DrawingSet, Sheet
@@ -27,6 +28,7 @@ LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "mirror": "PCMC-SEAM"
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
 MITRE = 3.0  # of an allowance: farther from its corner cloth is cut across
+MOST_NOTCHES = 1000  # on a seam; more mean a mistake in the unit
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
 
@@ -142,6 +144,11 @@ def strip_lines(
             edges = side.edges if side.forward else side.edges[:, ::-1]
             added |= dict.fromkeys(map(tuple, edges.tolist()), beyond)
             count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
+            if count > MOST_NOTCHES:
+                text = f"notches: marks at distances of {step:g} would be {count} on seam {seam.number}, more"
+                raise OptionError(
+                    f"{text} than {MOST_NOTCHES}; give a larger one", what="notches", found=step
+                )
             length = beyond or 0.02 * strip.width
             for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
                 at, inward = _along(seam, side, strip, place)

@@ -30,6 +30,7 @@ from .sheet import SheetMesh, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
+MOST = 100_000  # panels of a sheet; more mean a mistake in the unit
 KINDS = np.array(["inside", "edge", "corner"])  # of nodes
 FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
 NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
@@ -185,7 +186,7 @@ def panel_net(
     Raises
     ------
     SurfaceError : the surface is not certified, or is all walls.
-    OptionError : the size is too large for a patch, or the pattern does not exist on one.
+    OptionError : the size is too large or too small for a patch, or the pattern does not exist on one.
     MissingExtra : shapely is not installed.
 
     >>> from generators import delaunay
@@ -195,8 +196,7 @@ def panel_net(
     expect_surface(surface)
     expect_flat(surface, "the net of panels")
     size = validate.positive("size", size)
-    validate.choice("pattern", pattern, PATTERNS)
-    direction = validate.number("direction", direction)
+    check_grid(pattern, direction)
     certificate = certified(surface, anyway, certificate)
     sheets = sheets_of(surface)
     if not sheets:
@@ -214,6 +214,14 @@ def panel_net(
     return PanelNet(surface, pattern, size, certificate, *polygons, axes, found.normals, *tables, umbilics)
 
 
+def check_grid(pattern: str, direction: float, owner: str = "") -> None:
+    """Refuse an unknown pattern, and a direction that counts for nothing. ``owner`` begins their names."""
+    validate.choice(f"{owner}pattern", pattern, PATTERNS)
+    if validate.number(f"{owner}direction", direction) and pattern == "planar-quads":
+        text = f"{owner}direction: is of a grid in plan, and planar-quads follow lines of curvature"
+        raise OptionError(f"{text}; leave it out", what=f"{owner}direction", found=direction)
+
+
 def _sheet_net(
     surface: Surface, patch: int, faces: Ints, sheet: SheetMesh, size: float, pattern: str, direction: float
 ) -> SheetNet:
@@ -223,6 +231,10 @@ def _sheet_net(
     if size > most:
         text = f"size: panels of {size:g} are too large for patch {name!r}; choose at most {most:.2g}"
         raise OptionError(text, what="size", found=size, expected=most)
+    least = float(np.sqrt(face_areas(sheet.X[sheet.F]).sum() / MOST))
+    if size < least:
+        text = f"size: panels of {size:g} would be more than {MOST} on patch {name!r}; choose at least"
+        raise OptionError(f"{text} {1.01 * least:.2g}", what="size", found=size, expected=least)
     if pattern == "planar-quads":
         return SheetNet(name, faces, sheet, *curvature_coordinates(sheet, size, name))
     hexagons = pattern == "hexagons"

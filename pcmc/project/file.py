@@ -311,6 +311,8 @@ def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:
         text = f"{flag}: {project.path.name} has targets already; change them there"
         raise OptionError(text, what=flag)
     if project.mesh is not None:
+        if rises[0].kind not in RISES:
+            raise OptionError(f"{flag}: is for a plan, and here is a mesh; give --rise or --apex", what=flag)
         return replace(project, mesh=replace(project.mesh, rises=rises))
     assert project.plan is not None
     plan, targets, vary = with_rises(project.plan, rises)

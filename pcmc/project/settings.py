@@ -27,6 +27,7 @@ from ..drawings.net_drawings import TABLES as NET_TABLES
 from ..drawings.sheet import FORMATS
 from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..panelling.panel_net import PATTERNS as NET_PATTERNS
+from ..panelling.panel_net import check_grid
 from ..plot.figure import SUFFIXES
 from ..plot.scene import VIEWS
 from ..report.document import SUFFIXES as REPORTS
@@ -149,6 +150,11 @@ class AccuracyWanted:
         validate.integer("most_triangles", self.most_triangles, least=1)
         if self.accuracy:
             object.__setattr__(self, "accuracy", accuracies(self.accuracy))
+            return
+        for name, usual in (("accuracy_of", "mesh"), ("most_triangles", TRIANGLES)):
+            if getattr(self, name) != usual:
+                text = f"{name}: counts only with an accuracy; give accuracy, too, or leave it out"
+                raise OptionError(text, what=name, found=getattr(self, name))
 
 
 @dataclass(frozen=True)
@@ -207,8 +213,7 @@ class Output:
         for key, (suffixes, what) in DOCUMENTS.items():
             for file in self.files_of(key):
                 suffix_of(file, suffixes, what)
-        validate.choice("net_pattern", self.net_pattern, NET_PATTERNS)
-        validate.number("net_direction", self.net_direction)
+        check_grid(self.net_pattern, self.net_direction, "net_")
         if self.net_size is not None:
             validate.positive("net_size", self.net_size)
         if bool(self.net) != (self.net_size is not None):

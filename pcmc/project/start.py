@@ -39,7 +39,13 @@ def start_of(project: Project) -> Outcome:
     Errors as in ``load``."""
     if project.mesh is not None:
         surface, data = read_mesh(project.path, project.mesh, project.units)
-        units = Units(data.units.length, project.units.force or data.units.force)
+        own, force = data.units.force, project.units.force
+        if own and force not in ("", own):
+            text = f"{project.path}: force = {force!r}, but the tensions in {project.mesh.file} are in {own}"
+            raise OptionError(
+                f"{text}; make it {own!r}, or leave it out", what="force", found=force, expected=own
+            )
+        units = Units(data.units.length, force or own)
         surface, targets, vary = first_tensions(surface, project.mesh)
         if targets:
             project = replace(project, targets=[*project.targets, *targets], vary=[*project.vary, *vary])

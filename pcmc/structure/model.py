@@ -123,7 +123,8 @@ class StructuralModel:
             validate.refuse("members", self.members, "a sequence of Members")
         vars(self)["members"] = tuple(self.members)
         self.cable_sections, self.bars  # noqa: B018
-        if self.weights and not any(material.density for material in self.materials):
+        of_lines = [line.member.material for line in self.beams] + [of for _, of in self.cable_sections]
+        if self.weights and not any(material.density for material in (*self.materials, *of_lines)):
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
         known = self.certificate or getattr(solved, "certificate", None)
@@ -367,6 +368,8 @@ def checked_areas(given: object, surface: Surface, without: Container[str] = ())
         name = wanting[0].name
         message = f"cable_area is missing: give the area of the section of cable {name!r}, length²"
         raise OptionError(message, what="cable_area", where=name)
+    if given is not None and not isinstance(given, Mapping):
+        validate.number("cable_area", given, **limits)
     areas = [(name, area) for name, area in _each(given, surface.cables, "cable") if name not in without]
     return {name: validate.number("cable_area", area, where=name, **limits) for name, area in areas}
 

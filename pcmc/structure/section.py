@@ -156,7 +156,8 @@ class Structure:
     ----------
     young : Young's modulus E > 0, force per area; of a cloth along its warp.
     poisson : Poisson's ratio ν, 0 ≤ ν < 0.5.
-    density : mass per volume, as of ``Material``: t/m³ with kN and m. With a density, self-weight is a load.
+    density : mass per volume, as of ``Material``: t/m³ with kN and m. With one here, of a patch or of a
+        member, self-weight is a load.
     weft, shear : of a cloth: Young's modulus along its weft, and shear modulus, force per area.
     warp : of a cloth: a direction in space, whose projection onto each triangle is its warp.
     thickness : of all patches, length, or a table with one for each patch.
@@ -198,6 +199,9 @@ class Structure:
                 raise OptionError(text, what=name)
         self.material, self.enclosed  # noqa: B018
         members_of(self.members, None)
+        if self.gravity is not None and not self._heavy:
+            text = "gravity: nothing has a weight; give a density, too, or leave it out"
+            raise OptionError(text, what="gravity", found=self.gravity)
         check_combinations(self.combinations, self.loads(()))
 
     @property
@@ -234,11 +238,15 @@ class Structure:
         check_keys(self.gas, Gas, "structure.gas")
         return Gas(**self.gas)
 
+    @property
+    def _heavy(self) -> bool:
+        parts = (*self.patches.values(), *self.members.values())
+        return bool(self.density) or any(part.get("density") for part in parts)
+
     def loads(self, roof: Sequence[str]) -> tuple[Load | tuple[Load, ...], ...]:
         """Self-weight, snow and wind, each in a step of its own, and the cases of the zones; ``roof`` are the
         names of the patches that wind acts on by default."""
-        heavy = self.density > 0.0 or any(given.get("density", 0.0) for given in self.patches.values())
-        weight = [SelfWeight(self.gravity)] if heavy else []
+        weight = [SelfWeight(self.gravity)] if self._heavy else []
         snow = [Snow(self.snow)] if self.snow != 0.0 else []
         wind = [Wind(self.wind)] if self.wind else []
         cases: dict[str, list[Load]] = {}

@@ -203,6 +203,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["sweep", "generators:two_squares", "alpa=1,2"], "unknown parameter"),
         (["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "x.txt"], ".csv or .parquet"),
         (["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "no/x.csv"], "no folder"),
+        (["sweep", "generators:two_squares", "alpha_aux=1,2", "--retry-failed"], "name their --store"),
         (["solve", "roof.toml", "--folder", "roof.toml"], "needs a folder"),
         (["plot", "roof.toml", "away/x.png"], "there is no folder away"),
         (["plot", "roof.toml", "x.png", "--view", "1,2,3"], "unknown view"),
@@ -211,6 +212,27 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["explore", "--example", "two_square"], "did you mean 'two_squares'"),
         (["explore", "--example", "no.such:thing"], "--example no.such:thing: No module"),
         (["explore", "--example", "two_squares", "--set", "a=1"], "'a'"),
+        (
+            ["explore", "--example", "two_squares", "--set", "alpha_aux=1,2"],
+            "--set alpha_aux: give one value",
+        ),
+        (["explore", "roof.toml", "--set", "alpha_aux=1"], "--set needs an --example"),
+        (["explore", "--example", "two_squares", "--start"], "--start needs a file"),
+        (["solve", "roof.toml", "--tension", "roof=1", "--tension", "roof=2"], "roof is given twice"),
+        (["solve", "roof.toml", "--tension", "1", "--tension", "2"], "a bare value is given twice"),
+        (["solve", "roof.toml", "--accuracy-of", "limit"], "accuracy_of: counts only with an accuracy"),
+        (["solve", "roof.toml", "--most-triangles", "9"], "most_triangles: counts only with an accuracy"),
+        (
+            ["solve", "roof.toml", "--folder", "new", "-o", "x.obj"],
+            "--folder: roof.toml writes nothing there",
+        ),
+        (["panels", "roof.toml", "--tolerance", "1", "--cost", "1,2"], "give --change, too"),
+        (["panels", "roof.toml", "--tolerance", "1", "--change", "1", "--cost", "nan,2"], "--cost: expected"),
+        (["panels", "roof.toml", "--pattern", "quads", "--size", "1", "--sheet", "B3"], "unknown sheet"),
+        (
+            ["panels", "roof.toml", "--pattern", "planar-quads", "--size", "1", "--direction", "3"],
+            "direction: is of a grid in plan",
+        ),
     ],
 )
 def test_bad_input_is_2_in_one_line(folder, capsys, arguments, message):
@@ -221,6 +243,29 @@ def test_bad_input_is_2_in_one_line(folder, capsys, arguments, message):
     assert err.count("\n") == 1
     assert message in err
     assert [p.name for p in folder.iterdir()] == ["roof.toml"]
+
+
+def test_what_counts_with_a_plan_alone_is_refused_for_a_mesh(solved, capsys):
+    assert cli.main(["solve", "roof.pcmc", "--span-ratio", "4"]) == 2
+    assert "--span-ratio: is for a plan, and here is a mesh; give --rise or --apex" in capsys.readouterr().err
+
+
+def test_a_named_value_counts_whether_the_bare_one_comes_before_or_after(folder):
+    pcmc.write("two.pcmc", two_squares(2, alpha_aux=1.0))
+    for k, given in enumerate((["left=9", "8"], ["8", "left=9"])):
+        tensions = [word for value in given for word in ("--tension", value)]
+        assert cli.main(["convert", "two.pcmc", f"{k}.pcmc", *tensions]) == 0
+        found = {patch.name: patch.tension for patch in pcmc.read(f"{k}.pcmc").patches}
+        assert (found["left"], found["right"]) == (9.0, 8.0)
+
+
+def test_what_a_project_asks_for_is_told_by_certify_and_remesh_too(folder, capsys):
+    asked = 'margin = ["snow"]\nverify = true\nmesh_check = true\n'
+    (folder / "roof.toml").write_text(SMALL.replace("[solve]\n", f"[solve]\n{asked}"))
+    for command in (["certify", "roof.toml"], ["remesh", "roof.toml", "--edge-length", "0.8", "-o", "x.ply"]):
+        assert cli.main(command) == 0
+        out = capsys.readouterr().out
+        assert all(text in out for text in ("margin: ", "proved: ", "finer meshes have the same surface"))
 
 
 def test_the_version(capsys):

@@ -29,6 +29,14 @@ def test_a_table_a_diagram_and_every_surface(cap, capsys):
     assert (cap / "cap.svg").read_text().startswith("<?xml")
 
 
+def test_a_surface_found_is_not_written_over_the_one_that_is_read(cap, capsys):
+    (cap / "cap.pcmc").rename(cap / "roof-1.pcmc")
+    before = (cap / "roof-1.pcmc").read_bytes()
+    assert cli.main(["equilibria", "roof-1.pcmc", "--starts", "0", "-o", "roof.pcmc"]) == 2
+    assert "roof-1.pcmc: is read here, and is not written over" in capsys.readouterr().err
+    assert (cap / "roof-1.pcmc").read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -212,7 +212,10 @@ def test_the_command_cuts_a_project(tmp_path, capsys):
     assert len(pd.read_csv(files[1])) == 4
     assert main(["pattern", str(path), "--seam", "0,2,4", "-o", str(files[1])]) == 2
     assert capsys.readouterr().err.startswith("pcmc: error: --seam: expected points X,Y,X,Y and so on")
-    assert main(["pattern", str(path), "--strips", "2", "-o", str(files[1])]) == 0
+    few = ["pattern", str(path), "--strips", "2"]
+    assert main([*few, "--notches", "1e-9", "-o", str(files[0])]) == 2
+    assert "than 1000; give a larger one" in capsys.readouterr().err
+    assert main([*few, "-o", str(files[1])]) == 0
     assert pd.read_csv(files[1])["patch"].tolist() == ["west", "west", "east", "east"]
 
 

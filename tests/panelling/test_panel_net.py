@@ -236,6 +236,10 @@ def test_bad_input_is_refused_in_one_line(rectangle):
         panel_net(cap, 0.2)
     with pytest.raises(OptionError, match="too large for patch 'roof'; choose at most 6"):
         panel_net(rectangle, 7.0)
+    with pytest.raises(OptionError, match="more than 100000 on patch 'roof'; choose at least"):
+        panel_net(rectangle, 1e-3, "quads")
+    with pytest.raises(OptionError, match="planar-quads follow lines of curvature"):
+        panel_net(rectangle, 1.0, direction=30.0)
     with pytest.raises(OptionError, match="is upright or overhangs at"):
         panel_net(delaunay(exact=True), 0.4, "quads", anyway=True)
     with pytest.raises(OptionError, match="pattern"):

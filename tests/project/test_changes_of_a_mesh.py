@@ -3,7 +3,9 @@
 import pytest
 
 import pcmc
-from pcmc.base.errors import FileWarning
+from pcmc import cli
+from pcmc.base.errors import FileWarning, OptionError
+from pcmc.base.units import Units
 from pcmc.plan import Plan
 from pcmc.project import build, designed
 
@@ -61,3 +63,15 @@ def test_walls_of_a_mesh_follow_the_pressures_that_the_project_gives(tmp_path, s
         with pytest.warns(FileWarning, match="tensions and pressures are 1 unless given"):
             bare = build(path)
         assert (bare.pressures, bare.snows) == (pytest.approx(start.pressures), pytest.approx(start.snows))
+
+
+def test_tensions_in_another_unit_of_force_than_the_file_has_are_refused(tmp_path, capsys):
+    roof = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=3.0).surface()
+    pcmc.write(tmp_path / "roof.pcmc", pcmc.solve(roof).surface, units=Units("m", "kN"))
+    path = tmp_path / "roof.toml"
+    path.write_text('units = "m"\nforce = "N"\n[mesh]\nfile = "roof.pcmc"\n')
+    with pytest.raises(OptionError, match=r"force = 'N', but .* are in kN; make it 'kN'"):
+        build(path)
+    report = ["report", str(tmp_path / "roof.pcmc"), "-o", str(tmp_path / "roof.pdf"), "--force", "N"]
+    assert cli.main(report) == 2
+    assert "--force: the forces of roof.pcmc are in kN, not in N" in capsys.readouterr().err

@@ -162,9 +162,11 @@ def test_panels_larger_than_a_sheet_are_in_model_space(tmp_path, monkeypatch):
     output = 'files = ["a.obj"]\ndrawings = ["a.dxf"]\ntolerance = 0.1\npanel_sheets = true\nsheet = "A4"\n'
     (tmp_path / "roof.toml").write_text(UNITS + SMALL + OUTPUT + output, encoding="utf-8")
     assert cli.main(["solve", "roof.toml"]) == 0
-    doc = ezdxf.readfile(tmp_path / "a.dxf")
-    assert "Panels larger than A4" in doc.layouts.names()
-    assert len(doc.modelspace().query('LWPOLYLINE[layer=="PCMC-CUT"]')) == 26
+    assert cli.main(["draw", "roof.toml", "-o", "b.dxf"]) == 0
+    for name in ("a.dxf", "b.dxf"):
+        doc = ezdxf.readfile(tmp_path / name)
+        assert "Panels larger than A4" in doc.layouts.names()
+        assert len(doc.modelspace().query('LWPOLYLINE[layer=="PCMC-CUT"]')) == 26
 
 
 def test_a_project_with_a_net_writes_its_files_as_the_command_does(tmp_path, monkeypatch):

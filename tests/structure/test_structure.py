@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from refusals import refused
 from shapes import rotation
+from small_project import HALL_WITH_ARCH
 from starts import stationary, two_squares
 from structures import FABRIC, LOADS, model_of, pyramid, square
 
@@ -363,6 +364,20 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     assert "young" in capsys.readouterr().err
     (tmp_path / "roof.toml").write_text(PROJECT.replace("1e6", "-1.0"))
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+
+
+def test_a_member_alone_has_a_weight_too(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    given = ["structure", "hall.toml", "-o", "hall.inp"]
+    (tmp_path / "hall.toml").write_text(
+        HALL_WITH_ARCH.replace("young = 2.1e8", "young = 2.1e8\ndensity = 7.85")
+    )
+    assert cli.main([*given, "--gravity", "10"]) == 0
+    assert "form pressure, self-weight" in capsys.readouterr().out
+    assert "MEMBER_1,GRAV,10" in (tmp_path / "hall.inp").read_text()
+    (tmp_path / "hall.toml").write_text(HALL_WITH_ARCH)
+    assert cli.main([*given, "--gravity", "10"]) == 2
+    assert "gravity: nothing has a weight; give a density, too" in capsys.readouterr().err
 
 
 def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys):
