@@ -12,9 +12,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from .factorisation import Factor, Inverse, SingularMatrix
+from .factorisation import TINY, Factor, Inverse, SingularMatrix
 
-TINY = float(np.finfo(float).tiny)
 CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its sign
 
 
