@@ -121,13 +121,13 @@ def onto_held_curves(surface: Surface, corners: Ints | None = None) -> Projectio
     return project
 
 
-def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
+def held_corners(surface: Surface) -> Ints:
     """Vertices (k,) of held edges at which none of these goes on into another one.
 
     On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
     """
     edges = held_edges(surface)
-    edge, end, _ = _continuations(surface.vertices, edges, corner)
+    edge, end, _ = _continuations(surface.vertices, edges, CORNER)
     return np.setdiff1d(edges, edges[edge, end])
 
 
