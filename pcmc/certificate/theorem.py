@@ -30,7 +30,7 @@ from ..base.arrays import Floats
 from ..base.tolerances import AT_REST, PARALLEL
 from ..base.units import NO_UNITS, Units
 from ..forces.motion_space import MotionSpace
-from ..forces.pinching import StandingPart, pull_and_capacity
+from ..forces.pinching import StandingPart, pull_and_capacity, spans
 from ..stability.backward_error import backward_error
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix, factoriser
@@ -247,6 +247,10 @@ def _rests(
     if meet.any():  # there the largest pull over capacity is found by iteration, without a bound
         where = f"walls meet at resting vertex {meet.argmax()}"
         raise _Unproved(f"{where}, and what they hold there has no bound")
+    if len(over := spans(part.surface, walls, resting)):  # their forces are left out, without a bound
+        face = part.surface.faces[over[0]]
+        where = f"a wall stands on vertex {face[~(resting | walls.corner)[face]][0]}"
+        raise _Unproved(f"{where} between two that rest, whose pull has no bound")
     pull, capacity = pull_and_capacity(part.surface, walls, resting, -found.forces[:n])
     size = np.linalg.norm(found.forces[:n], axis=1)
     off = np.linalg.norm(found.forces_radius[:n], axis=1) + 2.0 * stiffness[:n] * radius + 1e-14 * size

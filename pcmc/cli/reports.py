@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 FAR = 10.0  # degrees: walls that lean less are not reported
-UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -51,7 +50,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
         leaning = lean_texts(certificate.leaning, outcome.surface.size, FAR)
         if leaning and certificate.certified:
-            print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
+            print(f"walls lean from the vertical: {', '.join(leaning)}; {_against_lean(outcome)}")
         if certificate.certified and outcome.shown.certificate.cuts_itself:
             print(f"not to be built as it is: {outcome.shown.certificate.cuts_itself}")
     if outcome.under_load is not None:
@@ -61,13 +60,29 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     ended(outcome.good, outcome.files)
 
 
+def _against_lean(outcome: Outcome) -> str:
+    """What limits the lean of the walls that lean far; only a straight divider can hold its wall upright."""
+    limit = 'a target "lean" limits it'
+    plan = None if outcome.project is None else outcome.project.plan
+    if plan is None:
+        return limit
+    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
+
+    table = outcome.certificate.leaning
+    far = set(table["wall"][table["lean"] >= FAR])
+    dividers = {d.name: d.curve.local(plan.plane) for d in plan.dividers if d.name in far}
+    straight = [repr(name) for name, curve in dividers.items() if is_straight(curve, SNAP * plan.edge_length)]
+    upright = f"upright = true under divider {' or '.join(straight)} keeps its wall in its plane, "
+    return f"{upright if straight else ''}{limit}"
+
+
 def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False) -> None:
     """Check the mesh of a roof at rest, if that is wanted; print why not, or, with ``brief``, the result."""
     if not roof.wants_mesh_check(wanted):
         if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
         return
-    sys.stdout.flush()
+    print(end="", flush=True)
     with working() as progress:
         check = roof.check_mesh(progress)
     if check is None:  # the surface and its files are good without it
@@ -79,7 +94,7 @@ def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False
 def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:
     """Find and print the margins wanted; of a certified roof also those that its project asks for."""
     own = roof.project.margin if roof.project is not None and roof.certified else ()
-    sys.stdout.flush()
+    print(end="", flush=True)
     for what in dict.fromkeys([*wanted, *own]):
         with working() as progress:
             found = roof.margin(what, progress)

@@ -7,6 +7,7 @@ import gc
 import os
 import sys
 import warnings
+from itertools import repeat
 
 from ..base import errors
 from ..base.errors import MissingExtra, PcmcError
@@ -82,12 +83,13 @@ def _run(arguments: list[str]) -> int:
         return BAD_INPUT
 
 
-def _plain(error: UnicodeError) -> tuple[str, int]:
-    """The letters that cannot be encoded, in ASCII, and where to go on."""
+def _plain(error: UnicodeError) -> tuple[bytes, int]:
+    """The letters that cannot be encoded, in ASCII, or the bytes of a file's name; and where to go on."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = error.object[error.start : error.end].translate(PLAIN)
-    return letters.encode("ascii", "backslashreplace").decode(), error.end
+    raw = ("surrogateescape" if "\udc80" <= one <= "\udcff" else "backslashreplace" for one in letters)
+    return b"".join(map(str.encode, letters, repeat("ascii"), raw)), error.end
 
 
 def _interrupted() -> int:

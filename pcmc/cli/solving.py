@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -178,7 +177,7 @@ def certify_(
     if meshes is None and roof.project is not None and roof.project.mesh_check:
         meshes = 3
     if meshes is not None and certificate.index is not None:
-        sys.stdout.flush()
+        print(end="", flush=True)
         with working() as progress:
             progress("checking the mesh")
             check = check_mesh(surface, meshes, corners=roof.corners)
@@ -205,7 +204,8 @@ def remesh_(
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
     written = output_of(file, files=output)
     with working() as progress:
-        project = replace(load_project(file, units), output=written)
+        project = load_project(file, units)
+        project = replace(project, output=replace(written, whole=project.output.whole))
         if solve:
             check = bool(project.mesh_check)
             project = replace(project, folder=file.parent, remeshing=(stage,), mesh_check=check)
@@ -318,7 +318,9 @@ def sweep(
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    good = table["verdict"].isin(["stable", "neutral"])
+    for wish in ("targets_met", "accuracy_reached"):
+        good &= table.get(wish, True)
     return OK if good.all() else NOT_CERTIFIED
 
 
@@ -326,6 +328,7 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
     """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
+    from ..sweep.solving import digest_of
 
     given: dict[str, list[Any]] = {}
     for name, listed in map(named_values, values):
@@ -341,4 +344,5 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
     about: dict[str, Any] = {name: True for name, wanted in options.items() if wanted}
-    return Sweep(solve_case, grid, about | {"generator": what, "method": method or "newton"} | fixed)
+    about |= {"generator": what, "generator_digest": digest_of(what), "method": method or "newton"}
+    return Sweep(solve_case, grid, about | fixed)

@@ -26,12 +26,13 @@ from ..base.errors import CurvedContactError
 from ..base.tolerances import EXCESS, ON
 from ..surface import Surface
 from ..surface.checks import lying
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, unit_vectors
 from ..surface.images import expect_no_images
 from ..surface.supports import apply_supports
 from ..surface.topology import topology
 from .functional import energy_and_gradient
 from .motion_space import MotionSpace, VertexClasses, vertex_classes
+from .triangles import effective_tensions
 from .wall_rows import WallRows, Walls, find_walls
 
 WEISZFELD = 30  # steps to the direction of the largest pull where walls meet
@@ -302,16 +303,38 @@ def pull_and_capacity(
     Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
     On a held bottom the pull is the force along the direction d of ``pull_directions``, and ℓ is taken on the
-    bottom; where walls meet, the area is ½ ℓ |d × e| for an edge along e.
+    bottom; where walls meet, the area is ½ ℓ |d × e| for an edge along e. The area of ``spans`` is no pull.
     ``force`` (n,3) is -∇E without supports, if that is known.
     """
     force = -energy_and_gradient(surface, supports=False)[1] if force is None else force
     d = pull_directions(surface, walls, resting, force)
+    force = _without_spans(surface, walls, resting, force)
     pull = np.where(resting, np.einsum("ij,ij->i", force, d), 0.0)
     vertex, half, along = _edge_ends(surface, walls)
     across = np.linalg.norm(np.cross(d[vertex], along), axis=1)
     capacity = np.bincount(vertex, half * np.where(walls.meeting[vertex], across, 1.0), surface.n)
     return pull, np.where(resting, capacity, 0.0)
+
+
+def spans(surface: Surface, walls: Walls, resting: Bools) -> Ints:
+    """(k,) the standing triangles of walls that reach from one resting vertex to another, over the bottom of
+    what stands between: lifting one of them leaves that bottom where it is, and so their area."""
+    low = resting | walls.corner
+    within = walls.pinchable[surface.patch_of_face]
+    return np.flatnonzero(within & (low[surface.faces].sum(axis=1) == 2))
+
+
+def _without_spans(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
+    """The forces (n,3) without those of the area of ``spans``: -½ α ν × e, e the side opposite."""
+    chosen = spans(surface, walls, resting)
+    if not len(chosen):
+        return force
+    F, P = surface.faces[chosen], surface.vertices[surface.faces[chosen]]
+    tension = effective_tensions(surface, surface.vertices, F, surface.patch_of_face[chosen])
+    own = -0.5 * tension[:, None, None] * np.cross(unit_vectors(area_vectors(P))[:, None], edge_vectors(P))
+    left = force.copy()
+    np.subtract.at(left, F, own)
+    return left
 
 
 def _edge_ends(surface: Surface, walls: Walls) -> tuple[Ints, Floats, Floats]:
@@ -346,6 +369,7 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
     held = resting & walls.held
     if not held.any():
         return direction
+    force = _without_spans(surface, walls, resting, force)
     pull = walls.across_bottom(force, surface.vertices)
     length = np.linalg.norm(pull, axis=1)
     pulled = held & (length > 0.0)

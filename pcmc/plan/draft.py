@@ -26,7 +26,7 @@ from ..surface.topology import components
 from ..surface.values import balanced_wall
 from .arrangement import Arrangement, Chain, arrange, hole_points
 from .edges import NONE, Boundary, boundary, check_lines
-from .lines import SNAP, Kind, LineTree, PlanLine
+from .lines import SNAP, Kind, LineTree, PlanLine, is_straight
 from .parts import BALANCED, check_count
 
 if TYPE_CHECKING:
@@ -295,11 +295,11 @@ def upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[Sides]) -> lis
         if not divider.upright:
             continue
         line, chains = draft.divider(number)
+        if not is_straight(line.curve, SNAP * draft.plan.edge_length):
+            raise line.error("is not straight, so no plane can hold its wall upright; remove upright = true")
         along = line.curve.at(line.curve.dense)[:, :2]
         start, way = along[0], along[-1] - along[0]
         across = np.array([-way[1], way[0]]) / (np.linalg.norm(way) or 1.0)
-        if line.curve.closed or np.abs((along - start) @ across).max() > SNAP * draft.plan.edge_length:
-            raise line.error("is not straight, so no plane can hold its wall upright; remove upright = true")
         foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
         own = walls.faces[divider_of_wall[walls.label] == number]
         held = np.zeros(len(draft.mesh.points) + len(walls.vertices), dtype=bool)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +37,7 @@ from .strokes import (
 )
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
+MOST_GAP = 0.05  # of the diagonal: a wider gap is a part that is missing
 LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
 ALONG = 2e-3  # of that diagonal: lines on an edge are compared with it at points so far apart
 
@@ -99,7 +101,8 @@ class _Reader:
         points = np.concatenate([s.curve.at(s.curve.dense) for s in self.edge if s.curve is not None])
         self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
         if gap is not None:
-            validate.number("gap", gap, least=LEAST_GAP * self.size, hint="or leave it out")
+            hint = "leave it out, and draw what is missing"  # a wide one would swallow short lines
+            validate.number("gap", gap, least=LEAST_GAP * self.size, most=MOST_GAP * self.size, hint=hint)
         self.gap = GAP * self.size if gap is None else gap
         self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= EXACT * self.size else 0.0
 
@@ -111,16 +114,20 @@ class _Reader:
     def _no_outline(self) -> PlanError:
         """The error of a drawing without an outline: what it has instead."""
         counts = {name: len(strokes) for name, strokes in self.by_layer.items()}
-        solid = sum(kinds.get("3-D faces", 0) for kinds in self.content.others.values())
+        others = Counter[str]()
+        for kinds in self.content.others.values():
+            others.update(kinds)
         hidden = sum(self.content.hidden.values())
-        if not counts and solid:
-            text = f"has only 3-D faces ({solid}); draw the lines of the plan, the edge on a layer 'outline'"
+        if not counts and others:
+            only = listed([f"{count} {kind}" for kind, count in others.items()])
+            text = f"has no lines, only {only}; draw those of the plan, the edge on a layer 'outline'"
         elif not counts:
             shown = f"shows nothing: its {hidden} entities are on layers turned off" if hidden else "is empty"
             text = f"{shown}; draw the edge of the roof on a layer 'outline'"
         else:
             strange = {name: count for name, count in counts.items() if layer_of(name) is None}
             why = left_out(strange) if strange else f"all are on {listed(list(map(repr, counts)))}"
+            why += "" if strange else "; draw the whole edge of the roof on 'outline', too"
             text = f"has no curve on a layer 'outline'; {why}"
         return PlanError(text, what="outline", found=counts, expected=UNDERSTOOD)
 
@@ -131,7 +138,9 @@ class _Reader:
             ends = ", ".join(f"{listed(loop.labels)} at {point_text(loop.ends[0])}" for loop in loops[:3])
             where = f"layer {loops[0].layer!r}"
             text = f"{where} has {len(loops)} closed curves ({ends}); a roof has one outline"
-            text += ": put the edges of openings on a layer 'hole NAME'"
+            text += (
+                ": put the edges of openings on a layer 'hole NAME', and draw another roof in its own file"
+            )
             raise PlanError(text, what=where, found=len(loops), expected=1)
         outline, self.layers["the outline"] = loops[0].curve, loops[0].source
         holes: dict[str, Curve] = {}
@@ -221,10 +230,10 @@ class _Reader:
             gap = float(apart[place])
             between = f"between {one[0]} at {point_text(one[1])} and {two[0]} at {point_text(two[1])}"
             enough = two_digits(gap, math.ceil)
-            allow = (
-                f"draw what is missing, or close it: gap = {enough:g} in [plan], pcmc plan --gap {enough:g}"
-            )
-            text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
+            allow = f", or close it: gap = {enough:g} in [plan], pcmc plan --gap {enough:g}"
+            if enough > MOST_GAP * self.size:
+                allow = "; edges on layers 'mirror', 'free' and 'cable' are drawn on 'outline', too"
+            text = f"{where} is not closed: a gap of {gap:.3g} {between}; draw what is missing{allow}"
             raise PlanError(text, what=where, where=(_plain(one[1]), _plain(two[1])), found=gap)
         return paths
 

@@ -15,7 +15,7 @@ from ..base.errors import PlanError
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
-from ..surface.geometry import bounding_size
+from ..surface.geometry import angles, bounding_size
 from ..surface.pieces import point_text, to_local, to_space, two_digits
 from ..surface.topology import SIDES, edge_places
 from .arrangement import Arrangement
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .plan import Plan
 
 NONE = -1  # the cable of an edge without one
+CORNER, FLAT = 0.3, 0.1  # share of a sail's corner for each cable; radians below which it is no corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +163,37 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
 def usual_cable(plan: Plan) -> float:
     """A tension of cables with which the edges of a sail bend moderately; see ``cable_for``."""
     tension = max(patch.tension for patch in plan.patches) if plan.tension is None else plan.tension
-    return cable_for(plan.outline.local(plan.plane), tension)
+    points = [p for p in plan.supports if not isinstance(p, Curve)]
+    points = [p if len(p) == 2 else to_local(np.array([p]), plan.plane)[0] for p in points]
+    return cable_for(plan.outline.local(plan.plane), tension, points)
 
 
-def cable_for(outline: Curve, tension: float) -> float:
-    """1.5 α × the size of the outline, two digits."""
-    return two_digits(1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max())
+def cable_for(outline: Curve, tension: float, supports: Sequence[Any]) -> float:
+    """A tension for the cables of a sail, two digits: 1.5 α × the size of its outline, or more where it has
+    slender corners.
+
+    In a flat sail a cable is an arc of radius T/α, which leaves the chord L of its ends by
+    arcsin(α L / (2T)). At a held corner two of them must fit in the angle between the chords; 0.3 of it for
+    each leaves room. ``supports`` are points; those on the outline are such corners.
+
+    >>> from ..surface.curves import polyline
+    >>> half = [[0, 0], [10, 0], [10, 10]]
+    >>> cable_for(polyline(half, closed=True), 1.0, half), cable_for(polyline(half, closed=True), 1.0, ())
+    (30.0, 15.0)
+    """
+    size = float(np.ptp(outline.at(outline.dense)[:, :2], axis=0).max())
+    radius = 1.5 * size
+    points = np.array([p[:2] for p in supports], dtype=float).reshape(-1, 2)
+    t, away = PlanLine("the outline", Kind.OUTLINE, outline).nearest(points)
+    on = np.flatnonzero(away <= EXACT * size)
+    if len(on) > 2:
+        corners = points[on[np.argsort(t[on])]]
+        before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
+        angle = np.radians(angles(np.stack([before, corners, after], axis=1))[:, 1])
+        longer = np.maximum(*(np.linalg.norm(other - corners, axis=1) for other in (before, after)))
+        sharp = angle > FLAT
+        radius = max(radius, *(longer[sharp] / (2.0 * np.sin(CORNER * angle[sharp]))).tolist())
+    return two_digits(tension * radius)
 
 
 def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:

@@ -102,6 +102,14 @@ class PlanLine:
         return t, np.linalg.norm(self.curve.at(t)[:, :2] - xy, axis=1)
 
 
+def is_straight(curve: Curve, tolerance: float) -> bool:
+    """Whether a curve on Π is a straight line from its start to its end, to ``tolerance``."""
+    along = curve.at(curve.dense)[:, :2]
+    way = along[-1] - along[0]
+    length = float(np.linalg.norm(way)) or 1.0
+    return not curve.closed and bool((np.abs(cross_2d(way, along - along[0])) <= tolerance * length).all())
+
+
 class LineTree:
     """Which lines pass near points, and where lines cross: a tree of the chords of all lines."""
 

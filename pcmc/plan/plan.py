@@ -38,8 +38,9 @@ class Plan:
     holes : openings: Holes, or curves (with fixed edges).
     patches : the parts into which the dividers cut the plan: by name, the attributes of each. Without them
         ``tension`` holds for every part.
-    edge_length : of the triangles, length. Edges on lines are nearly as long. Corners, crossings and the
-        points where a curve is farthest along x or y are vertices; between two of them edges are equal.
+    edge_length : of the triangles, length; in a project by default so that there are about 1500, or more if
+        a part or a hole is small. Edges on lines are nearly as long. Corners, crossings and the points where
+        a curve is farthest along x or y are vertices; between two of them edges are equal.
     edge : the support of the outline: "fixed"; "sliding" on Π, where the roof is at rest if it meets Π
         at a right angle; "cable": free between ``supports``, with a cable along it; or "free", where the
         tension has nothing to pull against.

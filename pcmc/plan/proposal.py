@@ -46,21 +46,40 @@ class Part:
     radius: float
 
 
-def parts_of(drawing: Drawing) -> list[Part]:
-    """The parts into which the dividers cut the plan, from left to right."""
-    holes = [_line(curve) for curve in drawing.holes.values()]
-    lines = [_line(drawing.outline), *holes]
-    lines += [_line(curve, 2e-3 * drawing.outline.length) for curve in drawing.dividers.values()]
-    noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
-    roof = _roof_area(drawing.outline, drawing.holes.values())
+def parts_of(outline: Curve, holes: Sequence[Curve], dividers: Iterable[Curve], gap: float) -> list[Part]:
+    """The parts into which the dividers cut the plan, from left to right; lines nearer than ``gap`` meet."""
+    lines = [_line(curve) for curve in (outline, *holes)]
+    lines += [_line(curve, 2e-3 * outline.length) for curve in dividers]
+    noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * gap), 0.0)
+    roof = _roof_area(outline, holes)
     polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-    try:
-        check_count("patches", len(polygons) - len(holes))
-    except PlanError as error:
-        raise error.in_file(drawing.path) from None
+    check_count("patches", len(polygons) - len(holes))
     parts = [Part(p, *largest_circle(p)) for p in polygons]
     inside = [part for part in parts if shapely.contains_xy(roof, *part.middle)]
     return sorted(inside, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
+
+
+def first_edge_length(parts: Sequence[Part], holes: Iterable[Curve]) -> float:
+    """The edge length of a first mesh: about 1500 triangles, more where a part or a hole is small."""
+    area = sum(part.area.area for part in parts)
+    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
+    rims = (curve.length / 12.0 for curve in holes)
+    usual = min([most, *(part.radius / ACROSS for part in parts), *rims])
+    return two_digits(max(usual, least))
+
+
+def edge_length_for(plan: Plan) -> float:
+    """The edge length of a first mesh of a plan; that of the plan if its outline encloses no area.
+
+    >>> from .plan import Plan
+    >>> edge_length_for(Plan([[0, 0], [6000, 0], [6000, 4000], [0, 4000]], tension=3000.0))
+    190.0
+    """
+    outline = plan.outline.local(plan.plane)
+    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
+    dividers = [divider.curve.local(plan.plane) for divider in plan.dividers]
+    parts = parts_of(outline, holes, dividers, NEAR * outline.length)
+    return first_edge_length(parts, holes) if parts else plan.edge_length
 
 
 def plan_area(plan: Plan) -> Any:
@@ -138,22 +157,23 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     """
     values = dict(given or {})
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
-    parts = parts_of(drawing)
+    holes = list(drawing.holes.values())
+    try:
+        parts = parts_of(drawing.outline, holes, drawing.dividers.values(), drawing.gap)
+    except PlanError as error:
+        raise error.in_file(drawing.path) from None
     specs = _patches(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
     common = {"pressure": 0.0} if sail else {}  # an edge that nothing holds closes no space for a pressure
     common |= {key: values.pop(key) for key in ("pressure", "weight") if key in values}
     for spec, (key, value) in product(specs, common.items()):
         spec.setdefault(key, value)
     tensions = [spec["tension"] for spec in specs]
-    area = sum(part.area.area for part in parts)
-    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
-    rims = (curve.length / 12.0 for curve in drawing.holes.values())  # finer where parts or holes are small
-    usual = min([most, *(part.radius / ACROSS for part in parts), *rims])
-    edge_length = values.setdefault("edge_length", two_digits(max(usual, least)))
+    edge_length = values.setdefault("edge_length", first_edge_length(parts, holes))
     outline = PlanLine("the outline", Kind.OUTLINE, drawing.outline)
     tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
-    cable = cable_for(drawing.outline, max(tensions))
+    points = [support for support in drawing.supports if not isinstance(support, Curve)]
+    cable = cable_for(drawing.outline, max(tensions), points)
     if drawing.loose and values.setdefault("edge", "cable") == "cable":
         values.setdefault("cable", cable)
     cables = _changed(drawing.cables, values.pop("cables", []), "cable", CableLine)

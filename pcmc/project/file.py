@@ -16,6 +16,7 @@ from ..advice.rises import RISES, Rise, mast_note, take_rises, taken, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
+from ..base.libraries import require
 from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
@@ -213,6 +214,12 @@ def project_of(
         plan, targets, vary = None, list["Target"](), list["Parameter"]()
         if mesh is None:
             plan = plan_from(data["plan"])
+            if "edge_length" not in data["plan"]:
+                require("shapely", extra="plan")
+                from ..plan.proposal import edge_length_for
+
+                plan = replace(plan, edge_length=edge_length_for(plan))
+                chosen = replace(chosen, edge_length=plan.edge_length)
             plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
         named = [] if plan is None else [p.member for p in (*plan.dividers, *plan.holes) if p.member]
         if structure is not None:

@@ -180,7 +180,8 @@ def main_sections() -> tuple[Section, ...]:
     gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
     outline, *others = _of_class(Plan)
     plan = [replace(outline, unless=("drawing",)), Key("drawing", "a text", None, drawing)]
-    plan += [Key("gap", "a number", None, gap), *others]
+    plan += [Key("gap", "a number", None, gap)]
+    plan += [replace(key, default=None) if key.name == "edge_length" else key for key in others]
     plan += _rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:])
     specs = [key for key in _of_class(PatchSpec) if key.name != "name"]
     patch = [replace(key, unless=RISES) if key.name == "tension" else key for key in specs]

@@ -375,7 +375,8 @@ def checked_points(points: Any, what: str, least: int, exactly: bool = False) ->
         raise curve_error(what, "expected points, all [x, y] or all [x, y, z]", found=points)
     P = P.astype(float)
     if P.ndim != 2 or P.shape[1] not in (2, 3):
-        raise curve_error(what, f"expected points [x, y] or [x, y, z], found shape {P.shape}", found=P.shape)
+        found = f"{len(P)} lists of points; a curve is one" if P.ndim == 3 else f"shape {P.shape}"
+        raise curve_error(what, f"expected points [x, y] or [x, y, z], found {found}", found=P.shape)
     if len(P) < least or (exactly and len(P) != least):
         raise curve_error(what, f"expected {least} points, found {len(P)}", found=len(P), expected=least)
     bad = np.flatnonzero(~np.isfinite(P).all(axis=1))

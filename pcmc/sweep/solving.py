@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 from collections.abc import Callable, Container, Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base import validate
@@ -20,17 +22,32 @@ if TYPE_CHECKING:
     from ..project import Outcome
 
 
-def _split(
-    generator: str, method: str, arguments: Mapping[str, Any]
-) -> tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]:
-    """The generator, and which arguments are its own and which the solver's."""
+def _found(generator: str) -> tuple[Callable[..., Any], Mapping[str, Any]]:
+    """A generator and its parameters."""
     try:
         build = resolve(generator)
-        own = inspect.signature(build).parameters
+        return build, inspect.signature(build).parameters
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         text = f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
         text += " or 'package.module:function'"
         raise OptionError(text, what="generator", found=generator) from error
+
+
+def digest_of(generator: str) -> str:
+    """SHA-256, hexadecimal, of the file that a generator is in.
+
+    >>> digest_of("generators:two_caps") == digest_of("generators:two_squares")
+    False
+    """
+    file = inspect.getsourcefile(inspect.unwrap(_found(generator)[0]))
+    return hashlib.sha256(Path(file or "").read_bytes()).hexdigest() if file else ""
+
+
+def _split(
+    generator: str, method: str, arguments: Mapping[str, Any]
+) -> tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]:
+    """The generator, and which arguments are its own and which the solver's."""
+    build, own = _found(generator)
     options = find_method(method).options
     known = [f.name for f in fields(options)]
     for name in arguments:
@@ -44,7 +61,12 @@ def _split(
 
 
 def _check(
-    generator: str, method: str = "newton", mesh_check: bool = False, search: bool = False, **arguments: Any
+    generator: str,
+    method: str = "newton",
+    mesh_check: bool = False,
+    search: bool = False,
+    generator_digest: str = "",
+    **arguments: Any,
 ) -> None:
     validate.flag("mesh_check", mesh_check)
     validate.flag("search", search)
@@ -53,7 +75,12 @@ def _check(
 
 @checked(_check)
 def solve_case(
-    generator: str, method: str = "newton", mesh_check: bool = False, search: bool = False, **arguments: Any
+    generator: str,
+    method: str = "newton",
+    mesh_check: bool = False,
+    search: bool = False,
+    generator_digest: str = "",
+    **arguments: Any,
 ) -> dict[str, Any]:
     """Build a surface with a generator, solve it, certify it; every number of the certificate.
 
@@ -62,6 +89,7 @@ def solve_case(
     generator : a function that returns a Surface: ``"generators:two_caps"``.
     method, search : as of ``pcmc.solve``; with a search ``message`` has what was tried, and any proof.
     mesh_check : whether to solve each surface at rest on two finer meshes, too (``pcmc.check_mesh``).
+    generator_digest : ``digest_of(generator)``, if any: with it a store belongs to one state of its file.
     arguments : of the generator, and options of the method. A name that both have is the generator's.
 
     Returns

@@ -98,3 +98,21 @@ def test_without_stderr_it_works_all_the_same(folder, monkeypatch, capsys):
     assert "stable" in capsys.readouterr().out
     assert cli.main(["solve", "rof.toml"]) == 2
     assert capsys.readouterr().out == ""
+
+
+def test_without_stdout_it_works_all_the_same(folder, monkeypatch, capsys):
+    assert cli.main(["solve", "roof.toml", "--no-mesh-check"]) == 0
+    capsys.readouterr()
+    monkeypatch.setattr(sys, "stdout", None)  # as where the shell closes it: pcmc ... >&-
+    assert cli.main(["certify", "roof.pcmc", "--meshes", "2", "--margin", "snow"]) == 0
+    assert cli.main(["solve", "roof.toml"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_names_of_files_that_the_locale_cannot_read_are_printed_as_they_are(folder, monkeypatch):
+    shown, name = io.BytesIO(), "rööf.pcmc".encode().decode("ascii", "surrogateescape")  # so in the locale C
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii", errors="surrogateescape"))
+    monkeypatch.setattr("pcmc.project.solving.write_all", lambda *_: [name])
+    assert cli.main(["solve", "roof.toml", "--no-mesh-check"]) == 0
+    sys.stdout.flush()
+    assert "written: rööf.pcmc".encode() in shown.getvalue()

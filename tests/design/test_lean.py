@@ -70,16 +70,21 @@ def test_only_walls_lean():
         measure(Plan(HALL, tension=4.0, edge_length=1.5).surface(), Target("lean"))
 
 
-@pytest.mark.parametrize("upright", ["true", "false"])
-def test_the_command_says_which_walls_lean(tmp_path, capsys, upright):
+STRAIGHT, BENT = "[[6, 0], [6, 6]]", "{arc = [[6, 0], [5.5, 3], [6, 6]]}"
+
+
+@pytest.mark.parametrize(("curve", "upright"), [(STRAIGHT, "true"), (STRAIGHT, "false"), (BENT, "false")])
+def test_the_command_says_which_walls_lean_and_what_can_hold_them(tmp_path, capsys, curve, upright):
     path = tmp_path / "roof.toml"
     path.write_text(
         "[plan]\nedge_length = 1.0\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
-        f"dividers = [{{curve = [[6, 0], [6, 6]], upright = {upright}}}]\n"
+        f"dividers = [{{curve = {curve}, upright = {upright}}}]\n"
         "[plan.patches]\nwest = {tension = 7.0}\neast = {tension = 3.5}\n"
     )
     assert cli.main(["solve", str(path), "--no-mesh-check"]) == 0
-    assert ("walls lean from the vertical: 'wall 1'" in capsys.readouterr().out) is (upright == "false")
+    out = capsys.readouterr().out
+    assert ("walls lean from the vertical: 'wall 1'" in out) is (upright == "false")
+    assert ("; upright = true under divider 'wall 1'" in out) is (curve == STRAIGHT and upright == "false")
 
 
 NEAR = partial(refine_near, points=[6, 3, 0.5], levels=2, radius=1.5)

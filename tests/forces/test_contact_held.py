@@ -17,6 +17,7 @@ from pcmc.forces.pinching import (
     pull_and_capacity,
     pull_directions,
     resting_vertices,
+    spans,
     standing_part,
     top_spacing,
 )
@@ -171,6 +172,27 @@ def test_strong_walls_that_cross_leave_a_roof_in_each_bay():
     np.testing.assert_array_equal(part.resting, part.walls.top_free)
     assert result.energy == pytest.approx(4.0 * pcmc.solve(bay.surface()).energy, rel=5e-4)
     assert "walls meet at resting vertex" in pcmc.verify(result.surface).reason
+
+
+def test_a_wall_that_stands_on_one_vertex_pulls_up_none_of_those_beside_it():
+    """Its triangle spans from one resting vertex to the next, over the bottom that neither lifts with it."""
+    cross = [Divider(line, wall=1.2) for line in ([[6, 0], [6, 8]], [[0, 4], [12, 4]])]
+    roof = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], cross, edge_length=0.6, tension=2.0, pressure=0.4)
+    full = pcmc.solve(roof.surface())
+    assert full.certificate.verdict is Verdict.STABLE  # before, they were lifted and put down in turn
+    part, full = standing_part(full.surface), full.surface
+    standing, walls, resting = part.surface, part.walls, part.resting
+    pull, capacity = pull_and_capacity(standing, walls, resting)
+    ways = directions_of_pull(standing, walls, resting)
+    beside = np.unique(standing.faces[spans(standing, walls, resting)])
+    beside = beside[resting[beside]]
+    assert len(beside) >= 2
+    for v in beside:
+        one, step = np.arange(full.n) == v, 1e-5
+        slope = (energy(lift(full, walls, one, step, ways)) - energy(full)) / (
+            step * top_spacing(full, walls)[v]
+        )
+        assert slope == pytest.approx(capacity[v] - pull[v], abs=1e-3)
 
 
 @pytest.mark.parametrize("line", [[[6, 4], [12, 4]], [[6, 4], [12, 8]]])

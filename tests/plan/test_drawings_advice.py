@@ -57,6 +57,31 @@ def test_tensions_and_walls_that_are_chosen_for_a_drawing_are_printed(tmp_path):
     assert text.startswith("walls balanced with their neighbours: 'seam'")
 
 
+def test_a_sail_with_slender_corners_gets_cables_that_fit_in_them(tmp_path, capsys):
+    """At 1.5 α × the size, arcs of radius 15 needed 47° of a corner of 45°: no sail was at rest."""
+    masts = [("point", "mast", place) for place in ((0, 0, 1), (10, 0, 4), (10, 10, 1))]
+    edge = ("lwpolyline", "outline", [(0, 0), (10, 0), (10, 10), (0, 0)])
+    assert cli.main(["solve", str(drawing(tmp_path, edge, *masts, outline=False)), "--no-mesh-check"]) == 0
+    assert "stable" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 1000.0])
+def test_a_project_without_edge_length_gets_the_mesh_that_its_drawing_would(tmp_path, size):
+    """Edges of 1, whatever the unit, made three triangles of a small plan and millions of one in mm."""
+    path = tmp_path / "hall.toml"
+    path.write_text(
+        f"[plan]\noutline = [[0, 0], [{10 * size}, 0], [{10 * size}, {6 * size}], [0, {6 * size}]]\n"
+        f"holes = [{{circle = {{centre = [{7 * size}, {3 * size}], radius = {size}}}}}]\n"
+        f"dividers = [[[{4 * size}, 0], [{4 * size}, {7 * size}]]]\ntension = {5 * size}\n"
+    )
+    loaded = project.load(path)
+    assert 1300 < project.surface_of(loaded).m < 2500
+    assert f"edges of {loaded.plan.edge_length:g} (to change: edge_length" in loaded.chosen.text
+    if size == 1.0:
+        calls = [("circle", "hole", (7, 3), 1.0), ("line", "divider", (4, 0), (4, 6))]
+        assert project.load(drawing(tmp_path, *calls)).plan.edge_length == loaded.plan.edge_length
+
+
 @pytest.mark.parametrize(
     ("unit", "scale", "note"),
     [

@@ -100,7 +100,28 @@ def test_without_an_outline_only_layers_without_a_meaning_are_left_out(tmp_path)
     with pytest.raises(PlanError, match=r"left out: 'outlin' \(1 entity, did you mean 'outline'\?\); under"):
         read_drawing(file)
     file = drawing(tmp_path, lines[1], outline=False)
-    with pytest.raises(PlanError, match=r"no curve on a layer 'outline'; all are on 'divider A'$"):
+    with pytest.raises(
+        PlanError, match=r"no curve on a layer 'outline'; all are on 'divider A'; draw the whole"
+    ):
+        read_drawing(file)
+
+
+def test_an_edge_that_is_missing_is_no_gap_to_close(tmp_path):
+    """A gap as wide as a line swallows it: with ``gap = 9.1`` the mirror vanished without a word."""
+    lines = [("lwpolyline", "outline", [(6, 0), (0, 0), (0, 9), (6, 9)]), ("line", "mirror", (6, 0), (6, 9))]
+    file = drawing(tmp_path, *lines, outline=False)
+    with refused(PlanError, what="layer 'outline'", found=9.0) as caught:
+        read_drawing(file)
+    assert str(caught.value).endswith(
+        "draw what is missing; edges on layers 'mirror', 'free' and 'cable' are drawn on 'outline', too"
+    )
+    with refused(OptionError, what="gap", found=9.1):
+        read_drawing(file, gap=9.1)
+
+
+def test_a_drawing_without_lines_says_what_it_has(tmp_path):
+    file = drawing(tmp_path, ("hatch", "outline"), outline=False)
+    with pytest.raises(PlanError, match="has no lines, only 1 HATCH; draw those of the plan"):
         read_drawing(file)
 
 

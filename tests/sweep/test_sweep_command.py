@@ -89,6 +89,12 @@ def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
 
 
+def test_an_accuracy_that_is_missed_is_1(roof):
+    roof.write_text(TEXT + "accuracy = {height = 1e-9}\nmost_triangles = 9\n", encoding="utf-8")
+    assert cli.main(["sweep", "roof.toml", "east.tension=3", "--workers", "1", "--csv", "t.csv"]) == 1
+    assert pd.read_csv("t.csv")["accuracy_reached"].tolist() == [False]
+
+
 @pytest.mark.nightly
 def test_a_target_that_is_missed_is_1(roof):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 9}]\nvary = ["west"]\n'
@@ -125,6 +131,19 @@ def test_the_store_of_another_project_is_refused_and_kept(roof, capsys):
     err = capsys.readouterr().err
     assert "s.sqlite: written for another sweep (its fixed 'project_digest' is " in err
     assert (roof.parent / "s.sqlite").read_bytes() == kept
+
+
+def test_the_store_of_a_generator_that_has_changed_is_refused(roof, capsys, monkeypatch):
+    code = "import generators\ndef hall(alpha):\n    return generators.two_squares({}, alpha_aux=alpha)\n"
+    module = roof.with_name("own_hall.py")
+    module.write_text(code.format(2))
+    monkeypatch.syspath_prepend(roof.parent)
+    given = ["sweep", "own_hall:hall", "alpha=1,0.5", "--store", "s.sqlite", "--workers", "1"]
+    assert cli.main(given) == 0
+    module.write_text(code.format(3))
+    capsys.readouterr()
+    assert cli.main(given) == 2
+    assert "s.sqlite: written for another sweep (its fixed 'generator_digest' is " in capsys.readouterr().err
 
 
 def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch):
