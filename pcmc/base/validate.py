@@ -207,15 +207,18 @@ def refuse(
 
 
 def shown(value: object) -> str:
-    """The value as an error shows it: what is long is cut.
+    """The value as an error shows it, in one line: what is long is cut.
 
     >>> shown("roof"), shown([0] * 1000), shown(10**5000)
     ("'roof'", '[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ...]', 'a number of 16610 bits')
+    >>> import numpy as np
+    >>> shown(np.eye(2))
+    'array([[1., 0.], [0., 1.]])'
     """
     short = Repr()
     short.maxlist = short.maxtuple = short.maxdict = short.maxset = 10
     short.maxstring, short.maxother, short.maxlong = 200, 200, 40
     try:
-        return short.repr(value)
+        return " ".join(line.strip() for line in short.repr(value).split("\n"))
     except ValueError:  # Python writes no number of more than some thousand digits
         return f"a number of {value.bit_length()} bits" if isinstance(value, int) else type(value).__name__
