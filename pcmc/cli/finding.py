@@ -11,7 +11,7 @@ from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
 from . import OK, arguments
-from .arguments import MANY_FILES, FileUnits, Input, Shown, count, load_project, option, switch
+from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, count, load_project, option, switch
 from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
@@ -35,6 +35,7 @@ def equilibria_(
     mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,
     what: Shown,
     units: FileUnits = "",
+    whole: Whole = False,
 ) -> int:
     """Search for all equilibria of a roof, stable or not, and for the energy barriers between them.
 
@@ -59,9 +60,11 @@ def equilibria_(
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
-        roof = what.roof(load_project(file, units), progress, whole=False)
+        roof = what.roof(load_project(file, units), progress, whole)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}
-        found = find_equilibria(roof.surface, along or "pressure", callback=progress, span=ends, **options)
+        found = find_equilibria(
+            roof.shown.surface, along or "pressure", callback=progress, span=ends, **options
+        )
         jobs: list[Any] = []
         for path in files:
             if path.suffix.lower() in PICTURES:

@@ -204,7 +204,8 @@ def remesh_(
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
     written = output_of(file, files=output)
     with working() as progress:
-        project = replace(load_project(file, units), output=written)
+        project = load_project(file, units)
+        project = replace(project, output=replace(written, whole=project.output.whole))
         if solve:
             check = bool(project.mesh_check)
             project = replace(project, folder=file.parent, remeshing=(stage,), mesh_check=check)
@@ -317,7 +318,9 @@ def sweep(
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    good = table["verdict"].isin(["stable", "neutral"])
+    for wish in ("targets_met", "accuracy_reached"):
+        good &= table.get(wish, True)
     return OK if good.all() else NOT_CERTIFIED
 
 

@@ -177,9 +177,13 @@ class Equilibria:
             units.sentence if units else "",
             table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False),
         ]
+        half = ", ".join(self.found[0].certificate.symmetric_in) if self.found else ""
+        if half:
+            half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"
+            half += " (--whole, or the surface that pcmc.mirrored unfolds, has them)."
         given = "The search was stopped before its end." if self.stopped else ""
         ways = self.barrier_lines(units)
-        return "\n".join(filter(None, [*lines, *ways, *self.searched, *self.failed, given, INCOMPLETE]))
+        return "\n".join(filter(None, [*lines, *ways, *self.searched, *self.failed, given, half, INCOMPLETE]))
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
         """A line for each barrier: from where, over which saddle, to where, and its energy."""

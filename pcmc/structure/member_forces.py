@@ -16,11 +16,12 @@ from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
+from ..surface.geometry import vertex_sums
 from .frames import BarFrame
 from .loads import Step
 from .members import PlacedMember
 from .model import StructuralModel
-from .pulls import at_vertices, balancing_force, corner_forces, turns
+from .pulls import balancing_force, corner_forces, turns
 from .results import StepResults
 
 COLUMNS = ("N", "V", "V_across", "T", "M", "M_across")  # as ``FrameForces.within`` has them
@@ -134,7 +135,7 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
     thickness = model.thicknesses[s.patch_of_face[model.active], None, None]
     tensors = model.stresses if found is None else found.stresses[model.faces]
     forces = model.nodal_loads(step, X - s.vertices)
-    forces += at_vertices(corner_forces(X[faces], thickness * tensors), faces, s.n)
+    forces += vertex_sums(corner_forces(X[faces], thickness * tensors), faces, s.n)
     for cable in s.cables:
         pull = pull_along(s, cable, cable.edges) if found is None else found.cable_tensions[cable.name]
         along = pull[:, None] * directions(X, cable.edges)[0]

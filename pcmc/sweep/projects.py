@@ -84,8 +84,9 @@ def solve_varied(
 
     Returns numbers as ``solve_case``, but none of a shape that is not at rest; for each name in the
     project's ``solve.margin`` the margin, its bar and what ends it, such as ``pressure.margin``; and
-    ``targets_met``, if there are targets. With mirror planes they are those of the whole roof if the project
-    has ``whole = true``, otherwise of the part between them; ``extent`` says which.
+    ``targets_met`` and ``accuracy_reached``, if targets or an accuracy are asked for.
+    With mirror planes they are those of the whole roof if the project has ``whole = true``, otherwise of the
+    part between them; ``extent`` says which.
     """
     digest = projects.digest(project)
     if digest != project_digest:
@@ -103,4 +104,5 @@ def solve_varied(
         answer |= mesh_columns(outcome)
     for what in design.margin if outcome.certificate.index is not None else ():
         answer |= outcome.margin(what).numbers()
-    return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}
+    answer |= {} if outcome.design is None else {"targets_met": outcome.design.met}
+    return answer | ({} if outcome.accurate is None else {"accuracy_reached": outcome.accurate.reached})

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..plot.figure import Image
 
 TABLES = (".csv", ".parquet")
-FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met")
+FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met", "accuracy_reached")
 USUAL = ("apex", "rise", "area", "reaction per length")  # the first of each patch, the others of the roof
 GOOD = ("stable", "neutral")
 

@@ -111,6 +111,14 @@ def test_remesh_solves_again(solved, capsys):
     assert "not solved" in capsys.readouterr().out
 
 
+def test_remesh_writes_the_whole_roof_that_a_project_asks_for(folder):
+    half = SMALL.replace("patches =", "mirrors = [[[4, 0], [4, 3]]]\npatches =") + "whole = true\n"
+    (folder / "half.toml").write_text(half)
+    for more in ([], ["--no-solve"]):
+        assert cli.main(["remesh", "half.toml", "--edge-length", "0.8", "-o", "x.pcmc", *more]) == 0
+        assert np.ptp(pcmc.read("x.pcmc").vertices[:, 0]) == pytest.approx(8.0)
+
+
 def test_convert_and_plot(solved, capsys):
     assert cli.main(["convert", "roof.pcmc", "roof.ply"]) == 0
     assert pcmc.read("roof.ply").m == pcmc.read("roof.pcmc").m

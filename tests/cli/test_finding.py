@@ -6,6 +6,7 @@ import pytest
 import pcmc
 from generators import spherical_cap
 from pcmc import cli
+from pcmc.plan import Plan
 
 
 @pytest.fixture
@@ -27,6 +28,19 @@ def test_a_table_a_diagram_and_every_surface(cap, capsys):
     for number, energy in zip(table.number, table.energy, strict=True):
         assert pcmc.certify(pcmc.read(f"roof-{number}.pcmc")).energy == pytest.approx(energy, rel=1e-12)
     assert (cap / "cap.svg").read_text().startswith("<?xml")
+
+
+def test_a_part_says_what_was_left_out_and_the_whole_has_it(cap, capsys):
+    outline, mirrors = [[0, 0], [3, 0], [3, 4], [0, 4]], [[[3, 0], [3, 4]]]
+    half = pcmc.solve(Plan(outline, edge_length=1.0, tension=3.0, mirrors=mirrors).surface()).surface
+    pcmc.write("half.pcmc", half)
+    given = ["equilibria", "half.pcmc", "--starts", "0", "--span", "0.9,1.1", "-o", "t.csv"]
+    for more, times, said in (([], 1, "shapes that are not symmetric in mirror plane"), (["--whole"], 2, "")):
+        assert cli.main([*given, *more]) == 0
+        out = capsys.readouterr().out
+        assert said in out
+        assert ("were left out" in out) == bool(said)
+        assert pd.read_csv("t.csv").energy[0] == pytest.approx(times * pcmc.energy(half), rel=1e-9)
 
 
 def test_a_surface_found_is_not_written_over_the_one_that_is_read(cap, capsys):

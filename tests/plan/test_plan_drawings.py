@@ -108,6 +108,8 @@ def test_small_gaps_are_closed_and_said_and_arcs_stay_arcs(tmp_path):
     assert len(caught.value.where) == 2
     with refused(OptionError, what="gap", found=1e-320):
         read_drawing(tmp_path / "nave.dxf", gap=1e-320)
+    with refused(OptionError, what="gap", found=1e3):
+        read_drawing(tmp_path / "nave.dxf", gap=1e3)
 
 
 def test_ends_of_dividers_that_just_miss_their_line_are_moved_to_it(tmp_path):

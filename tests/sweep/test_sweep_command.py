@@ -89,6 +89,12 @@ def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
 
 
+def test_an_accuracy_that_is_missed_is_1(roof):
+    roof.write_text(TEXT + "accuracy = {height = 1e-9}\nmost_triangles = 9\n", encoding="utf-8")
+    assert cli.main(["sweep", "roof.toml", "east.tension=3", "--workers", "1", "--csv", "t.csv"]) == 1
+    assert pd.read_csv("t.csv")["accuracy_reached"].tolist() == [False]
+
+
 @pytest.mark.nightly
 def test_a_target_that_is_missed_is_1(roof):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 9}]\nvary = ["west"]\n'
