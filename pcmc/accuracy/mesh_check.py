@@ -18,11 +18,13 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import certify
 from ..certificate.quantities import dimension_of
 from ..meshing.held_curves import doubted_midpoints, held_corners, smooth_midpoints
+from ..meshing.quality import edge_lengths
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve_once
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from ..surface.lagrange import expect_flat
+from ..surface.pieces import two_digits
 from .extrapolation import extrapolate
 from .persistence import MeshVerdict, compared, lost, shape_order
 from .quantities import Key, Reading, readings
@@ -191,6 +193,12 @@ def check_mesh(
     if finding is None or len(surfaces) > 1:
         other = compared(surfaces, certificates)
         finding = other if finding is None or other.verdict is MeshVerdict.CHANGES else finding
+    if finding.verdict is MeshVerdict.CHANGES and not finding.advice:
+        finer = two_digits(0.5 * float(edge_lengths(first).mean()))
+        advice = (
+            f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh --edge-length {finer:g}"
+        )
+        finding = finding._replace(advice=advice)
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
     doubts = _curve_doubts(first, sharp, found, callback) if boundary == "smooth" else {}
     table = _table(found, shape_order(surfaces) if order is None else order, doubts)

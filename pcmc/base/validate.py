@@ -78,16 +78,7 @@ def positive(name: str, value: object) -> float:
     return number(name, value, above=0.0)
 
 
-def integer(
-    name: str,
-    value: object,
-    least: int = 0,
-    *,
-    most: int = MOST,
-    where: str | None = None,
-    hint: str = "",
-    error: type[PcmcError] = OptionError,
-) -> int:
+def integer(name: str, value: object, least: int = 0, *, most: int = MOST, hint: str = "") -> int:
     """An int ≥ least and ≤ most.
 
     >>> integer("iterations", 2.5)
@@ -98,7 +89,7 @@ def integer(
     if not isinstance(value, Integral) or isinstance(value, bool) or not least <= int(value) <= most:
         above = isinstance(value, Integral) and int(value) > most
         bounds = f"≥ {least} and ≤ {most}" if above else f"≥ {least}"
-        refuse(name, value, f"a whole number {bounds}", where, hint, error)
+        refuse(name, value, f"a whole number {bounds}", hint=hint)
     return int(value)
 
 
@@ -216,15 +207,18 @@ def refuse(
 
 
 def shown(value: object) -> str:
-    """The value as an error shows it: what is long is cut.
+    """The value as an error shows it, in one line: what is long is cut.
 
     >>> shown("roof"), shown([0] * 1000), shown(10**5000)
     ("'roof'", '[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ...]', 'a number of 16610 bits')
+    >>> import numpy as np
+    >>> shown(np.eye(2))
+    'array([[1., 0.], [0., 1.]])'
     """
     short = Repr()
     short.maxlist = short.maxtuple = short.maxdict = short.maxset = 10
     short.maxstring, short.maxother, short.maxlong = 200, 200, 40
     try:
-        return short.repr(value)
+        return " ".join(line.strip() for line in short.repr(value).split("\n"))
     except ValueError:  # Python writes no number of more than some thousand digits
         return f"a number of {value.bit_length()} bits" if isinstance(value, int) else type(value).__name__

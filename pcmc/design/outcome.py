@@ -114,7 +114,8 @@ class Design:
             text += f"; {label}: wanted {wanted:.6g}{unit}, {reached}"
         if len(missed):
             text += f" ({values_text(self.parameters, units)})"
-            text += f"; a step further, {self.reason}" if self.reason else ""
+            why = self.reason.split(";")[0]  # what follows is advice for tensions that are given, not sought
+            text += f"; a step further, {why}" if why else ""
         number, count = len(self.targets), len(self.parameters)
         if self.status is DesignStatus.CONFLICT and number > count:
             varied = " ".join(map(str, self.parameters.index))

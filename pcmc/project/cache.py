@@ -34,6 +34,7 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
+OWN = "[0-9a-f]" * 64 + ".pcmc"  # its files: the folder that ``PCMC_CACHE`` names may have others
 PARTS = [
     "plan",
     "mesh",
@@ -65,7 +66,7 @@ def cached_files() -> list[Path]:
     """The files of the cache, the one used longest ago first."""
     place = cache_folder()
     with suppress(OSError):
-        return sorted(place.glob("*.pcmc"), key=lambda path: path.stat().st_mtime_ns) if place else []
+        return sorted(place.glob(OWN), key=lambda path: path.stat().st_mtime_ns) if place else []
     return []
 
 

@@ -22,7 +22,7 @@ from pcmc.accuracy.persistence import compared
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.meshing.held_curves import smooth_midpoints
 from pcmc.meshing.refinement import held_midpoints, refine
-from pcmc.plan import Plan
+from pcmc.plan import Divider, Plan
 from pcmc.project import run
 from pcmc.solvers import solve_once
 from pcmc.sweep import run as run_sweep
@@ -140,6 +140,16 @@ def test_a_surface_that_jumps_to_another_is_another_shape():
     found = check_mesh(solve_once(start, target="stationary"))
     assert found.verdict is MeshVerdict.CHANGES
     assert "it is another shape" in found.detail
+
+
+def test_a_shape_of_coarse_triangles_alone_needs_finer_ones():
+    """The full roof over an L: with every wall held, the mesh is all that one can change."""
+    corners = [[0, 0], [10, 0], [10, 4], [4, 4], [4, 10], [0, 10]]
+    valley = Divider([[0, 0], [4, 4]], wall=0.64)
+    found = check_mesh(solve(Plan(corners, [valley], tension=1.8481, edge_length=1.0).surface()))
+    assert found.verdict is MeshVerdict.CHANGES
+    assert found.advice.startswith("take finer triangles: edge_length = 0.58 in [plan]")
+    assert found.advice in found.brief()
 
 
 def test_a_junction_that_comes_down_changes():

@@ -171,6 +171,10 @@ def test_an_unreachable_height_is_refused_with_the_limit():
             assert design.solves <= 15
             limit = design.targets["limit"].iloc[0]
             assert f"apex of cap: wanted {height:g}, nearest reachable {limit:.6g}" in design.message
+            reason = "it grew without bound; raise the tensions"  # which are what is sought
+            assert dataclasses.replace(design, reason=reason).message.endswith(
+                "a step further, it grew without bound"
+            )
             assert design.targets["value"].iloc[0] == pytest.approx(limit, rel=1e-2)
             assert design.certificate.residual < 1e-10
             limits.append(limit)

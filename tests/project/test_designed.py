@@ -295,3 +295,12 @@ def test_a_copy_of_the_project_elsewhere_has_the_same_roof(folder, tmp_path):
     designed("roof.toml")
     shutil.copy("roof.toml", tmp_path / "copy.toml")
     assert designed(tmp_path / "copy.toml").cached
+
+
+def test_files_of_others_in_the_folder_of_the_cache_stay(folder, monkeypatch, capsys):
+    monkeypatch.setenv("PCMC_CACHE", str(folder))
+    assert cli.main(["solve", "roof.toml", "--no-mesh-check", "-o", "mine.pcmc"]) == 0
+    assert len(cached_files()) == 1
+    assert cli.main(["cache", "--clear"]) == 0
+    assert "1 roofs removed" in capsys.readouterr().out
+    assert [path.name for path in folder.glob("*.pcmc")] == ["mine.pcmc"]
