@@ -81,15 +81,13 @@ def blocks(count: int, workers: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
-def sum_blocks(
-    work: Callable[[int, int, Any], None], count: int, shape: tuple[int, ...], workers: int | None = None
-) -> Any:
+def sum_blocks(work: Callable[[int, int, Any], None], count: int, shape: tuple[int, ...]) -> Any:
     """The sum of what ``work(first, last, out)`` adds to arrays of this shape, one for each block.
 
     They are added in order: the same number of workers gives the same bytes.
     """
-    out = [np.zeros(shape) for _ in blocks(count, workers or threads())]
-    run_blocks(lambda part, first, last: work(first, last, out[part]), count, workers)
+    out = [np.zeros(shape) for _ in blocks(count, threads())]
+    run_blocks(lambda part, first, last: work(first, last, out[part]), count, None)
     for other in out[1:]:
         out[0] += other
     return out[0]

@@ -78,16 +78,7 @@ def positive(name: str, value: object) -> float:
     return number(name, value, above=0.0)
 
 
-def integer(
-    name: str,
-    value: object,
-    least: int = 0,
-    *,
-    most: int = MOST,
-    where: str | None = None,
-    hint: str = "",
-    error: type[PcmcError] = OptionError,
-) -> int:
+def integer(name: str, value: object, least: int = 0, *, most: int = MOST, hint: str = "") -> int:
     """An int ≥ least and ≤ most.
 
     >>> integer("iterations", 2.5)
@@ -98,7 +89,7 @@ def integer(
     if not isinstance(value, Integral) or isinstance(value, bool) or not least <= int(value) <= most:
         above = isinstance(value, Integral) and int(value) > most
         bounds = f"≥ {least} and ≤ {most}" if above else f"≥ {least}"
-        refuse(name, value, f"a whole number {bounds}", where, hint, error)
+        refuse(name, value, f"a whole number {bounds}", hint=hint)
     return int(value)
 
 

@@ -17,17 +17,16 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
-from ..base.tolerances import AT_REST, COLLAPSED, NEAR_NEUTRAL, NEUTRAL
+from ..base.tolerances import AT_REST, COLLAPSED, EXCESS, NEAR_NEUTRAL, NEUTRAL
 from ..base.units import NO_UNITS, Units
 from ..forces.functional import energy
-from ..forces.loose_parts import islands, ratios, rounding_left, squared_forces
+from ..forces.loose_parts import patch_residuals, rounding_left
 from ..forces.volume_below import volumes_below
 from ..meshing.quality import triangle_quality
 from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
-from ..surface.topology import SHEET
 from . import tables
 from .balance import load_ratio, pressures_left_over
 from .crossings import crossing_table, crossing_texts
@@ -255,6 +254,9 @@ class Certificate:
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         supports = self.supports.drop(columns=[*MOMENT])
+        forces = supports[[*FORCE]].to_numpy(float)
+        rounding = np.abs(forces) <= EXCESS * np.abs(forces).max(initial=0.0)
+        supports[[*FORCE]] = np.where(rounding, 0.0, forces)
         shown = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
         texts = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in shown if len(t)]
         return "\n\n".join([head, *texts])
@@ -313,7 +315,7 @@ def certify(
         tolerance=tolerance,
         quality=quality,
         spectrum=spectrum,
-        own_residuals=_own_residuals(at),
+        own_residuals=patch_residuals(at.surface, at.classes, at.unbalanced),
         rounding=rounding_left(standing, at.classes, at.X),
         evidence=evidence,
         tried=tried,
@@ -386,22 +388,6 @@ def _stability(
         except SingularMatrix as error:
             spectrum = replace(spectrum, hidden=f"{error}; modes=0 judges by counts alone")
     return spectrum, np.empty(0), np.empty((0, 0, 3))
-
-
-def _own_residuals(equilibrium: Equilibrium) -> Floats:
-    """(patches,) the forces left inside each patch over the norm of its own triangles' forces.
-
-    Of a patch with several islands, the worst one counts.
-    """
-    surface, classes = equilibrium.surface, equilibrium.classes
-    island = islands(surface.topology)[classes.active]
-    own = squared_forces(surface, classes, surface.vertices)
-    island_of_vertex = np.zeros(surface.n, dtype=np.int64)
-    island_of_vertex[classes.topology.faces] = island[:, None]
-    inside = equilibrium.unbalanced * (classes.kind == SHEET)[:, None]
-    out = np.zeros(len(surface.patches))
-    np.maximum.at(out, classes.patch_of_face, ratios(inside, island_of_vertex, own, island)[island])
-    return np.sqrt(out)
 
 
 def _largest(values: pd.Series) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
+from ..base.units import Units
 from ..forces.cables import directions, pull_along
 from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..forces.functional import patch_areas
@@ -27,6 +28,14 @@ THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth
 def names_of(surface: Surface, patches: Iterable[int]) -> str:
     """The names of patches that meet, as in "north | south | wall"."""
     return " | ".join(surface.patches[i].name for i in patches)
+
+
+def head_text(certificate: Any, units: Units, rows: dict[str, str]) -> str:
+    """Lines of a name and a text each: whether what is printed comes from a certified surface, or from a part
+    of one; the units; and these rows."""
+    first = {} if certificate.certified else {"not certified": certificate.verdict.value}
+    first |= {"extent": certificate.part, "units": units.sentence if units else ""}
+    return "\n".join(f"{name:>14}  {text}" for name, text in (first | rows).items() if text)
 
 
 def curve_lengths(surface: Surface, curve: EdgeCurve) -> Floats:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..base.libraries import load_library
+from ..base.tolerances import ON
 from ..meshing.curve_cutting import cut_triangles, refined_round
 from ..meshing.quality import edge_lengths
 from ..surface import Surface
@@ -23,7 +24,6 @@ from ..surface.topology import SIDES, Topology, components, edge_places, topolog
 SNAP = 0.1  # of an edge: a seam that passes a vertex so near goes through it
 BESIDE = 0.3  # of an edge: such a seam crosses no other edge of that vertex so near to it
 MOST_TRIANGLES = 50_000  # beyond which triangles are not cut into four
-ON = 1e-9  # of the size: what lies so near an edge is on it
 
 
 @dataclass(frozen=True, eq=False)

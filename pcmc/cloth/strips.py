@@ -13,6 +13,7 @@ import pandas as pd
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
+from ..certificate.tables import head_text
 from ..surface import Surface
 from ..surface.geometry import cross_2d, face_areas, segment_lengths
 from .settings import CuttingOptions
@@ -177,11 +178,8 @@ class CuttingPattern:
         """Totals and the table of strips, with the units of the numbers if they are given."""
         table, seams = self.table, self.seam_table
         sewn = seams[seams["kind"] != "rim"]
-        rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
-        rows |= {"extent": self.certificate.part} if self.certificate.part else {}
-        rows |= {"units": units.sentence} if units else {}
         long, wide = table["length"].max(), table["width"].max()
-        rows["strips"] = f"{len(table)}, up to {long:.5g} long and {wide:.5g} wide"
+        rows = {"strips": f"{len(table)}, up to {long:.5g} long and {wide:.5g} wide"}
         rows["area"] = f"{table['area'].sum():.6g} on the roof, {table['cut_area'].sum():.6g} cut"
         rows["strain"] = f"{table['strain_min'].min():.2g} to {table['strain_max'].max():.2g} %"
         apart = f"their sides differ by at most {self.largest_difference:.1g} of the length"
@@ -189,5 +187,5 @@ class CuttingPattern:
         if table[["warp", "weft"]].to_numpy().any():
             warp, weft = (f"{table[way].min():.3g} to {table[way].max():.3g} %" for way in ("warp", "weft"))
             rows["cut shorter"] = f"by {warp} along the warp, {weft} along the weft"
-        head = "\n".join(f"{name:>13}  {text}" for name, text in rows.items())
+        head = head_text(self.certificate, units, rows)
         return f"{head}\n\n{table.to_string(index=False, float_format=lambda x: f'{x:.4g}')}"

@@ -18,6 +18,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.tolerances import COLLAPSED
 from ..solvers import solve_once
+from ..solvers.homotopy import MIN_QUALITY
 from ..solvers.result import Result
 from ..solvers.state import SolverState
 from ..solvers.steps import Stepper
@@ -31,7 +32,6 @@ STEPS = 40  # at most
 DIFFERENCE = 1e-4  # of a step: where the derivative along it is taken
 NEAR = 1e-3  # residual from which Newton's method alone goes on
 SHORTER = (1.0, 0.5, 0.25, 0.125)  # of a step, tried in turn where it spoils triangles
-MIN_QUALITY = 0.3  # vertices are redistributed while the worst triangle has less quality
 
 
 def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:

@@ -13,6 +13,7 @@ from ..meshing.quality import worst_quality
 from ..meshing.remeshing import remesh
 from ..solvers import solve_once
 from ..solvers.attempt import Log, NewtonOptions, NewtonRun
+from ..solvers.homotopy import MIN_QUALITY
 from ..solvers.result import Result, Status
 from ..solvers.state import SolverState
 from ..surface import Surface
@@ -22,7 +23,6 @@ FIRST = 0.02  # of the size: the largest displacement of the first step off a sa
 HALVINGS = 6  # of it, until the energy is lower there
 SMOOTH = 30  # steps of smooth descent before Newton's: these go down where they begin, and do not leap
 IMAGES = 9  # between two minima, on the straight way from one to the other
-MIN_QUALITY = 0.3  # of the worst triangle
 
 
 def way_down(saddle: Surface, mode: Floats) -> tuple[Surface, Status]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import squared_sides
-from ..surface.topology import Topology, components
+from ..surface.topology import SHEET, Topology, components
 from .cables import squared_cable_forces
 from .motion_space import VertexClasses, force_scale, squared_forces
 
@@ -45,6 +45,21 @@ def rounding_left(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     edges = np.sqrt(squares[counts > 0] / (3.0 * counts[counts > 0]))
     shortest = edges[edges > 0.0].min(initial=np.inf)
     return float(np.finfo(float).eps * np.abs(X).max(initial=0.0) / shortest)
+
+
+def patch_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
+    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces.
+
+    Of a patch with several islands, the worst one counts.
+    """
+    island = islands(surface.topology)[classes.active]
+    own = squared_forces(surface, classes, surface.vertices)
+    island_of_vertex = np.zeros(surface.n, dtype=np.int64)
+    island_of_vertex[classes.topology.faces] = island[:, None]
+    inside = left * (classes.kind == SHEET)[:, None]
+    out = np.zeros(len(surface.patches))
+    np.maximum.at(out, classes.patch_of_face, ratios(inside, island_of_vertex, own, island)[island])
+    return np.sqrt(out)
 
 
 def ratios(left: Floats, part: Ints, own: Floats, part_of_face: Ints) -> Floats:

@@ -44,7 +44,7 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | N
     return _middles(X, edges, *_arcs_over(X, edges, corner, corners))
 
 
-def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Floats | None:
+def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> Floats | None:
     """(k,3) other places for the same vertices, about as far from those as the curve that was meant may be.
 
     Each lies nearer to the middle of its edge, or farther from it. With r, s the rises of the two arcs over
@@ -64,7 +64,7 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     [0.00067, 0.00104]
     """
     X, edges = surface.vertices, held_edges(surface)
-    rises, arcs = _arcs_over(X, edges, corner, corners)
+    rises, arcs = _arcs_over(X, edges, CORNER, corners)
     two, one = arcs.all(axis=1), arcs[:, 0] != arcs[:, 1]
     square = ((X[edges[:, 1]] - X[edges[:, 0]]) ** 2).sum(axis=1)
     apart, heights = rises[:, 1] - rises[:, 0], np.linalg.norm(rises, axis=2)
@@ -84,12 +84,11 @@ def doubted_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | 
     return _middles(X, edges, rises, arcs) + moves
 
 
-def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Projection:
+def onto_held_curves(surface: Surface, corners: Ints | None = None) -> Projection:
     """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
 
-    The curves are those of ``smooth_midpoints``, as are ``corner`` and ``corners``, with each edge cut into
-    256. All meshes made with one such function, by ``refine``, ``remesh`` or ``check_mesh``, have the same
-    boundary.
+    The curves are those of ``smooth_midpoints``, as are ``corners``, with each edge cut into 256. All meshes
+    made with one such function, by ``refine``, ``remesh`` or ``check_mesh``, have the same boundary.
 
     >>> from pcmc import Patch
     >>> angle = 2 * np.pi * np.arange(12) / 12
@@ -100,9 +99,9 @@ def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | N
     1.0
     """
     X, edges = surface.vertices, held_edges(surface)
-    corners = np.union1d(held_corners(surface, corner), np.empty(0, int) if corners is None else corners)
+    corners = np.union1d(held_corners(surface), np.empty(0, int) if corners is None else corners)
     for _ in range(HALVINGS):
-        middle = _middles(X, edges, *_arcs_over(X, edges, corner, corners))
+        middle = _middles(X, edges, *_arcs_over(X, edges, CORNER, corners))
         number = len(X) + np.arange(len(edges))
         X = np.concatenate([X, middle])
         edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
@@ -122,13 +121,13 @@ def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | N
     return project
 
 
-def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
+def held_corners(surface: Surface) -> Ints:
     """Vertices (k,) of held edges at which none of these goes on into another one.
 
     On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
     """
     edges = held_edges(surface)
-    edge, end, _ = _continuations(surface.vertices, edges, corner)
+    edge, end, _ = _continuations(surface.vertices, edges, CORNER)
     return np.setdiff1d(edges, edges[edge, end])
 
 

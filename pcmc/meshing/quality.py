@@ -100,10 +100,8 @@ def edge_lengths(surface: Surface) -> Floats:
     return segment_lengths(surface.vertices, surface.topology.sides)
 
 
-def towards_star_centres(
-    surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints, step: float = 0.5
-) -> Floats:
-    """Move (n,3) of each vertex towards a better-shaped star, before any projection.
+def towards_star_centres(surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints) -> Floats:
+    """Move (n,3) of each vertex halfway towards a better-shaped star, before any projection.
 
     Inside a sheet (``kind`` (n,)) towards the area-weighted mean of its triangles' centroids, at the
     vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
@@ -112,7 +110,7 @@ def towards_star_centres(
     move = _to_star_centres(X, surface.faces)
     move[kind != SHEET] = 0.0
     move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
-    return apply_supports(surface, step * move, X)
+    return apply_supports(surface, 0.5 * move, X)
 
 
 @compiled

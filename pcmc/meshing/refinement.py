@@ -66,7 +66,7 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     (9, 8, 8)
     """
     expect_surface(surface)
-    for _ in range(refinable("levels", levels, surface.m)):
+    for _ in range(refinable(levels, surface.m)):
         if surface.periodic:
             surface = _refined_cell(surface, project)
             continue
@@ -90,11 +90,11 @@ def _refined_cell(surface: Surface, project: Projection | None) -> Surface:
     return fine.with_mesh(columns, images=images, rooms=surface.rooms)
 
 
-def refinable(name: str, levels: object, triangles: int) -> int:
+def refinable(levels: object, triangles: int) -> int:
     """The number of refinements, if so many triangles can be counted in 32 bits afterwards."""
     most = int(np.log2(validate.MOST / triangles) / 2.0)
     hint = f"each makes four times as many triangles of {triangles}"
-    return validate.integer(name, levels, most=most, hint=hint)
+    return validate.integer("levels", levels, most=most, hint=hint)
 
 
 def prolongation(surface: Surface) -> csr_array:

@@ -16,6 +16,7 @@ from ..base.files import atomic_write, writing
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.certificate import certified
+from ..certificate.tables import head_text
 from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
@@ -137,10 +138,7 @@ class PanelNet:
         table, beams, nodes = self.panels, self.beams, self.nodes
         kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
         worst, area = table.iloc[table["planarity"].argmax()], table["area"]
-        rows = {} if self.certificate.certified else {"not certified": self.certificate.verdict.value}
-        rows |= {"extent": self.certificate.part} if self.certificate.part else {}
-        rows |= {"units": units.sentence} if units else {}
-        rows["panels"] = f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"
+        rows = {"panels": f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"}
         rows["area"] = f"{area.sum():.6g}, {100.0 * self.covered:.2f} % of the roof's;"
         rows["area"] += f" panels {area.min():.3g} to {area.max():.3g}"
         rows["planarity"] = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
@@ -159,7 +157,7 @@ class PanelNet:
         if flat := table["panel"][area < NO_AREA * self.size**2].tolist():
             text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
             rows["slivers"] = text
-        return "\n".join(f"{name:>14}  {text}" for name, text in rows.items())
+        return head_text(self.certificate, units, rows)
 
 
 def panel_net(

@@ -13,6 +13,7 @@ from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.certificate import certified
+from ..certificate.tables import head_text
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
@@ -106,23 +107,17 @@ class Panels:
         total = self.edge_totals
         lengths = ", ".join(f"{r.kind} {r.length:.6g} ({r['count']})" for _, r in total.iterrows())
         angles = self.edges["dihedral"].dropna()
-        rows = [
-            ("panels", f"{len(self.panels)} in {self.count} families, at least {self.at_least} are needed"),
-            ("tolerance", f"{self.tolerance:g}, mirror images {self.mirror_images}"),
-            ("area", f"{self.area:.8g}"),
-            ("largest panel", _described(self.largest)),
-            ("smallest panel", _described(self.smallest)),
-            ("edges", f"{total['length'].sum():.6g} long: {lengths}"),
-        ]
-        if len(angles):
-            rows.append(("angles", f"{angles.min():.1f} to {angles.max():.1f} degrees between neighbours"))
-        if units:
-            rows.insert(0, ("units", units.sentence))
-        if self.certificate.part:
-            rows.insert(0, ("extent", self.certificate.part))
-        if not self.certificate.certified:
-            rows.insert(0, ("not certified", self.certificate.verdict.value))
-        head = "\n".join(f"{name:>14}  {text}" for name, text in rows)
+        between = f"{angles.min():.1f} to {angles.max():.1f} degrees between neighbours"
+        rows = {
+            "panels": f"{len(self.panels)} in {self.count} families, at least {self.at_least} are needed",
+            "tolerance": f"{self.tolerance:g}, mirror images {self.mirror_images}",
+            "area": f"{self.area:.8g}",
+            "largest panel": _described(self.largest),
+            "smallest panel": _described(self.smallest),
+            "edges": f"{total['length'].sum():.6g} long: {lengths}",
+            "angles": between if len(angles) else "",
+        }
+        head = head_text(self.certificate, units, rows)
         table = self.families.head(SHOWN).to_string(index=False, float_format=lambda x: f"{x:.5g}")
         rest = self.count - SHOWN
         return f"{head}\n\n{table}" + (f"\n... {rest} more families" if rest > 0 else "")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import groupby, pairwise
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -43,11 +42,7 @@ class Arrangement:
 
     def along(self, line: int) -> Sequence[Chain]:
         """The chains of a line."""
-        return self._by_line.get(line, [])
-
-    @cached_property
-    def _by_line(self) -> dict[int, list[Chain]]:
-        return {line: list(own) for line, own in groupby(self.chains, key=lambda chain: chain.line)}
+        return [chain for chain in self.chains if chain.line == line]
 
 
 def arrange(

@@ -23,7 +23,7 @@ from ..plot.figure import png
 from ..surface import Surface, expect_surface
 from ..surface.images import expect_no_images
 from . import tables
-from .chapters import at_rest_chapter, cutting_chapter, under_load_chapter
+from .chapters import PIXELS, at_rest_chapter, cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from ..structure import Analysis, StructuralModel
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
-PIXELS = 1300  # width of a picture
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,8 +128,10 @@ class Objective:
         self.status = self.evaluate.ending(point)
         if point.finite or not self.rows:
             self.rows.append((self.evaluate.count, point.energy, point.squared))
-            if self.best is None or self.status is Status.CONVERGED or _better(point, self.best):
-                self.best = point
+            best = self.best or point  # the one of less energy, or of the same to rounding and less force
+            other = abs(point.energy - best.energy) > SAME_ENERGY * abs(best.energy)
+            better = point.energy < best.energy if other else point.squared < best.squared
+            self.best = point if better or self.status is Status.CONVERGED else best
         if self.status is None and self.evaluate.count >= self.options.evaluations:
             self.status = Status.ITERATION_LIMIT  # NLopt's own limit waits for a step
         if self.callback is not None and point.finite:
@@ -191,10 +193,3 @@ def _optimize(objective: Objective) -> Status:
     if raised is not None:
         raise raised
     return objective.status or Status.STALLED
-
-
-def _better(new: Point, best: Point) -> bool:
-    """Whether it has less energy, or the same to rounding and less force."""
-    if abs(new.energy - best.energy) > SAME_ENERGY * abs(best.energy):
-        return new.energy < best.energy
-    return new.squared < best.squared

@@ -43,7 +43,7 @@ def newton(
     options = options or NewtonOptions()
     _refuse_loose_parts(surface)
     check_rooms(surface)
-    refinable("levels", options.levels, surface.m)
+    refinable(options.levels, surface.m)
     log, first, rows = Log(callback), surface, list[dict[str, Any]]()
     surface = _with_volumes(surface)
     order = options.order or surface.order

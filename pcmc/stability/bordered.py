@@ -12,7 +12,9 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from .factorisation import Inverse
+from .factorisation import TINY, Factor, Inverse, SingularMatrix
+
+CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its sign
 
 
 class BorderedFactor:
@@ -81,3 +83,22 @@ def solve_preconditioned(
         callback_type="pr_norm",
     )
     return z, residuals
+
+
+def negatives_without(factor: Factor, columns: Floats) -> int:
+    """Negative eigenvalues on the complement of the columns (N,k).
+
+    Haynsworth: the bordered matrix [[A, Q], [Qᵀ, 0]] has the inertia of A restricted to the
+    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q. SingularMatrix if rounding hides one of these.
+    """
+    k = columns.shape[1]
+    if not k:
+        return factor.negative
+    solved = factor.solve(columns)
+    # a rigid motion costs nothing, so its entries are far larger than those of a volume
+    size = np.sqrt(np.linalg.norm(solved, axis=0)) + TINY
+    small = (columns.T @ solved) / np.outer(size, size)
+    values = np.linalg.eigvalsh(0.5 * (small + small.T))
+    if not np.abs(values).min() > CLOSE:
+        raise SingularMatrix("the second variation is singular among the motions that keep the volumes")
+    return factor.negative + int((values > 0.0).sum()) - k

@@ -26,12 +26,10 @@ from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from ..surface.supports import apply_supports
-from .bordered import AcrossFactor, BorderedFactor
+from .bordered import AcrossFactor, BorderedFactor, negatives_without
 from .factorisation import Factor, Factoriser, Inverse, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
-TINY = float(np.finfo(float).tiny)
-CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its sign
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
@@ -383,22 +381,3 @@ class SecondVariation:
     def solve(self, right: Floats) -> Floats:
         """The inverse (N,) among the motions that count: with none of the excluded ones."""
         return self._across_excluded.solve(right)
-
-
-def negatives_without(factor: Factor, columns: Floats) -> int:
-    """Negative eigenvalues on the complement of the columns (N,k).
-
-    Haynsworth: the bordered matrix [[A, Q], [Qᵀ, 0]] has the inertia of A restricted to the
-    complement plus (k, k), and that of A plus that of -QᵀA⁻¹Q. SingularMatrix if rounding hides one of these.
-    """
-    k = columns.shape[1]
-    if not k:
-        return factor.negative
-    solved = factor.solve(columns)
-    # a rigid motion costs nothing, so its entries are far larger than those of a volume
-    size = np.sqrt(np.linalg.norm(solved, axis=0)) + TINY
-    small = (columns.T @ solved) / np.outer(size, size)
-    values = np.linalg.eigvalsh(0.5 * (small + small.T))
-    if not np.abs(values).min() > CLOSE:
-        raise SingularMatrix("the second variation is singular among the motions that keep the volumes")
-    return factor.negative + int((values > 0.0).sum()) - k

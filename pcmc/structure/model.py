@@ -36,7 +36,7 @@ from .loads import (
 )
 from .material import Material
 from .members import Member, PlacedMember, bars_on, lines_on
-from .pulls import at_vertices, balancing_force, corner_forces, in_planes
+from .pulls import balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
@@ -241,7 +241,7 @@ class StructuralModel:
             faces = s.faces[s.patch_of_face == wall]
             P = s.vertices[faces]
             load = s.net_pressures[wall] / 3.0 * area_vectors(P)[:, None]
-            of_wall = at_vertices(corner_forces(P, s.tensions[wall] * in_planes(P)) + load, faces, s.n)
+            of_wall = vertex_sums(corner_forces(P, s.tensions[wall] * in_planes(P)) + load, faces, s.n)
             N, _ = balancing_force(s.vertices[line.vertices], -of_wall[line.vertices], line.closed)
             if N <= 0.0:
                 text = f'member {line.name!r}: the sheets press along it; no cable can; kind = "beam" does'

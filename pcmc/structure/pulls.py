@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..surface.geometry import area_vectors, edge_vectors, unit_vectors
 
 
@@ -39,11 +39,6 @@ def corner_forces(P: Floats, tensors: Floats) -> Floats:
     """
     normal = unit_vectors(area_vectors(P))
     return -0.5 * np.einsum("eij,ekj->eki", tensors, np.cross(normal[:, None], edge_vectors(P)))
-
-
-def at_vertices(forces: Floats, faces: Ints, n: int) -> Floats:
-    """(n,3) the sums of forces (e,3,3) on the corners of faces (e,3)."""
-    return np.stack([np.bincount(faces.ravel(), column, n) for column in forces.reshape(-1, 3).T], axis=1)
 
 
 def turns(P: Floats, closed: bool) -> Floats:

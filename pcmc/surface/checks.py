@@ -96,12 +96,12 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
     return result
 
 
-def pair_array(pairs: Any, what: str, n: int) -> Ints:
-    """(k,2) int64 pairs of vertices within 0..n-1."""
-    E = _integers(pairs, what)
+def pair_array(pairs: Any, n: int) -> Ints:
+    """(k,2) int64 pairs of an image and its vertex, within 0..n-1."""
+    E = _integers(pairs, "images")
     if E.ndim != 2 or E.shape[1] != 2:
-        refuse_shape(what, E, "(k, 2), pairs of an image and its vertex")
-    _within(what, E, n, "vertex")
+        refuse_shape("images", E, "(k, 2), pairs of an image and its vertex")
+    _within("images", E, n, "vertex")
     return E
 
 

@@ -199,8 +199,11 @@ def angles(P: Floats) -> Floats:
 
 
 def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
-    """(n,3) at each vertex the sum of the values (m,3) of the faces around it."""
-    return np.stack([np.bincount(F.ravel(), np.repeat(column, 3), n) for column in values.T], axis=1)
+    """(n,c) at each vertex the sum of values (m,c) of the faces around it, or (m,3,c) of their corners."""
+    if values.ndim == 2:
+        values = np.repeat(values[:, None], 3, axis=1)
+    columns = values.reshape(-1, values.shape[2]).T
+    return np.stack([np.bincount(F.ravel(), column, n) for column in columns], axis=1)
 
 
 def cross_2d(u: Floats, v: Floats) -> Floats:

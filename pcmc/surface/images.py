@@ -194,7 +194,7 @@ def checked_images(
     pairs = np.asarray(given)
     if not pairs.size:
         return NONE
-    pairs = checks.pair_array(pairs, "images", len(X))
+    pairs = checks.pair_array(pairs, len(X))
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     image, vertex = pairs.T
     near = ON * bounding_size(X)

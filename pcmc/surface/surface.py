@@ -156,8 +156,7 @@ class Surface(supports.Supported, Imaged):
         Forces do not change with it where the pressures cancel along all edges that are not held; elsewhere
         it stays the point of Π. Far from that, as in survey coordinates, volumes would lose digits: there it
         is the point of Π below the middle of the surface, or the middle itself, if that is far above Π and
-        nothing slides there. It is moved along Π to lie on as many of the other planes as possible: these
-        then add nothing to volumes (``flat_pieces``).
+        nothing slides there. It lies on as many other planes as possible: they add nothing to volumes then.
         """
         point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
         if self.uncancelled.any():
@@ -328,8 +327,7 @@ class Surface(supports.Supported, Imaged):
 
         A load s on the plan area has the potential s ∫ z dA_plan = s V, V the volume over Π, as a pressure
         lower by s has. This holds where the boundary of the patches is held, lies on Π, or meets other
-        patches under the same snow: at a free edge V is that of cones to Π's point, whose sides would carry
-        snow, too.
+        patches under the same snow: at a free edge V is that of cones to Π's point, whose sides carry snow.
 
         Parameters
         ----------

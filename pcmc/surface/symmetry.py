@@ -359,10 +359,8 @@ def _cables(surface: Surface, place: Ints, masks: Bools, next_to: Sequence[Ints]
             edges = np.sort(place[label[:, c] == part][:, cable.edges].reshape(-1, 2), axis=1)
             edges, times = np.unique(edges, axis=0, return_counts=True)
             if times.min() != times.max():
-                text = (
-                    f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
-                )
-                raise SurfaceError(text, what="cables", where=cable.name)
+                text = f"cable {cable.name!r} lies in a mirror plane in part; make"
+                raise SurfaceError(f"{text} that part a cable of its own", what="cables", where=cable.name)
             name = cable.name if part == label[0, c] else _unused(cable.name, taken)
             cables.append(replace(cable.shared(int(times[0]), edges), name=name))
     return tuple(cables)
@@ -386,10 +384,8 @@ def _curves(surface: Surface, images: Sequence[Image], place: Ints) -> tuple[Hel
 def _rooms(
     surface: Surface, meets: Bools, next_to: Sequence[Ints], patch: Ints, names: Sequence[tuple[int, str]]
 ) -> tuple[Room, ...]:
-    """The rooms: images of one that meet across a plane are one room, with the volume of all.
-
-    ``patch`` (images, patches) and ``names`` are those of the whole's patches.
-    """
+    """The rooms: images of one that meet across a plane are one room, with the volume of all; ``patch``
+    (images, patches) and ``names`` are those of the whole's patches."""
     label = _joined((meets[:, None, :] & (surface.room_signs != 0.0)).any(axis=2), next_to)
     taken, rooms = {room.name for room in surface.rooms}, []
     for r, room in enumerate(surface.rooms):

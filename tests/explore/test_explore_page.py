@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -78,8 +79,7 @@ def test_dragging_a_slider_with_the_mouse_is_one_step(page):
 
 
 def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(driver):
-    running = explore.start(CAP)
-    try:
+    with closing(explore.start(CAP)) as running:
         page = Explored(driver, running.url)
         before = page.picture()
         page.enter("Tension α of cap", 0.2)
@@ -98,14 +98,11 @@ def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         console = page.complaints()
         assert all("400 (Bad Request)" in line for line in console)
-    finally:
-        running.close()
 
 
 @pytest.mark.nightly
 def test_a_saddle_is_named_and_its_motion_shown(driver):
-    running = explore.start(four_fans(rings=5, alpha_aux=6.0))
-    try:
+    with closing(explore.start(four_fans(rings=5, alpha_aux=6.0))) as running:
         page = Explored(driver, running.url)
         assert page.verdict == "saddle"
         assert page.find("#stabilise").is_displayed()
@@ -120,8 +117,6 @@ def test_a_saddle_is_named_and_its_motion_shown(driver):
         assert [n.get_attribute("value") for n in numbers] == ["1"] * 4
         assert page.verdict == "stable"
         assert not page.find("#stabilise").is_displayed()
-    finally:
-        running.close()
 
 
 def test_the_export_downloads_the_surface(page, driver, explorer):
@@ -369,8 +364,7 @@ def test_when_the_program_has_ended_the_page_says_so(driver):
 def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
     from selenium.webdriver.common.keys import Keys
 
-    running = explore.start(spherical_cap(0.3))
-    try:
+    with closing(explore.start(spherical_cap(0.3))) as running:
         page = Explored(driver, running.url)
         page.find("#equilibria").click()
         until(lambda: page.text("#equilibria-result ol"), "the equilibria")
@@ -398,5 +392,3 @@ def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
         assert page.verdict == "saddle"
         assert not page.find("#equilibria-result").is_displayed()  # it is about the surface shown
         assert page.complaints() == []
-    finally:
-        running.close()

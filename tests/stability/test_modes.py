@@ -14,7 +14,8 @@ from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pattern import Pattern
 from pcmc.forces.rigid_motions import rigid_modes, rigid_motions
 from pcmc.stability import modes
-from pcmc.stability.equilibrium import Equilibrium, negatives_without
+from pcmc.stability.bordered import negatives_without
+from pcmc.stability.equilibrium import Equilibrium
 from pcmc.stability.factorisation import factoriser
 from pcmc.stability.modes import lowest
 
