@@ -226,7 +226,7 @@ def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         problem = f"patch {bare[0]!r} has no at=; give it to all patches or to none"
         raise PlanError(problem, what="at", where=bare[0])
     elif len(specs) != parts:
-        problem = f"the dividers cut the plan into {parts} parts, but there are {len(specs)} patches"
+        problem = f"the dividers cut the plan into {parts} parts, but the patches are {len(specs)}"
         problem += f" ({', '.join(bare)}); give one for each part, or place them with at="
         raise PlanError(problem, what="patches", found=len(specs), expected=parts)
     else:

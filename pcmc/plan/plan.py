@@ -142,7 +142,9 @@ class Plan:
             if getattr(self, key) is not None:
                 validate.positive(key, getattr(self, key))
         if bool(self.patches) == (self.tension is not None):
-            problem = "a plan needs either patches, each with its tension, or one tension= for all"
+            problem = (
+                "a plan needs one tension= (in a project, tension or rise) or patches, each with its own"
+            )
             raise OptionError(problem, what="tension")
         for key, usual in (("pressure", 1.0), ("weight", 0.0)) if self.patches else ():
             if getattr(self, key) != usual:

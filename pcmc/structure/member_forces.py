@@ -25,6 +25,7 @@ from .pulls import balancing_force, corner_forces, turns
 from .results import StepResults
 
 COLUMNS = ("N", "V", "V_across", "T", "M", "M_across")  # as ``FrameForces.within`` has them
+ROUNDING = 1e-12  # of the largest force in a member: less of another is none
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
 STRAIGHT = 0.01  # share of a member's pull that bends it: below it needs no other line
@@ -60,9 +61,12 @@ class MemberForces:
     @property
     def largest(self) -> dict[str, float]:
         """The extremes along it: ``least_N`` and ``largest_N``, and the largest shear force ``V`` and moment
-        ``M``, in whichever direction."""
+        ``M``, in whichever direction; 0 for what is rounding beside the others."""
         N, (V, M) = self.within[:, 0], (np.linalg.norm(self.within[:, k], axis=1) for k in ([1, 2], [4, 5]))
-        return {"least_N": N.min(), "largest_N": N.max(), "V": V.max(), "M": M.max()}
+        found = {"least_N": N.min(), "largest_N": N.max(), "V": V.max(), "M": M.max()}
+        arms = {name: self.span if name == "M" else 1.0 for name in found}
+        least = ROUNDING * max(abs(value) / arms[name] for name, value in found.items())
+        return {name: value if abs(value) > least * arms[name] else 0.0 for name, value in found.items()}
 
     @property
     def balance(self) -> tuple[float, float]:
