@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 FAR = 10.0  # degrees: walls that lean less are not reported
+NO_CHECK = "no mesh check: the surface is not at rest"
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -81,6 +82,8 @@ def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False
     if not roof.wants_mesh_check(wanted):
         if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
+        elif roof.mesh_check_wanted(wanted) and roof.certificate.index is None:
+            print(NO_CHECK)
         return
     print(end="", flush=True)
     with working() as progress:

@@ -176,7 +176,9 @@ def certify_(
         print(roof.theorem.text(roof.units))
     if meshes is None and roof.project is not None and roof.project.mesh_check:
         meshes = 3
-    if meshes is not None and certificate.index is not None:
+    if meshes is not None and certificate.index is None:
+        print(reports.NO_CHECK)
+    elif meshes is not None:
         print(end="", flush=True)
         with working() as progress:
             progress("checking the mesh")

@@ -102,7 +102,7 @@ def pressure_shares(surface: Surface) -> Floats:
     A wall has the difference to the air beyond it. It counts only where rooms have nothing else.
     """
     signs = surface.room_signs * surface.roof
-    whole = np.linalg.matrix_rank(signs) == len(signs)
+    whole = not surface.rooms or np.linalg.matrix_rank(signs) == len(signs)  # numpy 2.1 refuses no rows
     return np.asarray(np.linalg.pinv((signs if whole else surface.room_signs).T))
 
 

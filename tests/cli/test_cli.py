@@ -276,6 +276,16 @@ def test_what_a_project_asks_for_is_told_by_certify_and_remesh_too(folder, capsy
         assert all(text in out for text in ("margin: ", "proved: ", "finer meshes have the same surface"))
 
 
+def test_a_mesh_check_of_what_is_not_at_rest_is_left_out_with_a_word(folder, capsys):
+    for command in (
+        ["certify", "roof.toml", "--start", "--meshes", "2"],
+        ["solve", "roof.toml", "--mesh-check"],
+    ):
+        tension = ["--tension", "0.3"]  # less than any roof needs
+        assert cli.main([*command, *tension]) == 1
+        assert "no mesh check: the surface is not at rest" in capsys.readouterr().out
+
+
 def test_the_version(capsys):
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"pcmc {version('pcmc-surfaces')}\n"
