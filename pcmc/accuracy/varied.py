@@ -14,7 +14,7 @@ from ..base.errors import OptionError
 from ..certificate.quantities import Parameter
 from ..solvers.continuation import Direction
 from ..surface import Surface
-from ..surface.values import sheets_below
+from ..surface.values import in_the_open
 
 Part = tuple[str, str]  # the kind of a parameter, such as "tension", and the name of what it belongs to
 
@@ -87,8 +87,8 @@ def named(surface: Surface) -> Mapping[str, tuple[Part, ...]]:
     pulling = tuple(part for part in tensions if Parameter(part[1], part[0]).value(surface) > 0.0)
     weights = listed["weight"] + listed.get("cable_weight", ())
     heavy = tuple(part for part in weights if Parameter(part[1], part[0]).value(surface) != 0.0)
-    covered = {*sheets_below(surface).values()} - {patch.name for patch in surface.patches if patch.snow}
-    snowed = tuple(part for part in listed.get("snow", ()) if part[1] not in covered)
+    out = in_the_open(surface) | (surface.snows != 0.0)
+    snowed = tuple(part for part in listed.get("snow", ()) if out[surface.patch_index(part[1])])
     together = listed | ({"tension": pulling} if pulling else {}) | ({"weight": heavy} if heavy else {})
     together |= {"snow": snowed} if snowed else {}
     single = {Parameter(name, kind).label: ((kind, name),) for kind, name in sum(listed.values(), ())}

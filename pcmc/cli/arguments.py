@@ -25,7 +25,7 @@ from ..project.outcome import MOST_CHECKED, OnStep
 from ..project.varied import with_loads
 from ..project.writing import check_outputs
 from ..surface import Surface
-from ..surface.values import sheets_below
+from ..surface.values import in_the_open, sheets_below
 
 TOML, DXF = ".toml", ".dxf"
 
@@ -120,9 +120,10 @@ class Loads:
         """The surface with these values; wall pressures follow those of their rooms."""
         sheets = [patch.name for patch in surface.patches if not patch.wall]
         loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
-        below = sheets_below(surface).values()  # they keep their factor, and no snow falls on them
-        upper = [name for name in loaded if name not in below]
-        names = {"tension": upper, "pressure": loaded, "weight": sheets, "snow": upper}
+        below = sheets_below(surface).values()  # they keep their factor
+        out = [p.name for p, out in zip(surface.patches, in_the_open(surface), strict=True) if out]
+        names = {"tension": [name for name in loaded if name not in below], "pressure": loaded}
+        names |= {"weight": sheets, "snow": [name for name in loaded if name in out]}
         names |= {key: [cable.name for cable in surface.cables] for key in ("cable", "cable_weight")}
         names |= {"volume": [room.name for room in surface.rooms]}
         flags = {key: f"--{key.replace('_', '-')}" for key in names}

@@ -161,7 +161,7 @@ class _Model:
             "Supports": ("IfcText", "".join(map(str, support_of(surface)[used].tolist()))),
         }
         if patch.tension > 0.0:
-            values["TargetMeanCurvature"] = ("IfcReal", patch.target_curvature)
+            values["TargetMeanCurvature"] = ("IfcCurvatureMeasure", patch.target_curvature)
         self.add_properties("Pcmc_Patch", element, values, str(k))
         return element
 
@@ -205,15 +205,17 @@ class _Model:
         used = self.add("IfcMaterialProfileSetUsage", ForProfileSet=profiles)
         ends = {"RelatedObjects": [element], "RelatingMaterial": used}
         self.rooted("IfcRelAssociatesMaterial", f"member {line.name} material", **ends)
-        stress = "IfcPlanarForceMeasure" if self.units.force else "IfcReal"
+        stress, density = "IfcPlanarForceMeasure", "IfcMassDensityMeasure"
+        if not self.units.force:
+            stress = density = "IfcReal"
         values = {
             "Kind": ("IfcLabel", line.kind),
             "Area": ("IfcAreaMeasure", profile.area * length_factor(self.units.length, "m") ** 2),
-            "SecondMomentUpright": ("IfcReal", profile.moments[0]),
-            "SecondMomentAcross": ("IfcReal", profile.moments[1]),
+            "SecondMomentUpright": ("IfcMomentOfInertiaMeasure", profile.moments[0]),
+            "SecondMomentAcross": ("IfcMomentOfInertiaMeasure", profile.moments[1]),
             "YoungsModulus": (stress, member.material.young),
             "PoissonsRatio": ("IfcReal", member.material.poisson),
-            "MassDensity": ("IfcReal", member.material.density),
+            "MassDensity": (density, member.material.density),
         }
         for key, value in zip(("LeastForceAtRest", "LargestForceAtRest"), line.forces or (), strict=False):
             values[key] = "IfcForceMeasure" if self.units.force else "IfcReal", value
@@ -284,19 +286,22 @@ def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
 
 
 def assigned_units(add: Callable[..., Any], units: Units) -> Any:
-    """The units of length, angle, area, volume, tension and pressure; ``add`` makes an entity."""
+    """The units of length, angle, area, volume, curvature and second moments, and with a unit of force those
+    of forces, tension, pressure and density, whose mass is force · s² / length; ``add`` makes an entity."""
     length = _unit(add, "LENGTHUNIT", "METRE", units.length, (1, 0, 0), length_factor(units.length, "m"))
     kinds = {"AREAUNIT": "SQUARE_METRE", "VOLUMEUNIT": "CUBIC_METRE", "PLANEANGLEUNIT": "RADIAN"}
     listed = [length, *(add("IfcSIUnit", UnitType=kind, Name=name) for kind, name in kinds.items())]
+    derived = [("CURVATUREUNIT", [(length, -1)]), ("MOMENTOFINERTIAUNIT", [(length, 4)])]
     if units.force:
         force = _unit(add, "FORCEUNIT", "NEWTON", units.force, (1, 1, -2), NEWTONS[units.force])
-        listed.append(force)
-        for kind, power in (("LINEARFORCEUNIT", -1), ("PLANARFORCEUNIT", -2)):
-            factors = [
-                add("IfcDerivedUnitElement", Unit=unit, Exponent=exponent)
-                for unit, exponent in ((force, 1), (length, power))
-            ]
-            listed.append(add("IfcDerivedUnit", Elements=factors, UnitType=kind))
+        second = add("IfcSIUnit", UnitType="TIMEUNIT", Name="SECOND")
+        listed += [force, second]
+        derived += [("LINEARFORCEUNIT", [(force, 1), (length, -1)])]
+        derived += [("PLANARFORCEUNIT", [(force, 1), (length, -2)])]
+        derived += [("MASSDENSITYUNIT", [(force, 1), (second, 2), (length, -4)])]
+    for kind, powers in derived:
+        factors = [add("IfcDerivedUnitElement", Unit=unit, Exponent=power) for unit, power in powers]
+        listed.append(add("IfcDerivedUnit", Elements=factors, UnitType=kind))
     return add("IfcUnitAssignment", Units=listed)
 
 

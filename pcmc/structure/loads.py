@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Bools, Floats
@@ -15,6 +14,7 @@ from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.values import in_the_open
 
 GRAVITY = 9.81  # m/s²
 FORM = "form"  # what combinations call the form-finding load
@@ -237,34 +237,6 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
                 raise OptionError(text, what="combinations", where=name, found=case)
         checked[name] = {c: validate.number("factor", f, where=c, **limits) for c, f in factors.items()}
     return checked
-
-
-def in_the_open(surface: Surface) -> Bools:
-    """(k,) the patches that are no walls and lie under no other sheet, as the lower one of a cushion does.
-
-    One lies under another if most of its triangles have, within their own size in the plan, the middle of a
-    triangle of that other one higher up.
-
-    >>> from pcmc import Patch
-    >>> X = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.6, 0.6, 1], [0.6, 0.6, -1]]
-    >>> faces = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]]
-    >>> sheets = [Patch("top", 1.0), Patch("bottom", 1.0)]
-    >>> in_the_open(Surface(X, faces, [0] * 3 + [1] * 3, sheets, fixed=range(3))).tolist()
-    [True, False]
-    """
-    P, patch_of = surface.plane.to_local(surface.vertices)[surface.faces], surface.patch_of_face
-    middle, reach = P.mean(axis=1), np.ptp(P, axis=1)[:, :2].max(axis=1)
-    found: Bools = surface.roof.copy()
-    roof = np.flatnonzero(surface.roof & (np.bincount(patch_of, minlength=len(found)) > 0))
-    trees = {k: cKDTree(middle[patch_of == k, :2]) for k in roof}
-    for k in trees:
-        mine = patch_of == k
-        for other in trees.keys() - {k}:
-            away, nearest = trees[other].query(middle[mine, :2])
-            higher = middle[patch_of == other, 2][nearest] > middle[mine, 2]
-            if (higher & (away < 0.5 * reach[mine])).mean() > 0.5:
-                found[k] = False
-    return found
 
 
 def plan_areas(surface: Surface) -> Floats:

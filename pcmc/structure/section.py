@@ -14,8 +14,9 @@ from ..surface import Surface
 from ..surface.curves import Curve
 from ..surface.parts import image_names, with_images
 from ..surface.symmetry import mirrored
+from ..surface.values import in_the_open
 from .gas import Gas
-from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_the_open
+from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads
 from .material import Material, Profile
 from .members import ENDS, KINDS, Member, bars_on, lines_on
 from .model import StructuralModel, checked_areas, checked_thickness

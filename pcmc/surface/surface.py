@@ -23,7 +23,7 @@ from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .images import Imaged, check_translations
 from .lagrange import element_nodes
 from .parts import Cable, CableEdges, Patch, Room, cable_edges, room_signs, summary
-from .values import part_index, sheets_below, wall_patches, with_values
+from .values import in_the_open, part_index, wall_patches, with_values
 
 
 def _of_patches(field: str) -> cached_property[Any]:
@@ -332,8 +332,8 @@ class Surface(supports.Supported, Imaged):
         Parameters
         ----------
         snow : s, force per area of the plan; Π's normal points up.
-        patches : names of the patches that it lies on; by default all that are no walls and no lower sheets
-            of cushions, or all if there are no others.
+        patches : names of the patches that it lies on; by default all that are no walls and under no other
+            sheet, or all if there are no others.
 
         Raises
         ------
@@ -347,8 +347,7 @@ class Surface(supports.Supported, Imaged):
         """
         snow = validate.number("snow", snow, error=SurfaceError)
         every = [patch.name for patch in self.patches]
-        shelter = {*sheets_below(self).values(), *(every[k] for k in np.flatnonzero(self.walls))}
-        roof = [name for name in every if name not in shelter]
+        roof = [name for name, out in zip(every, in_the_open(self), strict=True) if out]
         names = list(patches) if patches is not None else roof or every
         snows = {patch.name: patch.snow for patch in self.patches} | dict.fromkeys(names, snow)
         return self.retensioned(snows=snows).with_held_snow()

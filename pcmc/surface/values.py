@@ -127,6 +127,38 @@ def sheets_below(surface: Any) -> dict[str, str]:
     return {} if sheets and (surface.topology.boundary_edge & ~surface.mirror_edge).any() else sheets
 
 
+def in_the_open(surface: Any) -> Bools:
+    """(k,) the patches that snow falls on: no walls, and under no other sheet, as the lower one of a cushion.
+
+    The lower sheet is known by its name, too, as both may be flat at the start. Any other patch lies under
+    another one if most of its triangles have, within their own size in the plan, the middle of a triangle of
+    that one higher up.
+
+    >>> from . import Patch, Surface
+    >>> X = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.6, 0.6, 1], [0.6, 0.6, -1]]
+    >>> faces = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]]
+    >>> sheets = [Patch("top", 1.0), Patch("bottom", 1.0)]
+    >>> in_the_open(Surface(X, faces, [0] * 3 + [1] * 3, sheets, fixed=range(3))).tolist()
+    [True, False]
+    """
+    from scipy.spatial import cKDTree  # here, as few surfaces carry snow
+
+    P, patch_of = surface.plane.to_local(surface.vertices)[surface.faces], surface.patch_of_face
+    middle, reach = P.mean(axis=1), np.ptp(P, axis=1)[:, :2].max(axis=1)
+    lower = {*sheets_below(surface).values()}
+    found: Bools = surface.roof & [patch.name not in lower for patch in surface.patches]
+    roof = np.flatnonzero(surface.roof & (np.bincount(patch_of, minlength=len(found)) > 0))
+    trees = {k: cKDTree(middle[patch_of == k, :2]) for k in roof}
+    for k in trees:
+        mine = patch_of == k
+        for other in trees.keys() - {k}:
+            away, nearest = trees[other].query(middle[mine, :2])
+            higher = middle[patch_of == other, 2][nearest] > middle[mine, 2]
+            if (higher & (away < 0.5 * reach[mine])).mean() > 0.5:
+                found[k] = False
+    return found
+
+
 def of_both_sheets(surface: Any, pressures: Mapping[str, float]) -> dict[str, float]:
     """Pressures, or their rates, by patch: what is given for one sheet of a cushion alone is that of both."""
     both = dict(pressures)

@@ -10,9 +10,10 @@ from volume_cases import cap
 
 import pcmc
 from generators import hypar_roof, spherical_cap
-from pcmc import Parameter, Patch, Target, cli, io
+from pcmc import Parameter, Patch, Surface, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
 from pcmc.certificate.balance import load_name, load_ratio
+from pcmc.cli.arguments import Loads
 from pcmc.design.targets import measure
 from pcmc.explore.following import between, reach, wanted
 from pcmc.forces.rooms import room_pressures
@@ -23,6 +24,7 @@ from pcmc.project.values import changeable_values
 from pcmc.solvers.homotopy import Solves, attempt, raise_loads
 from pcmc.solvers.starts import low_start
 from pcmc.structure import Material, Snow, StructuralModel
+from pcmc.structure.loads import Step
 from studies.reference import evolver
 
 TOML = """
@@ -163,6 +165,18 @@ def test_commands_change_one_and_keep_the_other(tmp_path, monkeypatch, capsys):
     header, row = capsys.readouterr().out.split("\n\n")[1].splitlines()[:2]
     assert header.split()[:5] == ["patch", "tension", "pressure", "snow", "net"]
     assert row.split()[-len(header.split()) + 1 :][:4] == ["4", "1", "0.25", "0.75"]
+
+
+@pytest.mark.parametrize("lower", ["roof below", "under"])
+def test_snow_falls_on_the_upper_sheet_alone_whatever_their_names(lower):
+    corners = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.6, 0.6, 1], [0.6, 0.6, -1]]
+    faces = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]]
+    sheets = [Patch("roof", 1.0), Patch(lower, 1.0)]
+    cushion = Surface(corners, faces, [0] * 3 + [1] * 3, sheets, fixed=range(3))
+    assert cushion.with_snow(0.25).snows.tolist() == [0.25, 0.0]
+    assert Loads(snow=["0.25"]).of(cushion).snows.tolist() == [0.25, 0.0]
+    step = Snow(0.25).added_to(Step("snow", np.zeros(6), np.zeros((5, 3))), cushion, 0.0)
+    assert step.forces[3, 2] < 0.0 == step.forces[4, 2]
 
 
 def test_sweeps_vary_the_snow(tmp_path):

@@ -75,6 +75,12 @@ def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
     assert (arch.Name, wall.Name, model.by_type("IfcWall")) == ("wall 1", "wall 1", ())
     assert {part.Name for part in model.by_type("IfcBeam")} == {"edge 0", "edge 2"}
     assert get_pset(arch, "Pcmc_Member", "YoungsModulus") == 2.1e8
+    kinds = {v.Name: v.NominalValue.is_a() for v in model.by_type("IfcPropertySingleValue")}
+    assert kinds["SecondMomentAcross"] == "IfcMomentOfInertiaMeasure"
+    assert (kinds["MassDensity"], kinds["TargetMeanCurvature"]) == (
+        "IfcMassDensityMeasure",
+        "IfcCurvatureMeasure",
+    )
     assert get_material(arch).ForProfileSet.MaterialProfiles[0].Profile.WallThickness == 0.005
     lengths = {line.name: line.segments(np.eye(3)[2])[2].sum() for line in lines}
     for part, profile in ((parts["edge 0"], profiles[0]), (arch, members[0].profile)):
@@ -197,7 +203,13 @@ def test_forces_have_units_if_they_are_given(tmp_path, force):
         unit.UnitType: [element.Exponent for element in unit.Elements]
         for unit in model.by_type("IfcDerivedUnit")
     }
-    assert powers == {"LINEARFORCEUNIT": [1, -1], "PLANARFORCEUNIT": [1, -2]}
+    assert powers == {
+        "CURVATUREUNIT": [-1],
+        "MOMENTOFINERTIAUNIT": [4],
+        "LINEARFORCEUNIT": [1, -1],
+        "PLANARFORCEUNIT": [1, -2],
+        "MASSDENSITYUNIT": [1, 2, -4],
+    }
     dimensions = {unit.UnitType: tuple(unit.Dimensions) for unit in model.by_type("IfcConversionBasedUnit")}
     assert dimensions.pop("LENGTHUNIT") == (1, 0, 0, 0, 0, 0, 0)  # length, mass, time, and four more
     assert set(dimensions.values()) <= {(1, 1, -2, 0, 0, 0, 0)}
@@ -244,7 +256,7 @@ def test_other_files_are_refused(tmp_path):
         ("IFCTEXT('22", "IFCTEXT('72"),
         ('"counts"', '"count"'),
         ("IFCTRIANGULATEDFACESET(", "IFCPOLYGONALFACESET("),
-        ("#30,(#46,", "#30,(#99999,"),
+        ("#34,(#50,", "#34,(#99999,"),
     ],
 )
 def test_damaged_files_are_refused_in_one_line(tmp_path, old, new):

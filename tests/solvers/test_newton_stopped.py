@@ -166,7 +166,7 @@ def test_stopped_on_the_second_way_the_first_one_counts_if_it_came_farther(backe
 
 
 def test_a_backend_that_is_not_installed_is_named_with_its_extra(backend, monkeypatch):
-    monkeypatch.setattr("pcmc.stability.factorisation.available", lambda: ("superlu",))
+    monkeypatch.setattr("pcmc.stability.factorisation.installed", lambda: ("superlu",))
     with pytest.raises(MissingExtra, match=r"pypardiso is not installed.*\[fast\]"):
         solve(two_squares(4), backend="pardiso")
     assert solve(two_squares(4)).converged

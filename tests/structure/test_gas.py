@@ -15,7 +15,7 @@ from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan
 from pcmc.structure import Gas, analyse, calculix
-from pcmc.structure.loads import in_the_open
+from pcmc.surface.values import in_the_open
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
