@@ -137,10 +137,10 @@ def test_snow_lies_on_every_strip_of_a_ridge_of_long_triangles():
     """The middles of neighbours are nearer than a triangle is long, and none is under another."""
     X = [[x, y, z] for y, z in enumerate([0, 1, 2, 1, 0]) for x in (0, 10, 20)]
     faces, patches = [], []
-    for strip in range(4):
-        for a in (3 * strip, 3 * strip + 1):
+    for k in range(4):
+        for a in (3 * k, 3 * k + 1):
             faces += [[a, a + 1, a + 4], [a, a + 4, a + 3]]
-            patches += [strip, strip]
+            patches += [k, k]
     ridge = Surface(X, faces, patches, [Patch(f"strip {k}", 1.0) for k in range(4)], fixed=range(15))
     assert in_the_open(ridge).all()
 
