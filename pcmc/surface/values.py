@@ -144,7 +144,7 @@ def in_the_open(surface: Any) -> Bools:
     """
     from scipy.spatial import cKDTree  # here, as few surfaces carry snow
 
-    from .distance import distances  # needs Surface
+    from .distance import distances
 
     local, F, patch_of = surface.plane.to_local(surface.vertices), surface.faces, surface.patch_of_face
     plan, middle = local * [1.0, 1.0, 0.0], local[F].mean(axis=1)
