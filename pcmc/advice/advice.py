@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..base.arrays import toml, toml_key
 from ..base.errors import PcmcError
 from ..base.units import Units
 from ..certificate.balance import strained_junction
@@ -290,14 +291,14 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
     rows: list[tuple[str, Any, Any, Sequence[str]]]
     rows = [("[plan]", plan, other, ("edge", "cable", "tension", "pressure"))]
     for before, after in zip(plan.patches, other.patches, strict=True):
-        rows.append((f"[plan.patches] {before.name}:", before, after, ("tension", "pressure")))
+        rows.append((f"[plan.patches] {toml_key(before.name)}:", before, after, ("tension", "pressure")))
     for number, (hole, new) in enumerate(zip(plan.holes, other.holes, strict=False), 1):
         rows.append((f"[[plan.holes]] number {number}:", hole, new, ("edge", "cable")))
     for number, (divider, line) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
         rows.append(
             (f"[[plan.dividers]] number {number} ({divider.name!r}):", divider, line, ("wall", "bottom"))
         )
-    risen = {"[plan]" if r.patch is None else f"[plan.patches] {r.patch}:": r.kind for r in instead}
+    risen = {"[plan]" if r.patch is None else f"[plan.patches] {toml_key(r.patch)}:": r.kind for r in instead}
     walls, lines = other.surface().patches, []
     for place, before, after, keys in rows:
         for key in keys:
@@ -311,13 +312,13 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
                 new = next((p.tension for p in walls if _is_wall_of(after, p.name)), None)
                 if new == old:  # balanced as it is
                     continue
-            why = f"instead of {kind}" if kind else f"now {_toml(old)}"
-            lines.append(f"{place} {key} = {_toml(new)}  ({why})")
+            why = f"instead of {kind}" if kind else f"now {_shown(old)}"
+            lines.append(f"{place} {key} = {_shown(new)}  ({why})")
     return lines
 
 
-def _toml(value: Any) -> str:
-    return "none" if value is None else f"{value:g}" if isinstance(value, int | float) else f'"{value}"'
+def _shown(value: Any) -> str:
+    return "none" if value is None else f"{value:g}" if isinstance(value, float) else toml(value)
 
 
 def _is_wall_of(divider: Divider, name: str) -> bool:

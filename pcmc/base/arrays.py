@@ -1,8 +1,10 @@
-"""Names for the arrays that travel through pcmc, and values in the terms of JSON."""
+"""Names for the arrays that travel through pcmc, and values in the terms of JSON and TOML."""
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Callable, Mapping
 from enum import Enum
 from functools import cached_property, wraps
@@ -116,3 +118,20 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     return value.name.lower() if isinstance(value, Enum) else value
+
+
+def toml(value: Any) -> str:
+    """Plain data in TOML, in one line.
+
+    >>> toml({"at": [1.0, 2.0], "süd": True})
+    '{at = [1.0, 2.0], "süd" = true}'
+    """
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{toml_key(key)} = {toml(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def toml_key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml(name)

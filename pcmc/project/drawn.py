@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
+from ..base.arrays import toml
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
 from ..base.files import PathLike, as_path, check_name, check_regular
 from ..base.units import LENGTHS
@@ -96,10 +97,10 @@ class Chosen:
         "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
         """
         named = next(iter(self.cables), "")  # the outline's cable has none
-        cable = '[[plan.cables]] name = "{}", tension = ...' if named else "cable = ... under [plan]"
+        cable = "[[plan.cables]] name = {}, tension = ..." if named else "cable = ... under [plan]"
         kinds = {
-            "tension": (self.tensions, '"{}" = {{tension = ...}} under [plan.patches]'),
-            "wall": (self.walls, '[[plan.dividers]] name = "{}", wall = ...'),
+            "tension": (self.tensions, "{} = {{tension = ...}} under [plan.patches]"),
+            "wall": (self.walls, "[[plan.dividers]] name = {}, wall = ..."),
             "cable": (self.cables, cable),
         }
         parts, keys = [], []
@@ -108,7 +109,7 @@ class Chosen:
             for name, value in values.items():
                 groups.setdefault(value, []).append(repr(name) if name else "the outline")
             parts += [f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items()]
-            keys += [key.format(name) for name in list(values)[:1]]
+            keys += [key.format(toml(name)) for name in list(values)[:1]]
         if self.edge_length is not None:
             parts.append(f"edges of {self.edge_length:g}")
             keys.append("edge_length = ... under [plan]")

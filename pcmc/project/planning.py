@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
-import re
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.arrays import toml, toml_key
 from ..base.errors import FileError
 from ..base.files import PathLike
 from ..plan import plan_from
@@ -71,38 +70,39 @@ def _text(drawing: Drawing, values: Mapping[str, Any], name: str, gap: float | N
     missing = f'# units = "{FALLBACK}"  # the drawing has no unit of length'
     lines += [unit if drawing.units in LENGTHS else missing, "", "[plan]"]
     if name:
-        lines.append(f"drawing = {_toml(name)} # its layers are the lines; save it, and the roof follows")
-        lines += [] if gap is None else [f"gap = {_toml(gap)}"]
-    lines.append(f"edge_length = {_toml(values['edge_length'])} # of the triangles")
+        lines.append(f"drawing = {toml(name)} # its layers are the lines; save it, and the roof follows")
+        lines += [] if gap is None else [f"gap = {toml(gap)}"]
+    lines.append(f"edge_length = {toml(values['edge_length'])} # of the triangles")
     if not name:
-        lines += [f"plane = {_toml(values['plane'])}"] if "plane" in values else []
+        lines += [f"plane = {toml(values['plane'])}"] if "plane" in values else []
         lines.append(f"outline = {_curve(values['outline'], closed=True)}")
         for key in ("supports", "mirrors"):
             if values.get(key):
                 lines.append(f"{key} = {_list(map(_curve, values[key]))}")
         if "edge" in values:
             comment = "tension of the cables along the outline, between its supports"
-            lines += [f"edge = {_toml(values['edge'])}", f"cable = {_toml(values['cable'])} # {comment}"]
+            lines += [f"edge = {toml(values['edge'])}", f"cable = {toml(values['cable'])} # {comment}"]
     lines += ["", "[plan.patches] # a larger tension gives a flatter roof"]
     for patch, area in values["patches"].items():
-        lines.append(f"{_key(patch)} = {_toml({k: v for k, v in area.items() if not (name and k == 'at')})}")
+        own = {key: value for key, value in area.items() if not (name and key == "at")}
+        lines.append(f"{toml_key(patch)} = {toml(own)}")
     for kind in ("holes", "dividers", "cables"):
         for entry in values.get(kind, ()):
-            lines += ["", f"[[plan.{kind}]]", f"name = {_toml(entry['name'])}"]
+            lines += ["", f"[[plan.{kind}]]", f"name = {toml(entry['name'])}"]
             for key, value in entry.items():
                 if key == "name" or (key == "curve" and name) or (key, value) == ("bottom", "held"):
                     continue
                 comment = SHARPER if key == "wall" and value else ""
-                lines.append(f"{key} = {_curve(value) if key == 'curve' else _toml(value)}{comment}")
+                lines.append(f"{key} = {_curve(value) if key == 'curve' else toml(value)}{comment}")
     if len(drawing.heights) and not name:
         lines += ["", "[targets]", f"meet = {_list(height_targets(drawing))}"]
-        lines.append(f"vary = {_toml(list(values['patches']))} # the tensions that may change for it")
+        lines.append(f"vary = {toml(list(values['patches']))} # the tensions that may change for it")
     stem = drawing.path.stem
     lines += [
         "",
         "[output]",
-        f"files = {_toml([f'{stem}-roof.3dm'])}",
-        f"picture = {_toml(f'{stem}-roof.png')}",
+        f"files = {toml([f'{stem}-roof.3dm'])}",
+        f"picture = {toml(f'{stem}-roof.png')}",
     ]
     return "\n".join([*lines, ""])
 
@@ -137,26 +137,9 @@ def _curve(curve: Any, closed: bool = False) -> str:
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]
     if closed and isinstance(data, Mapping) and data.get("closed"):
         data = data["polyline"]
-    return _list(data) if isinstance(data, list) and isinstance(data[0], Mapping) else _toml(data)
+    return _list(data) if isinstance(data, list) and isinstance(data[0], Mapping) else toml(data)
 
 
 def _list(items: Iterable[Any]) -> str:
     """A list in TOML, a line for each item; texts are TOML already."""
-    return "[\n" + "".join(f"    {i if isinstance(i, str) else _toml(i)},\n" for i in items) + "]"
-
-
-def _toml(value: Any) -> str:
-    """Plain data in TOML, in one line.
-
-    >>> _toml({"at": [1.0, 2.0], "süd": True})
-    '{at = [1.0, 2.0], "süd" = true}'
-    """
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{_key(key)} = {_toml(item)}' for key, item in value.items())}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+    return "[\n" + "".join(f"    {i if isinstance(i, str) else toml(i)},\n" for i in items) + "]"

@@ -1,6 +1,7 @@
 """Wrong first projects: the advice printed for each, typed as it is printed, gives a certified roof."""
 
 import re
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +12,9 @@ from nightly import night_but
 from pcmc import cli
 from pcmc.advice.advice import changes
 from pcmc.certificate.diagnosis import describe_saddle
-from pcmc.plan import Divider, Plan
+from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.project import load, run_project
+from pcmc.project.drawn import Chosen
 
 HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
 SEAM = "curve = [[6, 0], [6, 6]]\n"
@@ -75,6 +77,17 @@ def test_a_wall_that_is_balanced_as_it_is_is_no_change():
     typed_in = replace(hall, dividers=[replace(line, wall=wall)])
     assert changes(typed_in, hall) == []
     assert changes(replace(hall, dividers=[replace(line, wall=2.0 * wall)]), hall)
+
+
+def test_a_line_advised_for_a_name_with_a_quote_is_read_by_toml():
+    line, name = Divider([[6, 0], [6, 6]]), 'the "west"'
+    areas = [PatchSpec(name, 5.0, at=[1, 1]), PatchSpec("east", 5.0, at=[9, 1])]
+    hall = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], [line], edge_length=0.8, patches=areas)
+    advised = changes(hall, replace(hall, patches=[replace(areas[0], tension=6.0), areas[1]]))[0]
+    key = advised.removeprefix("[plan.patches] ").split(": tension")[0]
+    assert tomllib.loads(f"{key} = 6") == {name: 6}
+    key = Chosen({name: 5.0}).text.split("to change: ")[1].split(" under")[0]
+    assert tomllib.loads(key.replace("...", "6")) == {name: {"tension": 6}}
 
 
 def test_no_tension_is_advised_for_a_tent_whose_ring_is_too_small(tmp_path):
