@@ -29,9 +29,8 @@ MISSING = (
 # in what the program prints where it finds no equilibrium; other errors are of the model or of the program
 NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum", "nonpositive jacobian")
 
-ERRORS = re.compile(
-    r"\*ERROR.*(?:\n(?! ?\*)[ \t]*\S.*)*"
-)  # with the lines that go on up to a blank one or a *
+# an error with the lines that go on, up to a blank one or a *
+ERRORS = re.compile(r"\*ERROR.*(?:\n(?! ?\*)[ \t]*\S.*)*")
 
 
 class CalculixError(PcmcError):
