@@ -134,4 +134,5 @@ def toml(value: Any) -> str:
 
 
 def toml_key(name: str) -> str:
+    """A key of TOML, in quotes where it needs them."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml(name)
