@@ -66,9 +66,13 @@ def total_load(surface: Surface) -> float:
 
 def along_normal(surface: Surface, forces: Floats) -> float:
     """The sum of forces (k,3) along Π's normal; 0 where rounding alone is left of them."""
-    parts = forces @ np.array(surface.plane.normal)
-    total = float(parts.sum())
-    return total if abs(total) > FORCE_ROUNDING * float(np.abs(parts).sum()) else 0.0
+    total = float((forces @ np.array(surface.plane.normal)).sum())
+    return total if abs(total) > rounding_of(forces) else 0.0
+
+
+def rounding_of(forces: Floats) -> float:
+    """What rounding leaves of the sum of forces (k,3) that cancel, force."""
+    return FORCE_ROUNDING * float(np.linalg.norm(forces, axis=1).sum())
 
 
 def support_forces(surface: Surface) -> Floats:

@@ -14,7 +14,7 @@ from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.pieces import point_text
 from ..surface.topology import POINT, EdgeCurve, vertex_kind
-from .forces import Forces, at_both_ends, held_boundary, load_places, sheet_pulls
+from .forces import Forces, at_both_ends, held_boundary, load_places, rounding_of, sheet_pulls
 from .tables import middle, names_of
 
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
@@ -67,7 +67,9 @@ def support_table(acting: Forces) -> pd.DataFrame:
         moment = np.cross(X[part.vertices] - at, part.forces).sum(axis=0)
         _, pulls = _pulled(acting, part)
         most = float(np.linalg.norm(pulls, axis=1).max()) if len(pulls) else np.nan
-        numbers = [segment_lengths(X, edges[part.edges]).sum(), *at, *part.forces.sum(axis=0), *moment, most]
+        force = part.forces.sum(axis=0)
+        force[np.abs(force) <= rounding_of(part.forces)] = 0.0
+        numbers = [segment_lengths(X, edges[part.edges]).sum(), *at, *force, *moment, most]
         rows.append([part.label, part.name or part.label, part.kind, *map(float, numbers)])
     return pd.DataFrame(rows, columns=COLUMNS)
 

@@ -175,8 +175,16 @@ def _residual(f: Findings) -> str:
 
 def _forces_left(f: Findings) -> list[object]:
     coarse = f"{f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"
-    reasons = [_residual(f), f.hardly_balanced, too_long(f.surface), _compressed(f)]
+    reasons = [_residual(f), _single_precision(f), f.hardly_balanced, too_long(f.surface), _compressed(f)]
     return [*reasons, coarse if f.overload else "", *f.tried[1:]]
+
+
+def _single_precision(f: Findings) -> str:
+    """That the coordinates have but the digits of .glb files, where that alone may leave the forces."""
+    X, coarser = f.surface.vertices, np.finfo(np.float32).eps / np.finfo(float).eps
+    if f.residual > NOISE * coarser * f.rounding or not np.array_equal(X, X.astype(np.float32)):
+        return ""
+    return "its coordinates are in single precision, as in a .glb file, which alone leaves as much"
 
 
 def _weak_patch(f: Findings) -> str:

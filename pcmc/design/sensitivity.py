@@ -157,7 +157,8 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         if not np.any(right):
             return np.zeros_like(at.X), np.zeros(len(units))
         z, residuals = solve_preconditioned(times, inverse.solve, right, ACCURACY, restart=40)
-        if not residuals or residuals[-1] > NO_SOLUTION:
+        unit = np.linalg.norm(inverse.solve(right)) / np.linalg.norm(right)  # that of the residuals
+        if not residuals or residuals[-1] > NO_SOLUTION * unit:
             raise SurfaceError(AT_FOLD, what="surface")
         return motion(z[:count]), units * z[count:]
 

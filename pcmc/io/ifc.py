@@ -198,7 +198,12 @@ class _Model:
         kind = {"column": "IfcColumn", "stay": "IfcTendon", "cable": "IfcTendon"}.get(line.kind, "IfcBeam")
         kind = "IfcMember" if line.wall and kind == "IfcBeam" else kind
         use = "NOTDEFINED" if kind == "IfcTendon" else kind.removeprefix("Ifc").upper()
-        element = self.element(kind, f"member {line.name}", line.name, place, shape, PredefinedType=use)
+        area = profile.area * length_factor(self.units.length, "m") ** 2
+        about = {"PredefinedType": use}
+        if kind == "IfcTendon":
+            about["CrossSectionArea"] = area
+            about["TensionForce"] = max(line.forces) if line.forces and self.units.force else None
+        element = self.element(kind, f"member {line.name}", line.name, place, shape, **about)
         material = self.add("IfcMaterial", Name=f"material of {line.name}")
         of_profile = self.add("IfcMaterialProfile", Name=line.name, Material=material, Profile=section)
         profiles = self.add("IfcMaterialProfileSet", Name=line.name, MaterialProfiles=[of_profile])
@@ -210,7 +215,7 @@ class _Model:
             stress = density = "IfcReal"
         values = {
             "Kind": ("IfcLabel", line.kind),
-            "Area": ("IfcAreaMeasure", profile.area * length_factor(self.units.length, "m") ** 2),
+            "Area": ("IfcAreaMeasure", area),
             "SecondMomentUpright": ("IfcMomentOfInertiaMeasure", profile.moments[0]),
             "SecondMomentAcross": ("IfcMomentOfInertiaMeasure", profile.moments[1]),
             "YoungsModulus": (stress, member.material.young),

@@ -192,7 +192,7 @@ def cable_for(outline: Curve, tension: float, supports: Sequence[Any]) -> float:
         angle = np.radians(angles(np.stack([before, corners, after], axis=1))[:, 1])
         longer = np.maximum(*(np.linalg.norm(other - corners, axis=1) for other in (before, after)))
         sharp = angle > FLAT
-        radius = max(radius, *(longer[sharp] / (2.0 * np.sin(CORNER * angle[sharp]))).tolist())
+        radius = max([radius, *(longer[sharp] / (2.0 * np.sin(CORNER * angle[sharp]))).tolist()])
     return two_digits(tension * radius)
 
 

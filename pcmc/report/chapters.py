@@ -128,7 +128,7 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
     kinds = {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length}
     columns = columns_in(table, kinds)
     columns["span over it"] = [f"{over:.3g}" if over < 1e3 else f"{over:.0f}" for over in table["span_over"]]
-    columns["buckling"] = [f"{factor:.4g}" if factor < 1e4 else "" for factor in table["buckling"]]
+    columns["buckling"] = ["" if math.isnan(factor) else f"{factor:.4g}" for factor in table["buckling"]]
     yield text_table("Forces of members", table[["case", "member"]], columns)
     yield SIGNS
     yield from (Picture("", picture) for picture in pictures)

@@ -69,7 +69,8 @@ def solve_preconditioned(
     restart: int,
     cycles: int = 1,
 ) -> tuple[Floats, list[float]]:
-    """z with ``times(z)`` = right (N,) to a relative accuracy, by GMRES, and the residual after each step."""
+    """z with ``times(z)`` = right (N,) to a relative accuracy, by GMRES, and the residual after each step:
+    that of ``inverse(times(z))``, over the norm of ``right``."""
     residuals: list[float] = []
     shape = len(right), len(right)
     z, _ = gmres(

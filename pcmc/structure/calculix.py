@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -15,6 +16,7 @@ from ..base.errors import FileError, PcmcError
 from ..base.files import writing
 from .inp import text_of
 from .loads import Step
+from .member_forces import floating, members_at_rest
 from .model import StructuralModel
 from .results import StepResults, read_steps
 
@@ -26,6 +28,9 @@ MISSING = (
 )
 # in what the program prints where it finds no equilibrium; other errors are of the model or of the program
 NOT_CONVERGED = ("too many cutbacks", "increment size smaller than minimum", "nonpositive jacobian")
+
+# an error with the lines that go on, up to a blank one or a *
+ERRORS = re.compile(r"\*ERROR.*(?:\n(?! ?\*)[ \t]*\S.*)*")
 
 
 class CalculixError(PcmcError):
@@ -70,7 +75,9 @@ def run_as_far(
         text = f"{PROGRAM} finds no equilibrium under the form-finding load alone; is the surface certified?"
         if model.lines:
             share = 100.0 * found[0].share if found else 0.0
-            text = f"the members carry only {share:.0f} % of what walls and supports do; make them stiffer"
+            unheld = [floating(model, beam, model.units) for beam in members_at_rest(model)]
+            text = f"the members carry only {share:.0f} % of what walls and supports do; "
+            text += "; ".join(filter(None, unheld)) or "make them stiffer"
         raise CalculixError(text, what=steps[0].name)
     return found
 
@@ -106,7 +113,7 @@ def run_file(path: Path, timeout: float | None = None) -> str:
     except subprocess.TimeoutExpired:
         raise CalculixError(f"{PROGRAM} did not finish within {timeout:g} s") from None
     if "Job finished" not in done.stdout:
-        errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
+        errors = [" ".join(text.split()) for text in ERRORS.findall(done.stdout)]
         stopped = NotConverged if any(text in done.stdout for text in NOT_CONVERGED) else CalculixError
         raise stopped(f"{PROGRAM}: {'; '.join(errors) or f'it stopped, code {done.returncode}'}")
     return done.stdout

@@ -31,6 +31,7 @@ from ..surface.topology import components
 
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
 EXACT = 1e-10  # of the factor at which bars buckle
+NEVER = 1e4  # factor from which it is rounding, as of a ring in tension, and they do not buckle
 LOOSE = 1e-9  # a rigid motion that supports hold less than so moves freely
 BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
 PULLED = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]], dtype=float)
@@ -60,7 +61,8 @@ class BarFrame:
 
     def buckling(self, N: Floats) -> float:
         """The factor on forces N (b,) along the bars, tension above 0, at which these buckle, loads keeping
-        their directions: the least λ > 0 with (K + λ G(N)) u = 0 for a motion u that is free; else inf.
+        their directions: the least λ > 0 with (K + λ G(N)) u = 0 for a motion u that is free; else inf,
+        and above 1e4, where it is rounding.
 
         A column of two bars with hinged ends, to 0.7 % of π² E I/L²:
 
@@ -88,7 +90,7 @@ class BarFrame:
 
         start = np.random.default_rng(0).standard_normal(n)  # no mode is square to it, as to an even vector
         most = float(eigs(LinearOperator((n, n), answer), 1, which="LR", v0=start, tol=EXACT)[0][0].real)
-        return 1.0 / most if most > 0.0 else np.inf
+        return 1.0 / most if most > 1.0 / NEVER else np.inf
 
     @cached_property
     def _axes(self) -> tuple[Floats, Floats]:

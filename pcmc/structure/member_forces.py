@@ -218,7 +218,7 @@ def supports_with_members(results: StepResults) -> pd.DataFrame:
 def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
-    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, NaN where it pulls. And a
+    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a
     row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
     ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``.
     """
@@ -247,8 +247,8 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
         about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment}"
         about += f", M/N = {most['M'] / abs(far):.2g}{length}" if far else ""
-        about += f"; {beam.enough:.3g} times its E A and E I keep the"
-        about += f" deflection below 1/{LIMIT:.0f} of the span (the member alone)"
+        stiff = f"{beam.enough:.3g} times its E A and E I keep the deflection below 1/{LIMIT:.0f} of the span"
+        about += f"; {floating(model, beam, units) or f'{stiff} (the member alone)'}"
         about += f"; alone it buckles at {beam.buckling:.3g} times this" if beam.buckling < np.inf else ""
         if beam.line.wall:
             about += f"; N = {N:.3g}{force} all along would leave {100.0 * share:.0f} % of the sheets' pull"
@@ -257,6 +257,18 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
             about += units.behind("tension") + "; N is a thrust, which no cable has" * (N <= 0.0)
         lines.append(about)
     return lines
+
+
+def floating(model: StructuralModel, beam: MemberForces, units: Units) -> str:
+    """Why no stiffness helps a ring that nothing but the sheets holds along Π's normal; empty for others."""
+    line, v, up = beam.line, beam.line.vertices, np.array(model.surface.plane.normal)
+    pull = abs(float(beam.pulls.sum(axis=0) @ up))
+    alone = line.closed and not line.wall and not line.member.propped and not model.held[v].any()
+    alone = alone and sum(np.isin(v, other.vertices).any() for other in model.beams) == 1
+    if not alone or pull <= STRAIGHT * np.linalg.norm(beam.pulls, axis=1).sum():
+        return ""
+    text = f"nothing but the sheets holds {line.name} upright, and at rest they pull it up or down with"
+    return f"{text} {pull:.3g}{units.behind('force')}: add propped = true to it, for columns or a wall below"
 
 
 def cable_offers(model: StructuralModel) -> list[str]:
@@ -287,6 +299,9 @@ def weak_members(
             text = f"{case}: {rest.line.name} buckles at {100.0 * worst.buckling:.2g} % of its thrust, if no"
             text += f" sheets hold it; {1.0 / worst.buckling:.2g} times its E I carries it alone, without any"
             lines.append(f"{text} safety")
+        if unheld := floating(model, rest, units):
+            lines.append(unheld)
+            continue
         case, worst = max(own, key=lambda one: one[1].deflection)
         first = listed[0][1][k]
         inner = slice(None) if rest.line.closed else slice(1, -1)

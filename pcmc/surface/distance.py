@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from .geometry import area_vectors, point, to_triangle, vertex_sums
-from .surface import Surface
 
 
 def distances(points: Floats, X: Floats, F: Ints) -> Floats:
@@ -28,12 +29,12 @@ def distances(points: Floats, X: Floats, F: Ints) -> Floats:
     return np.asarray(_nearest(points, X, F, start, np.concatenate(lists).astype(np.int64)))
 
 
-def difference(surface: Surface, other: Surface) -> Floats:
+def difference(surface: Any, other: Any) -> Floats:
     """(n,) distance of each vertex from another surface, length; positive outside it, along its normals.
 
     The meshes may differ. Walls are no part of it, except for the vertices of walls.
 
-    >>> from pcmc import Patch
+    >>> from pcmc import Patch, Surface
     >>> corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0.0]])
     >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 1.0)], fixed=[0, 1, 2])
     >>> lower = Surface(corners - [0, 0, 0.5], [[0, 1, 2]], [0], [Patch("roof", 1.0)], fixed=[0, 1, 2])

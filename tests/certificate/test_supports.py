@@ -131,7 +131,8 @@ def test_glass_carries_nothing_along_itself_where_a_curved_sheet_is_fixed_beside
 
 def test_the_sentence_of_balance_tells_whether_there_are_loads():
     """Of a film without loads the forces of its supports cancel, up to what the solver leaves of them."""
-    film = pcmc.solve(catenoid(0.4, half_distance=0.5), tolerance=1e-6).certificate
+    film = pcmc.solve(catenoid(0.4, half_distance=0.5), tolerance=1e-6).surface
+    film = pcmc.certify(film.moved(film.vertices @ [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]))
     table = film.balance
     assert table["force_share"].iloc[1] > 0.0
     sentence = balance_sentence(table)
@@ -214,3 +215,13 @@ def test_forces_at_points_are_blue():
     image = plot.reactions(pcmc.solve(cables_between_walls()).surface)
     assert near(image, rgb("#2166AC")).sum() > 100
     assert near(image, rgb("#B2182B")).sum() > 100
+
+
+def test_forces_of_a_rim_that_cancel_are_zero():
+    """Both sheets of a cushion pull on its rim inwards alone, and all around."""
+    cushion = pcmc.solve(Plan([[0, 0], [6, 0], [6, 4], [0, 4]], tension=3.0, cushion=1.0).surface()).surface
+    certificate = pcmc.certify(cushion)
+    (rim,) = certificate.supports[FORCE].to_numpy().tolist()
+    assert rim == [0.0, 0.0, 0.0]
+    assert certificate.support == 0.0
+    assert certificate.supports["per_length_max"][0] > 5.0

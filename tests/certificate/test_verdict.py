@@ -301,3 +301,13 @@ def test_every_verdict_names_itself_and_says_what_it_means():
         name, meaning = verdict.value.split(": ")
         assert name.startswith(verdict.name.lower().replace("_", " "))
         assert len(meaning.split()) > 3
+
+
+@pytest.mark.parametrize("moved", [0.0, 1e-3])
+def test_coordinates_of_single_precision_are_named_where_they_alone_leave_forces(moved):
+    roof = solve(spherical_cap(0.3)).surface
+    X = roof.vertices + moved * ~roof.fixed[:, None] * np.random.default_rng(0).standard_normal((roof.n, 3))
+    for places, single in ((X, False), (X.astype(np.float32).astype(float), True)):
+        found = certify(roof.moved(places))
+        assert ("single precision" in found.detail) == (single and not moved)
+        assert (found.verdict is Verdict.NOT_CONVERGED) == (single or moved > 0.0)

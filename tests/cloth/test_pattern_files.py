@@ -184,7 +184,7 @@ def test_the_cloth_of_the_structural_model_is_the_one_that_is_cut(tmp_path):
     assert "cut shorter  by 0.3" in str(pattern)
     words = " ".join(words_of(tmp_path / "hall.pdf"))
     assert "Cutting pattern, scale 1:" in words
-    assert f"{len(pattern.strips)} strips of" in words
+    assert f"{len(pattern.strips)} strips, together" in words
     path.write_text(text + 'direction = 0.0\n[output]\npattern = ["cloth.csv"]\n')
     with pytest.raises(OptionError, match=r"warp of 'west' lies at 0 degrees in \[pattern\], and at 90"):
         project.run(path)

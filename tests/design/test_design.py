@@ -14,7 +14,7 @@ from generators import spherical_cap, two_caps
 from pcmc import Design, Parameter, Target, meet
 from pcmc.design import DesignStatus
 from pcmc.design.targets import measure
-from pcmc.plan import Plan
+from pcmc.plan import Plan, circle
 
 
 @pytest.fixture
@@ -224,3 +224,11 @@ def test_the_limit_of_solves():
     design = meet(cap(), [Target("apex", None, 0.9)], ["cap"], solves=2)
     assert design.status is DesignStatus.SOLVES
     assert design.solves == 2
+
+
+@pytest.mark.parametrize("size", [3e-4, 1e-3, 1.0, 1e3])
+def test_a_target_is_met_in_any_unit_of_length(size):
+    plan = Plan(circle([0, 0], 4.0 * size), tension=3.4 * size, edge_length=0.28 * size)
+    found = meet(plan.surface(), Target("apex", value=1.331727 * size), "patch 1")
+    assert found.status is DesignStatus.MET
+    assert found.surface.tensions[0] == pytest.approx(3.33604 * size, rel=1e-4)

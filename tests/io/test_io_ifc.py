@@ -113,6 +113,8 @@ def test_columns_and_stays_have_their_forces(tmp_path):
     assert [mast.Name, *(part.Name for part in stays)] == list(forces.index)
     for part in (mast, *stays):
         assert get_pset(part, "Pcmc_Member", "LargestForceAtRest") == pytest.approx(forces[part.Name])
+    assert [part.TensionForce for part in stays] == pytest.approx(forces.iloc[1:].tolist())
+    assert [part.CrossSectionArea for part in stays] == [3e-4, 3e-4]
     assert all(one.forces is None for one in drawn_members(StructuralModel(start, **about)))
 
 

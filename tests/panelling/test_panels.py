@@ -336,13 +336,13 @@ def test_the_curve_of_families_against_change_of_shape_has_its_costs(tmp_path, s
     assert re.search(rf"{fewer.after.count} +\S+ +\S+ cheapest", capsys.readouterr().out)
     assert pd.read_csv(tmp_path / "s-costs.csv")["cost"].tolist() == pytest.approx(costs["cost"].tolist())
     assert (tmp_path / "s-costs.svg").read_text().count("the cheapest") == 1
-    for bad in (
-        ["--change", "0.02", "--cost", "100"],
-        ["--change", "0.02", "--cost=-1,2"],
-        ["--cost", "1,2"],
+    for bad, words in (
+        (["--change", "0.02", "--cost", "100"], "two numbers FAMILY,PANEL"),
+        (["--change", "0.02", "--cost=-1,2"], "--cost: expected a finite number ≥ 0, found -1.0"),
+        (["--cost", "1,2"], "--cost: prices the surfaces that --change finds"),
     ):
         assert main(["panels", str(roof), "--tolerance", "0.01", *bad]) == 2
-        assert "two numbers FAMILY,PANEL" in capsys.readouterr().err
+        assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,9 @@ from refusals import refused
 from pcmc import cli, project
 from pcmc.advice.advice import chosen_values
 from pcmc.base.errors import FileError, FileWarning
+from pcmc.plan.edges import cable_for
 from pcmc.plan.proposal import _rounded
+from pcmc.surface.curves import polyline
 
 SEAM = ("line", "divider seam", (5, 0), (5, 6))
 
@@ -130,3 +132,9 @@ def test_points_of_patches_have_few_digits():
         value = 1234.56789 * radius
         assert abs(_rounded(value, radius) - value) <= 0.05 * radius
         assert len(repr(_rounded(value, radius))) <= 8
+
+
+def test_a_cable_is_chosen_for_masts_at_one_point():
+    """They make no corner, slender or not."""
+    square = polyline([[0, 0], [10, 0], [10, 10], [0, 10]], closed=True)
+    assert cable_for(square, 2.0, [[0, 0]] * 3) == cable_for(square, 2.0, ()) == 30.0

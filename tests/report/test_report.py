@@ -114,13 +114,16 @@ def test_every_verdict_has_its_sentence():
     assert set(words.VERDICTS) == set(Verdict)
 
 
-def test_the_verdict_in_words():
+def test_the_verdict_in_words(caps):
     certificate = replace(pcmc.certify(pyramid()), detail="a reason", residual=3e-12)
     _, *sentences = words.verdict_sentences(certificate)
     assert sentences[:2] == ["In detail: a reason.", "The forces left are 3e-12 of the forces in the roof."]
     of_curvature, of_load, balance = sentences[2:]
     assert of_curvature.startswith("Each patch has the mean curvature")
-    assert of_curvature.endswith(f" up to {tables.small(certificate.curvature_error)} of it.")
+    assert certificate.curvature_error == 0.0
+    assert of_curvature.endswith("tension and pressure ask for.")
+    bent = pcmc.certify(caps)
+    assert f" up to {tables.small(bent.curvature_error)} of it." in words.verdict_sentences(bent)[2]
     assert f" {100.0 * certificate.load_ratio:.0f} % of the most" in of_load
     assert balance.startswith("The supports carry")
     assert [tables.small(x) for x in (0.0, 0.0012, np.inf, np.nan)] == ["0", "1e-03", "–", "–"]

@@ -169,6 +169,10 @@ def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch,
     monkeypatch.setattr(calculix, "text_of", lambda *_, **__: wrong)
     with pytest.raises(CalculixError, match="ERROR"):  # no load that is too much
         calculix.run_as_far(model_of(pyramid()), model_of(pyramid()).steps)
+    pcmc.write_structure(path, model_of(pyramid()))
+    path.write_text(path.read_text().replace("TYPE=M3D3", "TYPE=M3D9"))
+    with pytest.raises(CalculixError, match=r"\*ERROR reading \*ELEMENT: M3D9 is an unknown element type"):
+        calculix.run_file(path)
     monkeypatch.setattr(calculix, "PROGRAM", "no-such-program")
     assert not calculix.available()
     with pytest.raises(CalculixError, match="not installed"):

@@ -133,6 +133,29 @@ def test_snow_lies_on_the_upper_sheet_of_a_cushion():
     assert in_the_open(parts()).all()
 
 
+def test_snow_lies_on_every_strip_of_a_ridge_of_long_triangles():
+    """The middles of neighbours are nearer than a triangle is long, and none is under another."""
+    X = [[x, y, z] for y, z in enumerate([0, 1, 2, 1, 0]) for x in (0, 10, 20)]
+    faces, patches = [], []
+    for k in range(4):
+        for a in (3 * k, 3 * k + 1):
+            faces += [[a, a + 1, a + 4], [a, a + 4, a + 3]]
+            patches += [k, k]
+    ridge = Surface(X, faces, patches, [Patch(f"strip {k}", 1.0) for k in range(4)], fixed=range(15))
+    assert in_the_open(ridge).all()
+
+
+def test_a_sheet_under_two_others_is_under_them():
+    """Each covers half of it."""
+    X = [[x, y, z] for z in (1, 0) for y in (0, 2) for x in (0, 2, 4)]
+    faces = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
+    faces += [[a + 6 for a in face] for face in faces]
+    patches = [Patch(name, 1.0) for name in ("west", "east", "ceiling")]
+    roof = Surface(X, faces, [0, 0, 1, 1, 2, 2, 2, 2], patches, fixed=range(12))
+    assert in_the_open(roof).tolist() == [True, True, False]
+    assert roof.with_snow(0.5).snows.tolist() == [0.5, 0.5, 0.0]
+
+
 def test_a_gas_has_the_pressure_of_the_air_outside_in_any_units():
     model = model_of(parts(), gas=Gas(volume=1.0), units=Units("mm", "N"), anyway=True)
     assert model.gas.outside(model.units) == pytest.approx(0.101325)

@@ -184,3 +184,18 @@ def test_a_sentence_shows_a_thrust_that_is_larger_than_the_pull(monkeypatch, end
     monkeypatch.setattr("pcmc.structure.member_forces.members_at_rest", lambda model: turned)
     [text] = sentences(hall_with(), Units("m", "kN"))
     assert text.startswith(f"wall 1: at rest N = {shown} kN, ")
+
+
+def test_a_ring_that_only_sheets_hold_upright_wants_props_and_no_stiffness():
+    """The sheets of a cap pull its rim down with the load on the disc, however stiff the rim is."""
+    cap = spherical_cap(0.4, alpha=0.6, exact=True)
+    for propped in (False, True):
+        for profile in (TUBE, TUBE.scaled(1e3)):
+            rim = Member(circle([0, 0], 1.0), profile, STEEL, propped=propped, name="rim")
+            model = model_of(cap, members=[rim], anyway=True)
+            [text] = sentences(model, Units("m", "kN"))
+            lines = [text, *weak_members(model, [("snow", members_at_rest(model))], Units("m", "kN"))]
+            told = [line for line in lines if "nothing but the sheets holds rim upright" in line]
+            assert len(told) == (0 if propped else 2)
+            assert all("propped = true" in line and "too weak" not in line for line in told)
+            assert ("times its E A" in text) == propped

@@ -118,7 +118,7 @@ def test_without_the_program_the_rows_say_so(small, monkeypatch):
 
 
 def test_without_the_fast_backend_the_rows_say_so(small, monkeypatch):
-    monkeypatch.setattr(solver, "available", lambda: ("superlu",))
+    monkeypatch.setattr(solver, "installed", lambda: ("superlu",))
     rows = {row.what: row for row in solver.newton_steps(True)}
     assert rows["Newton step, pardiso"].remark == "not installed"
     assert rows["Newton step, superlu"].value > 0.0
