@@ -121,7 +121,7 @@ def panels_(
         validate.positive("--change", change)
     prices = None if cost is None else arguments.numbers(cost, "--cost", TWO, 2)
     if prices is not None and change is None:
-        raise OptionError("--cost: prices the surfaces that --change finds; give it, too", what="--cost")
+        raise OptionError("--cost: prices what --change finds; give --change, too", what="--cost")
     for price in prices or ():
         validate.number("--cost", price, least=0.0)
     outputs = Output(picture=picture, view=seen).paths

@@ -339,7 +339,7 @@ def test_the_curve_of_families_against_change_of_shape_has_its_costs(tmp_path, s
     for bad, words in (
         (["--change", "0.02", "--cost", "100"], "two numbers FAMILY,PANEL"),
         (["--change", "0.02", "--cost=-1,2"], "--cost: expected a finite number ≥ 0, found -1.0"),
-        (["--cost", "1,2"], "--cost: prices the surfaces that --change finds"),
+        (["--cost", "1,2"], "--cost: prices what --change finds"),
     ):
         assert main(["panels", str(roof), "--tolerance", "0.01", *bad]) == 2
         assert words in capsys.readouterr().err
