@@ -17,7 +17,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
-from ..base.tolerances import AT_REST, COLLAPSED, EXCESS, NEAR_NEUTRAL, NEUTRAL
+from ..base.tolerances import AT_REST, COLLAPSED, NEAR_NEUTRAL, NEUTRAL
 from ..base.units import NO_UNITS, Units
 from ..forces.functional import energy
 from ..forces.loose_parts import patch_residuals, rounding_left
@@ -254,9 +254,6 @@ class Certificate:
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         supports = self.supports.drop(columns=[*MOMENT])
-        forces = supports[[*FORCE]].to_numpy(float)
-        rounding = np.abs(forces) <= EXCESS * np.abs(forces).max(initial=0.0)
-        supports[[*FORCE]] = np.where(rounding, 0.0, forces)
         shown = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
         texts = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in shown if len(t)]
         return "\n\n".join([head, *texts])

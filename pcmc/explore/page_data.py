@@ -127,7 +127,9 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
     return {
         "mesh": crc32(surface.faces.tobytes() + origin.tobytes() + names.encode()),  # that ``outline`` has
         "values": {"asked": changeable_values(state.wanted), "shown": changeable_values(surface)},
-        "verdict": _verdict(state.failure or certificate, "" if moving else certificate.cuts_itself),
+        "verdict": _verdict(
+            state.failure or certificate, "" if moving or state.failure else certificate.cuts_itself
+        ),
         "at_rest": state.failure is None,
         "findings": _findings(certificate, moving),
         "figures": figures_data(surface, certificate),

@@ -99,7 +99,7 @@ def import_case(case: str) -> None:
     provenance()
 
 
-def run_case(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
+def answer_case(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
     """Run one case that is loaded; its outcome. The process exits at the time limit."""
     function, process, extra = resolve(case), os.getpid(), {}
     started, begin = datetime.now(UTC).isoformat(timespec="milliseconds"), time.perf_counter()

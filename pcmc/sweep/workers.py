@@ -130,7 +130,7 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
         started = datetime.now(UTC).isoformat(timespec="milliseconds")
         try:
             task = case, parameters, time_limit
-            outcome: dict[str, Any] = process.call(SCRIPT, "run_case", *task, limit=limit)
+            outcome: dict[str, Any] = process.call(SCRIPT, "answer_case", *task, limit=limit)
             return outcome
         except ChildError as death:
             status, message = "killed", f"ended its worker process ({_cause(death.code or 0)})"

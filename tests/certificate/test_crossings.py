@@ -1,4 +1,4 @@
-"""Where a surface cuts itself: the pairs of triangles, and what is said of a roof that does."""
+"""Surfaces that cut themselves: which triangles cross, and what pcmc reports."""
 
 import re
 from itertools import combinations

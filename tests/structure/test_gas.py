@@ -146,7 +146,7 @@ def test_snow_lies_on_every_strip_of_a_ridge_of_long_triangles():
 
 
 def test_a_sheet_under_two_others_is_under_them():
-    """Each covers half of it."""
+    """Each of the two covers half of the sheet."""
     X = [[x, y, z] for z in (1, 0) for y in (0, 2) for x in (0, 2, 4)]
     faces = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
     faces += [[a + 6 for a in face] for face in faces]

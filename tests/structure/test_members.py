@@ -164,7 +164,7 @@ def roof_with_ring():
 
 
 def ring_and_arch(metre, density=0.0):
-    """A model of that roof with a ring and an arch, in a unit of which ``metre`` are one metre."""
+    """The same roof with a ring and an arch; one metre is ``metre`` units of length."""
     per_area = metre**-2
     ring_profile, tube = Profile.rectangle(0.1 * metre, 0.2 * metre), Profile.tube(0.1 * metre, 0.005 * metre)
     steel = Material(2.1e8 * per_area, 0.2, density * metre**-4)
