@@ -124,12 +124,11 @@ def state_data(state: SessionState, origin: Floats, moving: bool = False) -> dic
     """A state in words and numbers; while a slider is ``moving``, without the tables of supports."""
     surface, certificate = state.surface, state.certificate
     names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
+    cuts = "" if moving or state.failure else certificate.cuts_itself
     return {
         "mesh": crc32(surface.faces.tobytes() + origin.tobytes() + names.encode()),  # that ``outline`` has
         "values": {"asked": changeable_values(state.wanted), "shown": changeable_values(surface)},
-        "verdict": _verdict(
-            state.failure or certificate, "" if moving or state.failure else certificate.cuts_itself
-        ),
+        "verdict": _verdict(state.failure or certificate, cuts and f"not to be built as it is: {cuts}"),
         "at_rest": state.failure is None,
         "findings": _findings(certificate, moving),
         "figures": figures_data(surface, certificate),

@@ -156,6 +156,7 @@ class Explorer:
             "formats": list(FORMATS),
             "title": roof.title,
             "name": roof.name,
+            "whole_files": roof.outcome.unfold,
             "units": page_data.unit_texts(roof.outcome.units),
             "note": "; ".join(filter(None, (roof.note if untouched else "", left_out))),
             "note_met": untouched and roof.outcome.result is not None and roof.outcome.good,
@@ -203,10 +204,12 @@ class Explorer:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         # the page lists what formats carry; a rule for this module alone, as threads share the rules
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
+        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known={})
+        members = members_drawn(outcome) if FORMATS[suffix].members else ()
         with tempfile.TemporaryDirectory() as folder:
-            files, units = [Path(folder) / f"surface{suffix}"], roof.outcome.units
-            for path, write in certified_files(state.surface, state.certificate, files, units):
-                write(path)
+            path = Path(folder) / f"surface{suffix}"
+            for file, write in certified_files(*outcome.shown, [path], outcome.units, "", members):
+                write(file)
             return f"{roof.name}{suffix}", path.read_bytes()
 
     def wait(self) -> None:

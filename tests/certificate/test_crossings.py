@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from shapes import bubbles
 
 import generators
 import pcmc
@@ -23,16 +24,6 @@ SHAPES = [
     ),
     *("joined_caps", "catenoid", "enneper", "lens"),
 ]
-
-
-def bubbles(distance, size=1.0):
-    """Two caps of radius 1 side by side, each over a circle of its own."""
-    one = generators.spherical_cap(0.25)
-    X = np.concatenate([one.vertices, one.vertices + np.array([distance, 0.0, 0.0])]) * size
-    faces = np.concatenate([one.faces, one.faces + one.n])
-    patches = [Patch("west", one.patches[0].tension * size), Patch("east", one.patches[0].tension * size)]
-    fixed = np.tile(one.fixed, 2)
-    return pcmc.solve(Surface(X, faces, np.repeat([0, 1], one.m), patches, fixed=fixed)).surface
 
 
 def goes_through(one, other):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from browsing import Explored, changed, needs_browser, until
 from explore_cases import followed
+from shapes import bubbles
 
 import pcmc
 from generators import four_fans, spherical_cap
@@ -98,6 +99,19 @@ def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         console = page.complaints()
         assert all("400 (Bad Request)" in line for line in console)
+
+
+def test_a_roof_that_cuts_itself_is_named(driver):
+    with closing(explore.start(bubbles(0.9 * 2.0 * CAP.vertices[:, 0].max()))) as running:
+        page = Explored(driver, running.url)
+        warning = "ot to be built as it is: 'west' cuts 'east' near ("
+        assert page.verdict == "stable"
+        assert warning in page.text("#verdict")
+        assert page.find("#verdict .detail").is_displayed()
+        page.slider("Tension α of west").send_keys("\ue014")  # the arrow to the right
+        page.idle()
+        assert warning in page.text("#verdict")
+        assert page.complaints() == []
 
 
 @pytest.mark.nightly

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from small_project import HALL_WITH_ARCH
 
 import pcmc
 from generators import spherical_cap
-from pcmc import explore
+from pcmc import cli, explore
 from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
@@ -22,6 +23,16 @@ from pcmc.explore.session import Session, figures_data
 from pcmc.surface.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
+HALF = """
+units = "mm"
+[plan]
+edge_length = 2000
+outline = [[0, 0], [6000, 0], [6000, 8000], [0, 8000]]
+mirrors = [[[6000, 0], [6000, 8000]]]
+patches = {roof = {tension = 2e4}}
+[output]
+whole = true
+"""
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +75,21 @@ def test_the_page_has_the_members_with_their_forces_at_every_state(tmp_path):
         assert force(higher) != pytest.approx(force(header), rel=0.01)
     finally:
         explorer.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix"),
+    [(HALL_WITH_ARCH.partition("[output]")[0], ".ifc"), (HALF, ".pcmc"), (HALF, ".glb")],
+    ids=["members", "whole", "whole, in metres"],
+)
+def test_an_export_is_the_file_that_the_command_writes(tmp_path, text, suffix):
+    """With the members, and the whole roof where the project asks for it."""
+    roof = tmp_path / "hall.toml"
+    roof.write_text(text)
+    written = roof.with_suffix(suffix)
+    assert cli.main(["solve", str(roof), "-o", str(written), "--no-mesh-check"]) == 0
+    with closing(explore.start(read_roof(roof, use_cache=False))) as running:
+        assert running.export(running.open()[0], suffix) == (written.name, written.read_bytes())
 
 
 def test_a_project_opens_at_its_targets(hall_roof, client):

@@ -1,10 +1,11 @@
-"""Small meshes for the tests of the core, made here so that they do not lean on the generators."""
+"""Small meshes for the tests of the core; all but the bubbles do not lean on the generators."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pcmc import Patch, Plane, Surface
+import generators
+from pcmc import Patch, Plane, Surface, solve
 
 LATTICE = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])  # two sides of an equilateral triangle
 
@@ -161,3 +162,13 @@ def length(points, closed=False):
     """Of a line through points, or of a closed one."""
     ends = np.append(points, points[:1], axis=0) if closed else points
     return float(np.linalg.norm(np.diff(ends, axis=0), axis=1).sum())
+
+
+def bubbles(distance: float, size: float = 1.0) -> Surface:
+    """Two caps of radius 1 side by side at rest, each over a circle of its own; near ones cut each other."""
+    one = generators.spherical_cap(0.25)
+    X = np.concatenate([one.vertices, one.vertices + np.array([distance, 0.0, 0.0])]) * size
+    faces = np.concatenate([one.faces, one.faces + one.n])
+    patches = [Patch(name, one.patches[0].tension * size) for name in ("west", "east")]
+    fixed = np.tile(one.fixed, 2)
+    return solve(Surface(X, faces, np.repeat([0, 1], one.m), patches, fixed=fixed)).surface

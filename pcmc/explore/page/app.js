@@ -59,7 +59,9 @@ class Page {
       ? `Tension in ${units.tension}, pressure in ${units.pressure}.`
       : "Any consistent units. With metres and kilonewtons: tension kN/m, pressure kN/m², curvature 1/m.";
     const piece = { 1: "", 2: "the half", 4: "the quarter" }[header.whole] ?? "the piece";
-    const about = `All numbers are of ${piece} between the mirror planes; the picture shows the whole.`;
+    const [numbers, whole] = header.whole_files
+      ? ["All numbers are", "the picture and the exports show"] : ["All numbers and exports are", "the picture shows"];
+    const about = `${numbers} of ${piece} between the mirror planes; ${whole} the whole.`;
     Object.assign(find("#piece"), { hidden: !piece, textContent: about });
     this.underPressure = new Uint8Array(header.vertices);
     arrays.sheet_patch.forEach((p, i) => {
