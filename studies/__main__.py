@@ -94,7 +94,8 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
     outcomes = run_all(studies, results, console, workers=asked.workers, short=asked.short, steps=steps)
     tables = write_comparison(results)
     show_outcomes(outcomes, console)
-    show(*tables, console)
+    if any(study.paper for study in studies):
+        show(*tables, console)
     console.print(f"{time.perf_counter() - start:.1f} s; written to {results}")
     return 1 if any(outcome.error for outcome in outcomes) else 0
 

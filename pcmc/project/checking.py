@@ -79,7 +79,7 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
             raise _error(text, at, message, found=value, expected=key.choices)
     for name in table:
         if name not in known:
-            curves = CURVES if section.name in OR_CURVE and "curve" not in table else ()
+            curves = CURVES if section.name in OR_CURVE and not known.keys() & table.keys() else ()
             message = unknown(f"key of {title}", name, [*known, *curves])
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():

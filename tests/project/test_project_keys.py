@@ -48,6 +48,15 @@ def test_an_unknown_key_has_its_line_and_the_nearest_key(small, old, new, line, 
     assert "\n" not in text
 
 
+@pytest.mark.parametrize(("own", "listed"), [("wall = 1\n", False), ("", True)])
+def test_kinds_of_curves_are_listed_where_they_can_be_keys(small, own, listed):
+    dividers = f"[[plan.dividers]]\n{own}points = [[2, 0], [2, 3]]\n[solve]"
+    with refused(FileError, what="plan.dividers.points", found="points") as caught:
+        load(changed(small, "[solve]", dividers))
+    assert "Known: curve, wall" in str(caught.value)
+    assert ("polyline" in str(caught.value)) is listed
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "key"),
     [
