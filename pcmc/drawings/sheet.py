@@ -260,7 +260,7 @@ def table_sheets(
             return [str(value) for value in values]
         if key in LENGTHS:
             return [f"{round(x, decimals) + 0.0:.{decimals}f}" for x in values]
-        alike = [one for one in table if one[:-1] == key[:-1]]  # such as force_x, force_y, force_z
+        alike = [one for one in table.columns if one[:-1] == key[:-1]]  # such as force_x, force_y, force_z
         numbers = np.array(column(table[alike].to_numpy().ravel()))
         return numbers[alike.index(key) :: len(alike)].tolist()
 
