@@ -186,7 +186,7 @@ def test_a_roof_that_is_not_certified_is_named_so(tmp_path, again):
         assert cli.main(["convert", str(tmp_path / "a.pcmc"), str(tmp_path / "a.ifc")]) == 0
     else:
         pcmc.write(tmp_path / "a.ifc", start, certificate=pcmc.certify(start))
-    _, roof, _ = roof_of(tmp_path / "a.ifc")
+    _model, roof, _parts = roof_of(tmp_path / "a.ifc")
     assert roof.Name == "Roof, NOT CERTIFIED: no equilibrium"
     assert get_pset(roof, "Pcmc_Certificate")["Mark"] == "NOT CERTIFIED: no equilibrium"
 
