@@ -16,9 +16,9 @@ from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..drawings import DrawingSet, Sheet
-from ..drawings.drawing_set import CSV, DECIMALS, document_files
+from ..drawings.drawing_set import CSV, document_files
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
-from ..drawings.sheet import SheetLine, Text, add_frames, table_sheets
+from ..drawings.sheet import SheetLine, Text, add_frames, length_decimals, table_sheets
 from ..drawings.views import DrawnView, placed
 from ..surface.geometry import cross_2d, unit_vectors
 from .strips import CuttingPattern, Seam, Side, Strip
@@ -51,7 +51,7 @@ def pattern_drawings(
     ['Seams on the roof', 'Strips 1 to 2, outside up', 'Strips', 'Seams']
     """
     length = expect_length(as_units(units).length, "a cutting pattern")
-    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, pattern.surface.size)
     size = sheet, millimetres, None, decimals
     sheets = [seam_sheet(pattern, *size)]
     for first in range(0, len(pattern.strips), PER_SHEET):
@@ -65,12 +65,10 @@ def pattern_drawings(
         sheets.append(placed(views, title, *size))
     head = {"area": f"area, {length}²", "cut_area": f"cut area, {length}²", "strain_min": "strain from, %"}
     head |= {"strain_max": "to, %", "strain_rms": "mean, %", "warp": "warp shorter, %", "weft": "weft, %"}
-    table = _texts(pattern.table, decimals, "length", "width")
-    sheets += table_sheets("Strips", table.rename(columns=head), sheet, 2)
+    sheets += table_sheets("Strips", pattern.table.rename(columns=head), sheet, decimals)
     sewn = pattern.seam_table.query("kind != 'rim'")[["seam", "kind", "strips", "length", "cut_length"]]
     if len(sewn):
-        table = _texts(sewn, decimals, "length", "cut_length")
-        sheets += table_sheets("Seams", table.rename(columns={"cut_length": "cut length"}), sheet, 2)
+        sheets += table_sheets("Seams", sewn.rename(columns={"cut_length": "cut length"}), sheet, decimals)
     add_frames(sheets, name, length, pattern.certificate)
     rows = [[str(strip.number), *at, "strip"] for strip, at in _middles(pattern)]
     points = pd.DataFrame(rows, columns=["point", *"xyz", "on"])
@@ -89,11 +87,6 @@ def pattern_files(
     tables = dict(zip(TABLES, (pattern.table, pattern.seam_table), strict=True))
     draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name)
     return document_files(paths, draw, tables, {}, "a cutting pattern")
-
-
-def _texts(table: pd.DataFrame, decimals: int, *lengths: str) -> pd.DataFrame:
-    """A table whose lengths are texts with so many decimals."""
-    return table.assign(**{key: [f"{x:.{decimals}f}" for x in table[key]] for key in lengths})
 
 
 def _curves(pattern: CuttingPattern) -> list[SheetLine]:

@@ -25,12 +25,11 @@ from ..surface.images import expect_no_images
 from . import dxf, views
 from .panel_sheets import flat_panels, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, table_sheets
+from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, length_decimals, table_sheets
 from .sheet import write_pdf as write_pages
 
 SUFFIXES, CSV = (".dxf", ".pdf", ".svg"), ".csv"
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
-DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
 
@@ -170,7 +169,7 @@ def drawing_set(
     expect_no_images(surface, "drawings")
     units = as_units(units)
     length = expect_length(units.length, "a drawing")
-    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, surface.size)
     validate.choice("sheet", sheet, tuple(FORMATS))
     if scale is not None:
         validate.integer("scale", scale, least=1)
@@ -217,9 +216,9 @@ def drawing_set(
         families = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
         families = families.assign(family=[f"F{k}" for k in families["family"]])
         tables["Families of panels"] = families.rename(columns={"count": "panels", "mirrored": "turned over"})
-    forces = dict.fromkeys(("force", *SUPPORT[-3:]), units.force)
+    heads = {"area": units.area, **dict.fromkeys(("force", *SUPPORT[-3:]), units.force)}
     for title, table in tables.items():
-        sheets += table_sheets(title, table, sheet, decimals, forces)
+        sheets += table_sheets(title, table, sheet, decimals, heads)
     if schedule is not None and panel_sheets:
         triangles = triangles_at_true_size(schedule, millimetres)
         flat = flat_panels(triangles)

@@ -13,10 +13,10 @@ import numpy as np
 from ..base import validate
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..panelling import PanelNet
-from .drawing_set import CSV, DECIMALS, DrawingSet, document_files
+from .drawing_set import CSV, DrawingSet, document_files
 from .drawing_set import SUFFIXES as DRAWINGS
 from .panel_sheets import flat_panels, panel_sheets, polygons_at_true_size
-from .sheet import FORMATS, SheetLine, add_frames, table_sheets
+from .sheet import FORMATS, SheetLine, add_frames, length_decimals, table_sheets
 from .views import DrawnView, placed
 
 OBJ = ".obj"
@@ -41,7 +41,7 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
     """
     validate.choice("sheet", sheet, tuple(FORMATS))
     length = expect_length(as_units(units).length, "drawings of panels")
-    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, net.mesh.size)
     curves = [
         SheetLine(net.points[loop], "PCMC-PANEL", True, name=f"panel {k}")
         for k, loop in enumerate(net.polygons, start=1)

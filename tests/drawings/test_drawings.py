@@ -9,9 +9,11 @@ from refusals import refused
 import pcmc
 from generators import hypar_roof, two_squares
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import drawing_set
-from pcmc.drawings.sheet import box
+from pcmc.drawings.sheet import box, column
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
 
@@ -30,6 +32,27 @@ def test_no_text_of_a_sheet_covers_another(drawings):
         low, high = boxes[:, None, 0], boxes[None, :, 1]
         both = (low < high).all(axis=2)
         assert (both & both.T).sum() == len(boxes), sheet.title
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("m", 1.0), ("mm", 1e3), ("mm", 0.5), ("m", 5e-4), ("m", 300.0)]
+)
+def test_numbers_have_four_digits_in_every_unit_and_size(squares, unit, factor):
+    """From a model of a few millimetres to a roof of kilometres, each at a scale that fills its sheet."""
+    about = {"sheet": "A4", "tolerance": 0.01 * factor}
+    drawings = drawing_set(scaled_surface(squares, factor), Units(unit, "kN"), **about)
+    sheets = {sheet.title: sheet for sheet in drawings.sheets}
+    texts = {title: {text.text for text in sheet.texts} for title, sheet in sheets.items()}
+    shown = [float(dimension.text) for dimension in sheets["Plan"].dimensions]
+    sizes = np.ptp(squares.vertices[:, :2], axis=0) * factor
+    assert max(shown) == pytest.approx(sizes.max(), rel=1e-3)
+    rim = np.concatenate([line.points for line in sheets["Plan"].lines if line.layer == "PCMC-RIM"])
+    assert 40.0 < np.ptp(rim, axis=0).max() < 250.0  # mm
+    forces = pcmc.certify(squares).supports[["force_x", "force_y", "force_z"]].to_numpy()
+    assert {f"{force:.2f}" for force in forces.ravel()} <= texts["Supports"]
+    (largest,) = pcmc.panels(squares, 0.01).families["area"].nlargest(1) * factor**2
+    assert column([largest])[0] in texts["Families of panels"]
+    assert f"area, {unit}²" in texts["Families of panels"]
 
 
 @pytest.mark.parametrize("units", [None, "", "parsec", 3])
