@@ -190,7 +190,7 @@ def _middles(X: Floats, edges: Ints, rises: Floats, arcs: Bools) -> Floats:
 
 
 def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints, Floats]:
-    """Edges (c,) that go on beyond an end, which end, the next vertex of the curve there, its turn in degrees."""
+    """Edges (c,) that go on beyond an end, which end, the curve's next vertex there, its turn in degrees."""
     vertex, other = edges.ravel(), edges[:, ::-1].ravel()
     order = np.argsort(vertex, kind="stable")
     vertex, other = vertex[order], other[order]
