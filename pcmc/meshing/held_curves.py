@@ -175,7 +175,7 @@ def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> t
 
 
 def _doubtful_corners(X: Floats, edges: Ints) -> Ints:
-    """Vertices (k,) that are guessed to be corners, but may be places of a smooth curve of long edges (e,2)."""
+    """Vertices (k,) that are guessed to be corners, but may be on a smooth curve of long edges (e,2)."""
     edge, end, _, turn = _continuations(X, edges, COARSE)
     turns, vertex = np.zeros((len(edges), 2)), edges[edge, end]
     turns[edge, end] = turn
