@@ -236,7 +236,8 @@ def _curve_doubts(
     doubts: dict[tuple[str, str], float] = {}
     for other in doubted_midpoints(first, corners=corners):
         there: dict[Key, Reading] = {}
-        if len(found) > 1 and (result := _solved(refine(first, 1, lambda _, at=other: at), callback)).converged:
+        start = refine(first, 1, lambda _, places=other: places)
+        if len(found) > 1 and (result := _solved(start, callback)).converged:
             there = readings(result.surface, result.certificate, first.n)
         for key, reading in found[0].items():
             known, name = key in there and key in found[1], (reading.quantity, reading.of)
