@@ -233,12 +233,14 @@ def _curve_doubts(
     first: Surface, corners: Ints, found: Sequence[dict[Key, Reading]], callback: Callback | None
 ) -> dict[tuple[str, str], float]:
     """How far limits may be off as curves are guesses: the next mesh is solved with other guesses, too."""
+
+    def read_with(places: Floats) -> dict[Key, Reading]:
+        result = _solved(refine(first, 1, lambda _: places), callback)
+        return readings(result.surface, result.certificate, first.n) if result.converged else {}
+
     doubts: dict[tuple[str, str], float] = {}
     for other in doubted_midpoints(first, corners=corners):
-        there: dict[Key, Reading] = {}
-        start = refine(first, 1, lambda _, places=other: places)
-        if len(found) > 1 and (result := _solved(start, callback)).converged:
-            there = readings(result.surface, result.certificate, first.n)
+        there = read_with(other) if len(found) > 1 else {}
         for key, reading in found[0].items():
             known, name = key in there and key in found[1], (reading.quantity, reading.of)
             more = CURVES * abs(found[1][key].estimate - there[key].estimate) if known else math.inf
