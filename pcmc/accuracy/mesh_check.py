@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from ..base import validate
-from ..base.arrays import Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import certify
