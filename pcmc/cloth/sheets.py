@@ -16,9 +16,9 @@ from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..drawings import DrawingSet, Sheet
-from ..drawings.drawing_set import CSV, DECIMALS, document_files
+from ..drawings.drawing_set import CSV, document_files
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
-from ..drawings.sheet import SheetLine, Text, add_frames, table_sheets
+from ..drawings.sheet import SheetLine, Text, add_frames, length_decimals, table_sheets
 from ..drawings.views import DrawnView, placed
 from ..surface.geometry import cross_2d, unit_vectors
 from .strips import CuttingPattern, Seam, Side, Strip
@@ -33,7 +33,7 @@ ARROW = 0.3  # of a strip's length: the arrow of its warp
 
 
 def pattern_drawings(
-    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = ""
+    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = "", mark: str = ""
 ) -> DrawingSet:
     """The sheets of a cutting pattern, and a model with all strips flat at true size, for .dxf, .pdf, .svg.
 
@@ -41,7 +41,7 @@ def pattern_drawings(
     ----------
     units : of the lengths: "m", "cm", "mm", "ft" or "in".
     sheet : format of the sheets, "A4" to "A0".
-    name : of the roof, in the title strips.
+    name, mark : of the roof, in the title strips and on every sheet.
 
     >>> from pcmc import Patch, Surface, cutting_pattern
     >>> flat = Surface([[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
@@ -51,7 +51,7 @@ def pattern_drawings(
     ['Seams on the roof', 'Strips 1 to 2, outside up', 'Strips', 'Seams']
     """
     length = expect_length(as_units(units).length, "a cutting pattern")
-    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, pattern.surface.size)
     size = sheet, millimetres, None, decimals
     sheets = [seam_sheet(pattern, *size)]
     for first in range(0, len(pattern.strips), PER_SHEET):
@@ -65,17 +65,15 @@ def pattern_drawings(
         sheets.append(placed(views, title, *size))
     head = {"area": f"area, {length}²", "cut_area": f"cut area, {length}²", "strain_min": "strain from, %"}
     head |= {"strain_max": "to, %", "strain_rms": "mean, %", "warp": "warp shorter, %", "weft": "weft, %"}
-    table = _texts(pattern.table, decimals, "length", "width")
-    sheets += table_sheets("Strips", table.rename(columns=head), sheet, 2)
+    sheets += table_sheets("Strips", pattern.table.rename(columns=head), sheet, decimals)
     sewn = pattern.seam_table.query("kind != 'rim'")[["seam", "kind", "strips", "length", "cut_length"]]
     if len(sewn):
-        table = _texts(sewn, decimals, "length", "cut_length")
-        sheets += table_sheets("Seams", table.rename(columns={"cut_length": "cut length"}), sheet, 2)
-    add_frames(sheets, name, length, pattern.certificate)
+        sheets += table_sheets("Seams", sewn.rename(columns={"cut_length": "cut length"}), sheet, decimals)
+    add_frames(sheets, name, length, pattern.certificate, mark)
     rows = [[str(strip.number), *at, "strip"] for strip, at in _middles(pattern)]
     points = pd.DataFrame(rows, columns=["point", *"xyz", "on"])
     about = pattern.surface, length, pattern.certificate, _curves(pattern)
-    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets)
+    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets, mark=mark)
 
 
 def pattern_files(
@@ -84,16 +82,12 @@ def pattern_files(
     units: str | Units,
     sheet: str = "A1",
     name: str = "",
+    mark: str = "",
 ) -> list[tuple[Path, Callable[[Path], Any]]]:
     """Each file of a cutting pattern with the function that writes it; FileError for an unknown suffix."""
     tables = dict(zip(TABLES, (pattern.table, pattern.seam_table), strict=True))
-    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name)
+    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name, mark=mark)
     return document_files(paths, draw, tables, {}, "a cutting pattern")
-
-
-def _texts(table: pd.DataFrame, decimals: int, *lengths: str) -> pd.DataFrame:
-    """A table whose lengths are texts with so many decimals."""
-    return table.assign(**{key: [f"{x:.{decimals}f}" for x in table[key]] for key in lengths})
 
 
 def _curves(pattern: CuttingPattern) -> list[SheetLine]:

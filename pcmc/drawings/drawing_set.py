@@ -25,12 +25,11 @@ from ..surface.images import expect_no_images
 from . import dxf, views
 from .panel_sheets import flat_panels, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, table_sheets
+from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, length_decimals, table_sheets
 from .sheet import write_pdf as write_pages
 
 SUFFIXES, CSV = (".dxf", ".pdf", ".svg"), ".csv"
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
-DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
 
@@ -51,6 +50,7 @@ class DrawingSet:
     flat: Sheet | None  # all panels at true size, mm, where sheets of panels are asked for
     sheets: Sequence[Sheet]  # of paper, in order
     members: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # section, force, … by name
+    mark: str = ""  # where the certificate has none
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
@@ -125,6 +125,7 @@ def drawing_set(
     certificate: Certificate | None = None,
     schedule: Panels | None = None,
     members: Sequence[Any] = (),
+    mark: str = "",
 ) -> DrawingSet:
     """Draw a roof: plan, elevations, sections, setting-out points, cables, supports, panels at true size.
 
@@ -149,6 +150,7 @@ def drawing_set(
     certificate, schedule : of the surface, where they are known; otherwise computed.
     members : of its structural model, ``structure.drawn_members(model)``: lines in the place of their walls,
         and a table.
+    mark : on every sheet and in the model, where the certificate has none.
 
     Raises
     ------
@@ -170,7 +172,7 @@ def drawing_set(
     expect_no_images(surface, "drawings")
     units = as_units(units)
     length = expect_length(units.length, "a drawing")
-    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, surface.size)
     validate.choice("sheet", sheet, tuple(FORMATS))
     if scale is not None:
         validate.integer("scale", scale, least=1)
@@ -217,17 +219,18 @@ def drawing_set(
         families = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
         families = families.assign(family=[f"F{k}" for k in families["family"]])
         tables["Families of panels"] = families.rename(columns={"count": "panels", "mirrored": "turned over"})
-    forces = dict.fromkeys(("force", *SUPPORT[-3:]), units.force)
+    heads = {"area": units.area, **dict.fromkeys(("force", *SUPPORT[-3:]), units.force)}
     for title, table in tables.items():
-        sheets += table_sheets(title, table, sheet, decimals, forces)
+        sheets += table_sheets(title, table, sheet, decimals, heads)
     if schedule is not None and panel_sheets:
         triangles = triangles_at_true_size(schedule, millimetres)
         flat = flat_panels(triangles)
         sheets += panels_at_true_size(triangles, sheet)
-    add_frames(sheets, name, length, certificate)
+    add_frames(sheets, name, length, certificate, mark)
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
     listed = (curves, cut, points, marks, schedule, flat, sheets)
-    return DrawingSet(surface, length, certificate, *listed, {texts["member"]: texts for texts in about})
+    by_name = {texts["member"]: texts for texts in about}
+    return DrawingSet(surface, length, certificate, *listed, by_name, mark)
 
 
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:

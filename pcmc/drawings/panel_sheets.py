@@ -47,7 +47,7 @@ def panel_sheets(panels: Sequence[FlatPanel], name: str) -> list[Sheet]:
         _add_panel(sheets[page], panel._replace(corners=placed + corner() + [0.0, high]))
     large = [panel for panel, corners in turned if corners is None]
     if large:
-        edges = [_edges(panel.corners)[1].tolist() for panel in large]
+        edges = [[f"{x:.1f}" for x in _edges(panel.corners)[1]] for panel in large]
         most = max(map(len, edges))
         letters = [f"{ascii_lowercase[k % 26]}{k // 26 or ''}" for k in range(most)]
         table = pd.DataFrame([[*row, *[""] * (most - len(row))] for row in edges], columns=letters)

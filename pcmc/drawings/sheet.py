@@ -4,7 +4,8 @@ their pages in a PDF file, of true size, with texts that can be searched.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,15 +15,20 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..base.libraries import require
-from ..certificate.certificate import Certificate, warning_mark
+from ..certificate import Certificate
 
 FORMATS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0)}
 FORMATS["A0"] = (1189.0, 841.0)
 """Width and height of the sheet formats, mm: ISO 216, landscape but for A4."""
 
-SCALES = (1, 2, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000)
-"""The scales that are chosen from where none is given: 1 to this."""
+SCALES: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5)
+SCALES += (1, 2, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000)
+"""The scales that are chosen from where none is given, 1 to this: ISO 5455 and a few between and beyond."""
+DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
+LENGTHS = {*"xyz", *"abc", "length", "width", "cut length"}  # columns of tables
+DIGITS = 4  # of the largest number of a column, and of the size of a small roof
 
+MISSED = "TARGETS NOT MET"  # mark of a roof that misses them
 MARGIN, STRIP = 10.0, 16.0  # mm: around the frame; height of the title strip within it
 GAP = 8.0  # mm between views
 TINY, SMALL, LARGE = 1.8, 2.5, 3.5  # mm: heights of letters
@@ -60,6 +66,32 @@ LAYERS = {
     "PCMC-LABEL": SheetLayer(5, 13, "labels of edges of panels and strips"),
     "PCMC-MARK": SheetLayer(1, 35, "what must not be overlooked"),
 }
+
+
+def length_decimals(unit: str, size: float) -> int:
+    """Decimals of the lengths of a roof: a millimetre or better, and four digits of its size.
+
+    >>> length_decimals("m", 24.0), length_decimals("mm", 24e3), length_decimals("mm", 3.0)
+    (3, 0, 3)
+    """
+    return max(DECIMALS[unit], DIGITS - 1 - math.floor(math.log10(size)))
+
+
+def column(values: Iterable[float], digits: int = DIGITS) -> list[str]:
+    """Numbers with as many decimals as the largest of them needs; nothing for what is not known.
+
+    >>> column([6.0, 12.3456, -1e-14, math.nan])
+    ['6.00', '12.35', '0.00', '–']
+    >>> column([6.17e-6, 1.6e-7])
+    ['6.170e-06', '1.600e-07']
+    """
+    numbers = np.asarray(list(values), dtype=float)
+    largest = float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
+    if largest > 0.0 and not 1e-4 <= largest < 1e9:
+        return ["–" if not math.isfinite(x) else f"{x:.{digits - 1}e}" for x in numbers]
+    decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest else 0
+    texts = [f"{x:.{decimals}f}" if math.isfinite(x) else "–" for x in numbers]
+    return [text.removeprefix("-") if not text.strip("-0.") else text for text in texts]
 
 
 class SheetLine(NamedTuple):
@@ -193,9 +225,9 @@ def corner() -> Floats:
     return np.array([MARGIN + GAP, MARGIN + STRIP + GAP])
 
 
-def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate) -> None:
+def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate, mark: str = "") -> None:
     """Give each sheet its frame, its title strip with its number, and the mark of a roof that needs one."""
-    mark = warning_mark(certificate)
+    mark = certificate.mark or mark
     for number, sheet in enumerate(sheets, start=1):
         width, height = sheet.size
         low, right, top = MARGIN, width - MARGIN, height - MARGIN
@@ -218,12 +250,23 @@ def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certific
 def table_sheets(
     title: str, table: pd.DataFrame, name: str, decimals: int, units: Mapping[str, str] | None = None
 ) -> list[Sheet]:
-    """A table in as many columns and sheets as it needs; its head has the units that columns have."""
+    """A table in as many columns and sheets as it needs; its head has the units that columns have.
+
+    ``decimals`` are those of lengths; other numbers have as many as the largest of their kind needs.
+    """
+
+    def texts(key: str) -> list[str]:
+        values = table[key]
+        if values.dtype != float:
+            return [str(value) for value in values]
+        if key in LENGTHS:
+            return [f"{round(x, decimals) + 0.0:.{decimals}f}" for x in values]
+        alike = [one for one in table.columns if one[:-1] == key[:-1]]  # such as force_x, force_y, force_z
+        numbers = np.array(column(table[alike].to_numpy().ravel()))
+        return numbers[alike.index(key) :: len(alike)].tolist()
+
     rows = [[", ".join(filter(None, (key, (units or {}).get(key)))) for key in table.columns]]
-    rows += [
-        [f"{round(x, decimals) + 0.0:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
-        for row in table.to_numpy(dtype=object).tolist()
-    ]
+    rows += map(list, zip(*map(texts, table.columns), strict=True))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     across = np.append(0.0, np.cumsum([(w + 2.0) * WIDTH * SMALL for w in widths]))
     wide, high = drawing_area(name)
@@ -232,10 +275,10 @@ def table_sheets(
     columns = max(1, int((wide + GAP) // (across[-1] + GAP)))
     sheets = []
     for first in range(1, max(2, len(rows)), per_column):
-        column = (first - 1) // per_column % columns
-        if column == 0:
+        place = (first - 1) // per_column % columns
+        if place == 0:
             sheets.append(Sheet(title, name))
-        left, top = corner() + np.array([column * (across[-1] + GAP), high])
+        left, top = corner() + np.array([place * (across[-1] + GAP), high])
         right = left + across[1:] - 2.0 * WIDTH * SMALL
         for k, row in enumerate([rows[0], *rows[first : first + per_column]]):
             y = top - (k + 0.5) * step

@@ -182,10 +182,10 @@ def placed(
     """
     boxes = [view.box for view in views]
     extent = np.max([high - low for low, high in boxes], axis=0)
-    scale, columns = _scale(extent * millimetres, len(views), name, scale, title)
+    chosen, columns = _scale(extent * millimetres, len(views), name, scale, title)
     rows = math.ceil(len(views) / columns)
-    sheet = Sheet(title, name, f"1:{scale}")
-    factor = millimetres / scale
+    sheet = Sheet(title, name, f"{1 / chosen:g}:1" if chosen < 1 else f"1:{chosen}")
+    factor = millimetres / chosen
     cell = extent * factor + BEFORE + BEHIND
     origin = corner() + 0.5 * (np.array(drawing_area(name)) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
@@ -201,7 +201,7 @@ def placed(
     return sheet
 
 
-def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -> tuple[int, int]:
+def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -> tuple[float, int]:
     """The scale, 1 to this, and the columns with which views of ``size`` (2,) mm fit a format."""
     grids = np.array([(columns, math.ceil(count / columns)) for columns in range(1, count + 1)])
     for one in SCALES if scale is None else (scale,):

@@ -9,6 +9,7 @@ curves. Reading leaves out these curves and the members.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
@@ -34,6 +35,7 @@ from .polygons import cut_polygons
 KEY, CABLE, NAME, MEMBER = "pcmc", "pcmc cable", "pcmc name", "pcmc member"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
+PRECISION = 1e-6  # of the size of the surface: the tolerance that Rhino works with, a power of ten
 CURVES = {
     "PCMC-RIDGE": (200, 0, 0, 255),
     "PCMC-RIM": (0, 0, 0, 255),
@@ -49,6 +51,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
     model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[content.units.length or UNIT].rhino)
+    # Rhino joins and cuts up to this length: its own, 0.001, would be a third of a roof of 3 mm in metres
+    model.Settings.ModelAbsoluteTolerance = 10.0 ** math.floor(math.log10(PRECISION * surface.size))
     replaced = {member.wall for member in content.members}
     for k, color, used, faces in patch_meshes(surface):
         rgba = (*(round(255 * float(c)) for c in color), 255)

@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..base.units import Units, length_factor
+from ..drawings.sheet import column
 from ..plot import member_forces, strains, under_load
 from ..plot.figure import png
 from ..structure.columns import column_answers, columns_at_rest
 from ..structure.member_forces import member_tables, members_at_rest, sentences
 from .plan import FORMAT, on_paper
-from .tables import Block, Columns, Heading, Picture, column, columns_in, one, text_table, vectors_of
+from .tables import Block, Columns, Heading, Picture, columns_in, one, text_table, vectors_of
 from .words import sentence
 
 if TYPE_CHECKING:

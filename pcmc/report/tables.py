@@ -13,6 +13,7 @@ from ..base.tolerances import ON
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.quantities import Figure, dimension_of
+from ..drawings.sheet import column
 from ..panelling import Panels
 from ..surface import Surface
 from .plan import PaperPlan
@@ -20,7 +21,6 @@ from .plan import PaperPlan
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
 
-DIGITS = 4  # of the largest number of a column
 MIDDLE = "middle_x middle_y middle_z"
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them
 
@@ -51,21 +51,6 @@ class Table(NamedTuple):
 Columns = dict[str, Iterable[Any]]
 Block = str | Heading | Picture | Table | PaperPlan
 """What the pages of a report are made of; a text alone is a paragraph."""
-
-
-def column(values: Iterable[float], digits: int = DIGITS) -> list[str]:
-    """Numbers with as many decimals as the largest of them needs; nothing for what is not known.
-
-    >>> column([6.0, 12.3456, -1e-14, math.nan])
-    ['6.00', '12.35', '0.00', '–']
-    """
-    numbers = np.asarray(list(values), dtype=float)
-    largest = float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
-    if largest > 0.0 and not 1e-6 <= largest < 1e9:
-        return ["–" if not math.isfinite(x) else f"{x:.{digits - 1}e}" for x in numbers]
-    decimals = min(max(digits - 1 - math.floor(math.log10(largest)), 0), 8) if largest else 0
-    texts = [f"{x:.{decimals}f}" if math.isfinite(x) else "–" for x in numbers]
-    return [text.removeprefix("-") if not text.strip("-0.") else text for text in texts]
 
 
 def one(value: float) -> str:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from refusals import refused
+from shapes import bubbles
 
 import pcmc
-from generators import hypar_roof, two_squares
+from generators import hypar_roof, spherical_cap, two_squares
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.drawings import drawing_set
-from pcmc.drawings.sheet import box
+from pcmc.drawings import drawing_set, dxf
+from pcmc.drawings.sheet import box, column
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
 
@@ -30,6 +33,27 @@ def test_no_text_of_a_sheet_covers_another(drawings):
         low, high = boxes[:, None, 0], boxes[None, :, 1]
         both = (low < high).all(axis=2)
         assert (both & both.T).sum() == len(boxes), sheet.title
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("m", 1.0), ("mm", 1e3), ("mm", 0.5), ("m", 5e-4), ("m", 300.0)]
+)
+def test_numbers_have_four_digits_in_every_unit_and_size(squares, unit, factor):
+    """From a model of a few millimetres to a roof of kilometres, each at a scale that fills its sheet."""
+    about = {"sheet": "A4", "tolerance": 0.01 * factor}
+    drawings = drawing_set(scaled_surface(squares, factor), Units(unit, "kN"), **about)
+    sheets = {sheet.title: sheet for sheet in drawings.sheets}
+    texts = {title: {text.text for text in sheet.texts} for title, sheet in sheets.items()}
+    shown = [float(dimension.text) for dimension in sheets["Plan"].dimensions]
+    sizes = np.ptp(squares.vertices[:, :2], axis=0) * factor
+    assert max(shown) == pytest.approx(sizes.max(), rel=1e-3)
+    rim = np.concatenate([line.points for line in sheets["Plan"].lines if line.layer == "PCMC-RIM"])
+    assert 40.0 < np.ptp(rim, axis=0).max() < 250.0  # mm
+    forces = pcmc.certify(squares).supports[["force_x", "force_y", "force_z"]].to_numpy()
+    assert {f"{force:.2f}" for force in forces.ravel()} <= texts["Supports"]
+    (largest,) = pcmc.panels(squares, 0.01).families["area"].nlargest(1) * factor**2
+    assert column([largest])[0] in texts["Families of panels"]
+    assert f"area, {unit}²" in texts["Families of panels"]
 
 
 @pytest.mark.parametrize("units", [None, "", "parsec", 3])
@@ -63,10 +87,21 @@ def test_a_surface_that_is_not_certified_is_refused_or_every_sheet_is_marked():
     with refused(SurfaceError, what="surface"):
         drawing_set(start, "m")
     drawings = drawing_set(start, "cm", tolerance=0.1, panel_sheets=True, sheet="A3", anyway=True)
-    for sheet in drawings.sheets:
-        assert [text.text for text in sheet.texts if text.layer == "PCMC-MARK"] == [
-            "NOT CERTIFIED: not converged"
-        ]
+    assert marks_of(drawings) == {"NOT CERTIFIED: not converged"}
+
+
+def marks_of(drawings):
+    """The marks in the model and on the sheets, each with one."""
+    doc = dxf.document(drawings)
+    found = [space.query("TEXT[layer=='PCMC-MARK']") for space in doc.layouts]
+    assert [len(marks) for marks in found] == [1] * (len(drawings.sheets) + 1)
+    return {mark.dxf.text for marks in found for mark in marks}
+
+
+def test_a_roof_that_cuts_itself_and_one_that_misses_its_targets_are_marked(squares):
+    near = bubbles(0.9 * 2.0 * spherical_cap(0.25).vertices[:, 0].max())
+    assert marks_of(drawing_set(near, "m")) == {"NOT TO BE BUILT: it cuts itself"}
+    assert marks_of(drawing_set(squares, "m", mark="TARGETS NOT MET")) == {"TARGETS NOT MET"}
 
 
 def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, drawings):

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from refusals import refused
+from shapes import pyramid
 
 import pcmc
 from pcmc.base.errors import FileError, FileWarning, FreeSurfaceWarning
 from pcmc.io import load
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.io.polygons import cut_polygons
 
 meshio = pytest.importorskip("meshio")
@@ -140,6 +142,13 @@ def test_meshio(tmp_path, suffix, binary):
     with pytest.warns(FileWarning, match="1 quads were cut into triangles"):
         surface = pcmc.read(path)
     check(surface, names)
+
+
+@pytest.mark.parametrize(("factor", "tolerance"), [(1.0, 1e-6), (1e3, 1e-3), (1e-3, 1e-9)])
+def test_rhino_works_with_a_tolerance_of_the_size_of_the_roof(tmp_path, factor, tolerance):
+    pcmc.write(tmp_path / "a.3dm", scaled_surface(pyramid(), factor))
+    model = rhino3dm.File3dm.Read(str(tmp_path / "a.3dm"))
+    assert model.Settings.ModelAbsoluteTolerance == pytest.approx(tolerance)
 
 
 def test_rhino_quads_on_layers(tmp_path):
