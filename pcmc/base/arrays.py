@@ -125,12 +125,14 @@ def toml(value: Any) -> str:
 
     >>> toml({"at": [1.0, 2.0], "süd": True})
     '{at = [1.0, 2.0], "süd" = true}'
+    >>> toml(chr(127)).isascii(), chr(127) in toml(chr(127))
+    (True, False)
     """
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{toml_key(key)} = {toml(item)}' for key, item in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(toml, value))}]"
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON may leave it
 
 
 def toml_key(name: str) -> str:

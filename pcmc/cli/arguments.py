@@ -72,6 +72,11 @@ def parsed_integer(text: str | int) -> int:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
 
 
+def parsed_unit(text: str) -> str:
+    """A unit of length in an option; empty for none."""
+    return validate.choice("--units", text, LENGTHS) if text else text
+
+
 EVERY = "A bare VALUE applies to every patch that is not named"
 LOADED = "A bare VALUE applies to every patch under pressure that is not named"
 UPDATED = "wall pressures are updated"
@@ -90,7 +95,7 @@ Start = Annotated[bool, switch("--start", START)]
 Cache = Annotated[bool, switch("--cache/--no-cache", CACHE)]
 Whole = Annotated[bool, switch("--whole", WHOLE)]
 MeshCheck = Annotated[bool | None, switch("--mesh-check/--no-mesh-check", MESH_CHECK)]
-FileUnits = Annotated[str, option("NAME", UNITS)]
+FileUnits = Annotated[str, option("NAME", UNITS, parser=parsed_unit)]
 SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
 SheetFormat = Annotated[str | None, option("NAME", SHEET)]
 OUTPUT = "-o", "--output"
@@ -140,6 +145,9 @@ class Shown(Loads):
 
     def roof(self, project: Project, progress: OnStep, whole: bool) -> Outcome:
         """The roof of a project; the ``whole`` one if asked for."""
+        if self.start and not project.specified:
+            text = f"--start: {project.path.name} is a surface, shown as it is; leave out --start"
+            raise OptionError(text, what="--start")
         how: dict[str, Any] = {"changed": self.change, "start": self.start, "use_cache": self.cache}
         roof = projects.opened(project, progress, **how)
         return replace(roof, unfold=whole or roof.unfold)
@@ -270,8 +278,10 @@ def numbers(
     return found
 
 
-def parsed_view(text: str) -> Any:
-    """The name of a view, or (azimuth, elevation)."""
+def parsed_view(text: str, picture: Path | None) -> Any:
+    """The name of a view of a picture, or (azimuth, elevation)."""
+    if picture is None and text != "diagonal":
+        raise OptionError("--view: is of the picture; give --picture, too, or leave it out", what="--view")
     try:
         azimuth, elevation = map(validate.parsed, text.split(","))
     except ValueError:

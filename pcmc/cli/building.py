@@ -100,7 +100,7 @@ def panels_(
       pcmc panels roof.pcmc --tolerance 0.005 --change 0.02 -o schedule.csv -o fewer.pcmc
       pcmc panels roof.toml --pattern planar-quads --size 1.2 -o panels.csv -o panels.obj
     """
-    seen, files = arguments.parsed_view(view), output or []
+    seen, files = arguments.parsed_view(view, picture), output or []
     triangles = {"tolerance": tolerance, "change": change, "cost": cost, "walls": walls or None}
     triangles["mirror-images"] = mirror_images if mirror_images != "alike" else None
     nets = {"units": units or None, "direction": direction or None, "sheet": sheet}

@@ -84,7 +84,7 @@ def pattern(
       pcmc pattern roof.toml --width 2.4 -o cloth.dxf -o cloth.pdf
       pcmc pattern roof.toml --width 2.4 --compensation 0.4,1.5 --allowance 0.04 -o cloth.csv
     """
-    seen, files = arguments.parsed_view(view), output or []
+    seen, files = arguments.parsed_view(view, picture), output or []
     arguments.output_of(file, pattern=files, picture=picture, view=seen)
     with working() as progress:
         project = arguments.load_project(file, units)

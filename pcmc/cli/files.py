@@ -38,6 +38,7 @@ from .arguments import (
     count,
     load_project,
     option,
+    parsed_unit,
     switch,
 )
 from .reports import working
@@ -105,7 +106,7 @@ def plot(
       pcmc plot roof.toml start.png --start
       pcmc plot half.pcmc roof.png --whole
     """
-    seen = arguments.parsed_view(view)
+    seen = arguments.parsed_view(view, picture)
     arguments.output_of(file, picture=picture, view=seen, colour=colour)
     roof = _good(file, what, whole)
     if roof is None:
@@ -196,7 +197,9 @@ NEW_LENGTH = "Edge length of new triangles, for a scan; otherwise the triangles 
 def plan(
     file: Annotated[Path, typer.Argument(metavar="DRAWING", help=f"A .dxf or .3dm. {LAYERS}")],
     output: Annotated[Path, option("FILE", "Project to write (.toml).", *OUTPUT)],
-    units: Annotated[str, option("NAME", f"Unit of the project: {', '.join(LENGTHS)}.")] = "",
+    units: Annotated[
+        str, option("NAME", f"Unit of the project: {', '.join(LENGTHS)}.", parser=parsed_unit)
+    ] = "",
     gap: Annotated[float | None, amount("LENGTH", GAP)] = None,
     refer: Annotated[bool, switch("--refer", REFER)] = False,
 ) -> int:
@@ -231,7 +234,7 @@ def repair_(
     weld: Annotated[float | None, amount("LENGTH", WELD)] = None,
     holes: Annotated[int, count(CLOSED)] = HOLES,
     edge_length: Annotated[float | None, amount("LENGTH", NEW_LENGTH)] = None,
-    units: Annotated[str, option("NAME", UNITS)] = "",
+    units: Annotated[str, option("NAME", UNITS, parser=parsed_unit)] = "",
     up: Annotated[str, option("AXIS", UP)] = "z",
 ) -> int:
     """Repair a dirty mesh: weld, remove what is double or flat, close small holes. FILE stays as it is.

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from .. import project as projects
+from ..base.errors import OptionError
 from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
@@ -58,6 +59,8 @@ def equilibria_(
     numbered = [_numbered(path, k) for path in surfaces for k in range(1, 100)]  # as many as may be found
     check_outputs([*files, *numbered], inputs=files_of(file))
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
+    if axis != "height" and not any(path.suffix.lower() in PICTURES for path in files):
+        raise OptionError("--axis: is of the diagram; add -o diagram.svg, or leave it out", what="--axis")
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
         roof = what.roof(load_project(file, units), progress, whole)

@@ -130,7 +130,8 @@ def solve_(
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, progress, changed=loads.change, **how)
     _print_solved(outcome, project, "--allow-uncertified to write it", loads.change)
-    return OK if outcome.good else NOT_CERTIFIED
+    load = outcome.under_load
+    return OK if outcome.good and (load is None or load.carried) else NOT_CERTIFIED
 
 
 def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: Changed | None = None) -> None:
@@ -170,7 +171,14 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        roof = what.roof(load_project(file), progress, whole)
+        project = load_project(file)
+        if margin:  # unknown names are refused before the work
+            from ..accuracy.varied import Varied  # takes long to import
+
+            start = what.of(projects.surface_of(project))
+            for name in margin:
+                Varied.of(start, name)
+        roof = what.roof(project, progress, whole)
         progress("certifying")
         surface, certificate = roof.shown
     if roof.result is not None:
@@ -284,6 +292,8 @@ def sweep(
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
         require("pyarrow")
+    if every and csv is None:
+        raise OptionError("--all: is of the table in a file; name it with --csv", what="--all")
     check_names((), plot)
     if retry_failed and store is None:
         raise OptionError("--retry-failed: is of stored cases; name their --store", what="--retry-failed")

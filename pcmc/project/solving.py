@@ -169,6 +169,9 @@ def run_project(
         outcome.whole  # noqa: B018 — computed here, while the progress is shown
     for what in project.margin if outcome.certified else ():
         outcome.margin(what, progress)
+    if outcome.good or anyway:
+        with in_file(project.path):
+            outcome.analysis(anyway, progress)
     if outputs and (outcome.good or anyway):
         jobs = project_files(project, outcome, anyway, progress)
         with output_folder(project.folder or Path()):
@@ -254,7 +257,7 @@ def _check_wishes(project: Project, surface: Surface) -> None:
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")
         if structure is not None and (output.structure is not None or structure.run):
             structure.check(surface, project.plan, output.whole)
-        if structure is not None and structure.run and (output.structure or output.report):
+        if structure is not None and structure.run:
             expect_program()
         if project.pattern is not None and (output.pattern or output.report):
             of_material(project.pattern, structure, surface)

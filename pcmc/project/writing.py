@@ -65,7 +65,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
             add("structural model", [model_job(Path(output.structure), model)])
-        analysis = outcome.analysis(anyway, progress) if output.structure or output.report else None
+        analysis = outcome.analysis(anyway, progress)
         if output.structure is not None and analysis is not None:
             add("under load", analysis_jobs(Path(output.structure), analysis))
         if project.pattern is not None and (output.pattern or output.report):

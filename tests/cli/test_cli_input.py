@@ -9,7 +9,8 @@ import sys
 import pytest
 from small_project import SMALL
 
-from pcmc import cli
+from generators import two_squares
+from pcmc import cli, write
 
 REMESH = ["remesh", "roof.toml", "-o", "x.obj", "--edge-length"]
 SWEEP = ["sweep", "roof.toml", "roof.tension=2,3"]
@@ -26,6 +27,8 @@ SWEEP = ["sweep", "roof.toml", "roof.tension=2,3"]
         ([*SWEEP, "--time-limit", "1m"], "'--time-limit': expected a number, found '1m'"),
         (["solve", "roof.toml", "--tension", "=4"], "expected NAME=NUMBER or NUMBER, found '=4'"),
         (["solve", "roof.toml", "--pressure", "nan"], "--pressure: expected NAME=NUMBER"),
+        (["solve", "roof.toml", "--units", "km"], "unknown --units 'km'"),
+        (["repair", "a.obj", "-o", "b.obj", "--units", "km"], "unknown --units 'km'"),
     ],
 )
 def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, arguments, message):
@@ -33,6 +36,36 @@ def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, argument
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert message in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["panels", "roof.toml", "--tolerance", "0.1", "--view", "plan"], "--view: is of the picture"),
+        (["pattern", "roof.toml", "--width", "2", "--view", "plan"], "--view: is of the picture"),
+        ([*SWEEP, "--all"], "--all: is of the table in a file"),
+        (["equilibria", "roof.toml", "--axis", "energy"], "--axis: is of the diagram"),
+        (["certify", "roof.toml", "--margin", "foo"], "'foo'"),
+        (["certify", "roof.toml", "--margin", "pressure", "--margin", "tension of roo"], "'tension of roo'"),
+    ],
+)
+def test_an_option_that_counts_for_nothing_is_refused_before_the_work(
+    folder, capsys, monkeypatch, arguments, message
+):
+    for place in ("project.solving.solve_project", "sweep.run", "equilibria.find_equilibria"):
+        monkeypatch.setattr(f"pcmc.{place}", None)
+    assert cli.main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
+
+
+@pytest.mark.parametrize("command", [["certify"], ["convert"]])
+def test_a_surface_has_no_start_shape(folder, capsys, command):
+    write("roof.pcmc", two_squares())
+    files = ["roof.pcmc", *["b.pcmc"] * (command == ["convert"])]
+    assert cli.main([*command, *files, "--start"]) == 2
+    assert "--start: roof.pcmc is a surface" in capsys.readouterr().err
 
 
 def test_an_edge_length_that_cannot_be_is_explained_in_one_line(folder, capsys):
