@@ -159,28 +159,11 @@ def _axis(name: str, values: object) -> list[Any]:
         raise OptionError(f"grid[{name!r}] is empty; give it at least one value", what="grid", where=name)
     seen: dict[str, int] = {}
     for i, value in enumerate(axis):
-        first = seen.setdefault(case_key(value), i)
+        first = seen.setdefault(json.dumps(value, sort_keys=True), i)
         if first != i:
             text = f"grid[{name!r}] has the value {value!r} twice, at {first} and {i}"
             raise OptionError(text, what="grid", where=(name, i), found=value)
     return axis
-
-
-def case_key(value: Any) -> str:
-    """A text for plain values that is the same for equal numbers.
-
-    >>> case_key({"a": [6.0, 0.5]}) == case_key({"a": [6, 0.5]}), case_key(1) == case_key(True)
-    (True, False)
-    """
-    return json.dumps(_with_integers(value), sort_keys=True)
-
-
-def _with_integers(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _with_integers(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_with_integers(item) for item in value]
-    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _plain(value: object, where: str) -> Any:

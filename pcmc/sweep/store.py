@@ -25,7 +25,7 @@ import numpy as np
 from ..base.errors import FileError, FileWarning
 from ..base.files import check_regular, system_error
 from .case_script import WORDS, answer, version
-from .grid import Sweep, case_key
+from .grid import Sweep
 
 FORMAT = 2
 COLUMNS = ["parameters", "record", "crc"]  # of the table of cases
@@ -70,10 +70,7 @@ class Store:
         new = {record.case: record for record in records}
         rows = []
         for record in new.values():
-            key, text = (
-                case_key(record.parameters),
-                json.dumps({name: getattr(record, name) for name in FIELDS}),
-            )
+            key, text = _key(record.parameters), json.dumps({name: getattr(record, name) for name in FIELDS})
             rows.append((key, text, zlib.crc32((key + text).encode())))  # SQLite has no checksums
         try:
             self.database.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?, ?)", rows)
@@ -222,18 +219,20 @@ def _check_declaration(path: Path, stored: dict[str, Any], new: dict[str, Any]) 
             raise FileError(text, what=str(path), where=name or part, found=before, expected=after)
 
 
+def _key(value: Any) -> str:
+    return json.dumps(value, sort_keys=True)
+
+
 def _records(
     path: Path, database: sqlite3.Connection, grid: Mapping[str, Sequence[Any]], fixed: Mapping[str, Any]
 ) -> dict[int, Record]:
     """The stored records of the grid's cases by case number; a record that is not sound is left out."""
     axes = dict(grid) | {name: [value] for name, value in fixed.items()}
-    places = {
-        name: {case_key(value): place for place, value in enumerate(axis)} for name, axis in axes.items()
-    }
+    places = {name: {_key(value): place for place, value in enumerate(axis)} for name, axis in axes.items()}
     records = {}
     for key, text, crc in database.execute("SELECT parameters, record, crc FROM cases"):
         try:
-            values = {name: case_key(value) for name, value in json.loads(key).items()}
+            values = {name: _key(value) for name, value in json.loads(key).items()}
             if values.keys() != axes.keys():
                 continue  # no case of the grid
             case = {name: places[name][values[name]] for name in axes}

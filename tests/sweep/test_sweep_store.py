@@ -9,7 +9,7 @@ import sweep_cases
 from refusals import refused
 from tables import same
 
-from pcmc.base.errors import FileError, FileWarning, OptionError
+from pcmc.base.errors import FileError, FileWarning
 from pcmc.sweep import Sweep, read_store, run, table
 from pcmc.sweep import store as store_module
 from pcmc.sweep.store import open_store
@@ -51,15 +51,6 @@ def test_values_added_to_the_grid_run_only_their_cases(stored):
     same(table(read_store(path)), grown)
     old = grown[grown["rate"].isin([3.7, 3.8, 3.9]) & grown["seed"].isin([0.1, 0.2])]
     assert old["x"].tolist() == frame["x"].tolist()
-
-
-def test_equal_numbers_are_one_case(tmp_path):
-    path = tmp_path / "stored.sqlite"
-    run_cases(Sweep(SWEEP.case, {"rate": [3, 3.5], "seed": [0.5]}), path)
-    frame, ran = run_cases(Sweep(SWEEP.case, {"rate": [3.0, 3.5], "seed": [0.5]}), path)
-    assert (ran, len(frame)) == ([], 2)
-    with refused(OptionError, found=3.0):
-        Sweep(SWEEP.case, {"rate": [3, 3.0], "seed": [0.5]})
 
 
 def test_values_taken_from_the_grid_stay_in_the_store(stored):
