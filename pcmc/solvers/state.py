@@ -18,7 +18,7 @@ from ..forces.pinching import (
     standing_part,
     top_spacing,
 )
-from ..forces.rooms import closing_volumes, volume_gradients_at, volumes_at, with_room_pressures
+from ..forces.rooms import closing_volumes, room_volume_gradients, room_volumes, with_room_pressures
 from ..forces.wall_rows import Walls, find_walls
 from ..meshing.elevation import blended, flat_places
 from ..meshing.quality import compare, edge_lengths, redistribute, worst_quality
@@ -120,10 +120,10 @@ class SolverState:
         surface, wanted = self.at.surface, self.at.volume_defects + self.at.wanted_volumes
         area = vertex_area_vectors(X, self.at.classes.faces, self.at.classes.topology.faces)[1]
         for _ in range(VOLUME_STEPS):
-            left = wanted - volumes_at(surface, X)
+            left = wanted - room_volumes(surface, X)
             if (np.abs(left) <= ROOM_VOLUME * np.abs(self.at.wanted_volumes)).all():
                 break
-            G = volume_gradients_at(surface, X)
+            G = room_volume_gradients(surface, X)
             even = G / np.where(area > 0.0, area, 1.0)[:, None]
             small = np.einsum("rnd,snd->rs", G, even)
             X = X + surface.spread(np.tensordot(np.linalg.lstsq(small, left)[0], even, axes=1))

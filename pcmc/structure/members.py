@@ -18,7 +18,7 @@ from ..certificate.forces import Forces
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.curves import Curve
-from ..surface.geometry import segment_lengths, unit_vectors
+from ..surface.geometry import lengths_along, segment_lengths, unit_vectors
 from ..surface.pieces import point_text, to_space
 from ..surface.topology import EdgeCurve
 from .frames import bar_axes
@@ -116,7 +116,7 @@ class PlacedMember(EdgeCurve):
 
     @property
     def length(self) -> float:
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        return float(lengths_along(self.path)[-1])
 
     @property
     def direction(self) -> Floats:

@@ -148,6 +148,15 @@ def file_origin(X: Floats, size: float) -> Floats:
     return np.round(middle) if np.linalg.norm(middle) > FAR * size else np.zeros(3)
 
 
+def lengths_along(points: Floats) -> Floats:
+    """(k,) the length of the polyline through points (k,d) up to each of them.
+
+    >>> lengths_along(np.array([[0, 0], [3, 4], [3, 5]])).tolist()
+    [0.0, 5.0, 6.0]
+    """
+    return np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
+
+
 def segment_lengths(X: Floats, ends: Ints) -> Floats:
     """(e,) lengths of the segments between vertices ``ends`` (e,2)."""
     return np.asarray(np.linalg.norm(X[ends[:, 1]] - X[ends[:, 0]], axis=1))
