@@ -48,7 +48,7 @@ QUANTITIES = {
     "margin": "times",  # factor on a load or tension up to which the roof stays stable
     "lowest eigenvalue": "eigenvalue",  # smallest second variation per unit area
 }
-"""Every quantity of a roof or of a part of it, with its unit as a name of ``Units``: one word, one meaning."""
+"""Every quantity of a roof or of a part of it, and its unit as a name of ``Units``: one word, one meaning."""
 
 CHANGED = {kind: values.KINDS[f"{kind}s"].dimension for kind in KINDS if kind not in QUANTITIES}
 """The dimensions of kinds of parameters that are no quantities of a roof."""

@@ -37,7 +37,7 @@ CLEAR = 0.3  # of a sixth of the cell: how far the places may be off
 
 
 def room_volumes(surface: Surface, X: Floats | None = None) -> Floats:
-    """(r,) the volume enclosed by each room of prescribed volume, length³; at X (n,3) or where the surface is.
+    """(r,) the volume enclosed by each room of prescribed volume, length³, also with vertices at X (n,3).
 
     SurfaceError if the patches of a room leave an edge open that nothing holds.
 
