@@ -21,7 +21,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
-from ..meshing.quality import compare, worst_quality
+from ..meshing.quality import turns_over, worst_quality
 from ..solvers import solve_once
 from ..surface import Surface
 from ..surface.distance import distances
@@ -248,7 +248,7 @@ class _Search:
         while share >= SHORTEST:
             slid = onto_circles(surface, X + share * motion)
             Y = place_wall_rows(surface, part.walls, slid, space)
-            turned, _, worst = compare(X, Y, self.faces)
+            turned, worst = turns_over(X, Y, self.faces), worst_quality(Y, self.faces)
             if not turned and worst >= self.quality and (self.at_rest or self.leaves(Y) <= self.change):
                 return Y
             share *= 0.5

@@ -21,7 +21,7 @@ from ..forces.pinching import (
 from ..forces.rooms import closing_volumes, room_volume_gradients, room_volumes, with_room_pressures
 from ..forces.wall_rows import Walls, find_walls
 from ..meshing.elevation import blended, flat_places
-from ..meshing.quality import compare, edge_lengths, redistribute, worst_quality
+from ..meshing.quality import edge_lengths, redistribute, turns_over, worst_quality
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.checks import reachable
@@ -160,8 +160,9 @@ class SolverState:
         """Whether the move to X turns a triangle over, makes the worst much worse or leads too far out."""
         if not reachable(X):
             return True
-        turned, before, after = compare(self.at.X, X, self.quality_faces)
-        return turned or after < 0.7 * min(before, self.min_quality)
+        if turns_over(self.at.X, X, self.quality_faces):
+            return True
+        return worst_quality(X, self.quality_faces) < 0.7 * min(self.quality, self.min_quality)
 
     def maintain_mesh(self) -> bool:
         """Redistribute the vertices along the shape while triangles are poor; True if they moved.

@@ -105,10 +105,8 @@ def edge_array(edges: Any, what: str) -> Ints:
     E = _integers(edges, what)
     if E.ndim != 2 or E.shape[1] != 2 or not len(E):
         refuse_shape(what, E, "(k, 2) with k > 0")
-    E = np.sort(E, axis=1)
-    E = E[np.lexsort((E[:, 1], E[:, 0]))]
-    double = np.append((E[1:] == E[:-1]).all(axis=1), False)
-    refuse_rows(what, E, double, "is given twice", "remove one")
+    E, times = np.unique(np.sort(E, axis=1), axis=0, return_counts=True)
+    refuse_rows(what, E, times > 1, "is given twice", "remove one")
     return E.astype(np.int32)
 
 

@@ -6,9 +6,6 @@ k: c - b, a - c, b - a. Its area vector is A ν = ½ (b - a) × (c - a), of leng
 There are two layers. Compiled loops use three-vectors, tuples of floats, with inlined operations: ``point``,
 ``cross``, ``dot`` and others. All other code uses whole arrays: a function of ``P`` (…,m,3,3) takes the
 corners of m triangles, ``X[F]`` for vertices X (n,3) and faces F (m,3).
-
-Numba caches a compiled loop by the file it stands in. After a change of the inlined operations here, delete
-the caches of the loops that use them (``__pycache__/*.nb?``).
 """
 
 from __future__ import annotations
