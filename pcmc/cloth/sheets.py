@@ -33,7 +33,7 @@ ARROW = 0.3  # of a strip's length: the arrow of its warp
 
 
 def pattern_drawings(
-    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = ""
+    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = "", mark: str = ""
 ) -> DrawingSet:
     """The sheets of a cutting pattern, and a model with all strips flat at true size, for .dxf, .pdf, .svg.
 
@@ -41,7 +41,7 @@ def pattern_drawings(
     ----------
     units : of the lengths: "m", "cm", "mm", "ft" or "in".
     sheet : format of the sheets, "A4" to "A0".
-    name : of the roof, in the title strips.
+    name, mark : of the roof, in the title strips and on every sheet.
 
     >>> from pcmc import Patch, Surface, cutting_pattern
     >>> flat = Surface([[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
@@ -69,11 +69,11 @@ def pattern_drawings(
     sewn = pattern.seam_table.query("kind != 'rim'")[["seam", "kind", "strips", "length", "cut_length"]]
     if len(sewn):
         sheets += table_sheets("Seams", sewn.rename(columns={"cut_length": "cut length"}), sheet, decimals)
-    add_frames(sheets, name, length, pattern.certificate)
+    add_frames(sheets, name, length, pattern.certificate, mark)
     rows = [[str(strip.number), *at, "strip"] for strip, at in _middles(pattern)]
     points = pd.DataFrame(rows, columns=["point", *"xyz", "on"])
     about = pattern.surface, length, pattern.certificate, _curves(pattern)
-    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets)
+    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets, mark=mark)
 
 
 def pattern_files(
@@ -82,10 +82,11 @@ def pattern_files(
     units: str | Units,
     sheet: str = "A1",
     name: str = "",
+    mark: str = "",
 ) -> list[tuple[Path, Callable[[Path], Any]]]:
     """Each file of a cutting pattern with the function that writes it; FileError for an unknown suffix."""
     tables = dict(zip(TABLES, (pattern.table, pattern.seam_table), strict=True))
-    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name)
+    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name, mark=mark)
     return document_files(paths, draw, tables, {}, "a cutting pattern")
 
 

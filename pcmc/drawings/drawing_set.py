@@ -50,6 +50,7 @@ class DrawingSet:
     flat: Sheet | None  # all panels at true size, mm, where sheets of panels are asked for
     sheets: Sequence[Sheet]  # of paper, in order
     members: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # section, force, … by name
+    mark: str = ""  # where the certificate has none
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
@@ -124,6 +125,7 @@ def drawing_set(
     certificate: Certificate | None = None,
     schedule: Panels | None = None,
     members: Sequence[Any] = (),
+    mark: str = "",
 ) -> DrawingSet:
     """Draw a roof: plan, elevations, sections, setting-out points, cables, supports, panels at true size.
 
@@ -148,6 +150,7 @@ def drawing_set(
     certificate, schedule : of the surface, where they are known; otherwise computed.
     members : of its structural model, ``structure.drawn_members(model)``: lines in the place of their walls,
         and a table.
+    mark : on every sheet and in the model, where the certificate has none.
 
     Raises
     ------
@@ -223,10 +226,11 @@ def drawing_set(
         triangles = triangles_at_true_size(schedule, millimetres)
         flat = flat_panels(triangles)
         sheets += panels_at_true_size(triangles, sheet)
-    add_frames(sheets, name, length, certificate)
+    add_frames(sheets, name, length, certificate, mark)
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
     listed = (curves, cut, points, marks, schedule, flat, sheets)
-    return DrawingSet(surface, length, certificate, *listed, {texts["member"]: texts for texts in about})
+    by_name = {texts["member"]: texts for texts in about}
+    return DrawingSet(surface, length, certificate, *listed, by_name, mark)
 
 
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:

@@ -187,6 +187,13 @@ class Outcome:
         return ", with ".join(values_text(table, self.units) for table in tables)
 
     @property
+    def mark(self) -> str:
+        """What drawings are marked with where the certificate has no mark."""
+        from ..drawings.sheet import MISSED
+
+        return "" if self.design is None or self.design.met else MISSED
+
+    @property
     def certified(self) -> bool:
         """Whether the surface, and the whole if that is asked for, is certified."""
         return self.certificate.certified and (self.whole is None or self.whole.certificate.certified)
@@ -245,7 +252,7 @@ class Outcome:
 
         warn_of_members(self, "drawings", held=True)
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
-        options["members"] = members_drawn(self)
+        options |= {"members": members_drawn(self), "mark": self.mark}
         return drawing_set(self.shown.surface, self.units, **self._about(output, anyway), **options)
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
