@@ -295,9 +295,8 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
     for number, (hole, new) in enumerate(zip(plan.holes, other.holes, strict=False), 1):
         rows.append((f"[[plan.holes]] number {number}:", hole, new, ("edge", "cable")))
     for number, (divider, line) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
-        rows.append(
-            (f"[[plan.dividers]] number {number} ({divider.name!r}):", divider, line, ("wall", "bottom"))
-        )
+        where = f"[[plan.dividers]] number {number} ({divider.name!r}):"
+        rows.append((where, divider, line, ("wall", "bottom")))
     risen = {"[plan]" if r.patch is None else f"[plan.patches] {toml_key(r.patch)}:": r.kind for r in instead}
     walls, lines = other.surface().patches, []
     for place, before, after, keys in rows:
