@@ -208,7 +208,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     used = np.zeros(surface.n, dtype=bool)
     used[surface.faces[surface.patch_of_face == patch]] = True
     top = used & surface.topology.on_junction
-    bottom, top = used & surface.fixed & ~top, top & surface.free
+    bottom, top = used & surface.pinned & ~top, top & ~surface.pinned
     if not (surface.auxiliary[patch] and top.any() and bottom.any()):
         return False
     height = float(np.min(cKDTree(X[bottom]).query(X[top])[0]))

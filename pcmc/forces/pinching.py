@@ -363,7 +363,7 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
 
     Where held walls meet, they resist a motion d by h(d) = Σ c |d × e|, c = ½ α_w ℓ, most where it is across
     all of them. The direction is the one of the largest ⟨f, d⟩ / h(d): there f ∝ M d, M = Σ c (1 - e eᵀ) /
-    |d × e|, a fixed point (Weiszfeld's).
+    |d × e|, a fixed point (Weiszfeld's). An upright plane takes what is across it.
     """
     direction = walls.side[:, None] * np.array(surface.plane.normal)
     held = resting & walls.held
@@ -382,12 +382,13 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
     number, c, e = np.searchsorted(meet, vertex[here]), c[here], e[here]
     P = c[:, None, None] * (np.eye(3) - e[:, :, None] * e[:, None, :])
     d = direction[meet]
+    free = walls.admissible.projectors(meet)
     for _ in range(WEISZFELD):
         M = np.zeros((len(meet), 3, 3))
         np.add.at(
             M, number, P / np.maximum(np.linalg.norm(np.cross(d[number], e), axis=1), ON)[:, None, None]
         )
-        d = np.linalg.solve(M, force[meet, :, None])[:, :, 0]
+        d = (np.linalg.pinv(free @ M @ free, hermitian=True) @ force[meet, :, None])[:, :, 0]
         d /= np.linalg.norm(d, axis=1)[:, None]
     direction[meet] = d
     return direction

@@ -92,6 +92,17 @@ class Admissible(NamedTuple):
             freedom[mask], axis[mask] = 1, guide.directions(X[mask])
         return cls(read_only(freedom), read_only(axis))
 
+    def part(self, vectors: Floats) -> Floats:
+        """The part of vectors (n,3) in these directions, in place."""
+        _project(self, vectors)
+        return vectors
+
+    def projectors(self, vertices: Ints) -> Floats:
+        """(k,3,3) the matrices that leave of a vector the part in these directions, of vertices (k,)."""
+        freedom, axis = self.freedom[vertices, None, None], self.axis[vertices]
+        along = axis[:, :, None] * axis[:, None, :]
+        return np.where(freedom == 1, along, np.where(freedom > 1, np.eye(3) - along, 0.0))
+
 
 class Supported:
     """A surface as its supports see it: which vertices they hold, and how these may move."""
@@ -182,8 +193,8 @@ def apply_supports(surface: Any, vectors: Floats, X: Floats | None = None) -> Fl
     Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
     along their plane at those that slide there, Eq. (19); at X (n,3) or where the surface has its vertices.
     """
-    _project(surface.admissible_at(surface.vertices if X is None else X), vectors)
-    return vectors
+    admissible: Admissible = surface.admissible_at(surface.vertices if X is None else X)
+    return admissible.part(vectors)
 
 
 @compiled
