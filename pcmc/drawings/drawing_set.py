@@ -54,7 +54,7 @@ class DrawingSet:
         """Each file that ``write`` would write, with the function that writes it."""
         jobs: list[tuple[Path, Callable[[Path], None]]] = []
         wanted = [(path, suffix_of(path, SUFFIXES, "a drawing")) for path in map(Path, paths)]
-        document: Any = dxf.document(self) if wanted else None
+        document: Any = dxf.document(self) if any(suffix != ".pdf" for _, suffix in wanted) else None
         for path, suffix in wanted:
             if suffix == ".dxf":
                 jobs.append((path, document.saveas))
