@@ -140,9 +140,8 @@ def strip_lines(
             count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
             if count > MOST_NOTCHES:
                 text = f"notches: marks at distances of {step:g} would be {count} on seam {seam.number}, more"
-                raise OptionError(
-                    f"{text} than {MOST_NOTCHES}; give a larger one", what="notches", found=step
-                )
+                text += f" than {MOST_NOTCHES}; give a larger one"
+                raise OptionError(text, what="notches", found=step)
             length = beyond or 0.02 * strip.width
             for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
                 at, inward = _along(seam, side, strip, place)

@@ -50,9 +50,7 @@ class FewerFamilies:
     change: float  # the largest distance of a panel's corner from the shape before, length
     moved: float  # the largest motion of a panel's corner, along the shape for the most part, length
     rounds: int  # how many were made
-    steps: (
-        pd.DataFrame
-    )  # on the way, the ``families`` and ``change`` that no other had both fewer and less of
+    steps: pd.DataFrame  # the ``families`` and ``change`` that no other had both fewer and less of
 
     @property
     def surface(self) -> Surface:
