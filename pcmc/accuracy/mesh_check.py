@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from ..base import validate
-from ..base.arrays import Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import certify
@@ -130,10 +130,11 @@ def check_mesh(
     meshes : how many in all, ≥ 2; the finest has 4^(meshes - 1) times as many triangles. With 2 there is no
         observed order, and order 2 is taken with a wide bar; more than 3 make the limit sharper.
     boundary : where new vertices of a held boundary or held line go: ``"smooth"``, on smooth curves
-        through the old ones, which turn by up to 40° at a vertex (straight lines stay straight);
+        through the old ones, which turn by up to 40° at a vertex (straight lines stay straight); where
+        they turn by a little more, beside other turns, the bars also count that there may be no corner;
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
         on the exact curve. Vertices that slide on Π stay on it.
-    corners : vertices (k,) at which held curves have corners though they turn by less.
+    corners : vertices (k,) at which held curves have corners for sure, also where they turn by less.
     callback : called with a ``Progress`` after each step of the solver. Where it raises StopIteration,
         the check ends with KeyboardInterrupt, as with Ctrl-C.
     most_triangles : the most that the finest mesh may have.
@@ -165,7 +166,8 @@ def check_mesh(
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
     expect_flat(first, "check_mesh")
     validate.integer("most_triangles", most_triangles)
-    sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
+    known = vertex_numbers(corners, first.n)
+    sharp = np.union1d(known, held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
         raise OptionError(
@@ -195,12 +197,10 @@ def check_mesh(
         finding = other if finding is None or other.verdict is MeshVerdict.CHANGES else finding
     if finding.verdict is MeshVerdict.CHANGES and not finding.advice:
         finer = two_digits(0.5 * float(edge_lengths(first).mean()))
-        advice = (
-            f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh --edge-length {finer:g}"
-        )
-        finding = finding._replace(advice=advice)
+        advice = f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh"
+        finding = finding._replace(advice=f"{advice} --edge-length {finer:g}")
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
-    doubts = _curve_doubts(first, sharp, found, callback) if boundary == "smooth" else {}
+    doubts = _curve_doubts(first, known, found, callback) if boundary == "smooth" else {}
     table = _table(found, shape_order(surfaces) if order is None else order, doubts)
     return MeshCheck(*finding, table, tuple(surfaces), doubts)
 
@@ -231,18 +231,19 @@ def _curve_doubts(
     first: Surface, corners: Ints, found: Sequence[dict[Key, Reading]], callback: Callback | None
 ) -> dict[tuple[str, str], float]:
     """How far limits may be off as curves are guesses: the next mesh is solved with other guesses, too."""
-    other = doubted_midpoints(first, corners=corners)
-    if other is None:
-        return {}
-    there: dict[Key, Reading] = {}
-    if len(found) > 1 and (result := _solved(refine(first, 1, lambda _: other), callback)).converged:
-        there = readings(result.surface, result.certificate, first.n)
-    return {
-        (reading.quantity, reading.of): CURVES * abs(found[1][key].estimate - there[key].estimate)
-        if key in there and key in found[1]
-        else math.inf
-        for key, reading in found[0].items()
-    }
+
+    def read_with(places: Floats) -> dict[Key, Reading]:
+        result = _solved(refine(first, 1, lambda _: places), callback)
+        return readings(result.surface, result.certificate, first.n) if result.converged else {}
+
+    doubts: dict[tuple[str, str], float] = {}
+    for other in doubted_midpoints(first, corners=corners):
+        there = read_with(other) if len(found) > 1 else {}
+        for key, reading in found[0].items():
+            known, name = key in there and key in found[1], (reading.quantity, reading.of)
+            more = CURVES * abs(found[1][key].estimate - there[key].estimate) if known else math.inf
+            doubts[name] = doubts.get(name, 0.0) + more
+    return doubts
 
 
 def _table(

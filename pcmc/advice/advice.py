@@ -238,7 +238,7 @@ def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
     mean = float(f"{sum(others) / len(others):.3g}")
     areas = [replace(area, tension=mean) if area.name in names else area for area in plan.patches]
     walls = {divider.name for divider in plan.dividers if divider.wall is not None} - names
-    return replace(_with_dividers(plan, walls, wall=BALANCED), patches=areas)
+    return replace(with_dividers(plan, walls, wall=BALANCED), patches=areas)
 
 
 def _step(plan: Plan, result: Result) -> Plan:
@@ -248,9 +248,9 @@ def _step(plan: Plan, result: Result) -> Plan:
     if grew or certificate.verdict in (Verdict.RAN_AWAY, Verdict.NONE_FOUND):
         plan = _stiffer(plan, result)
     sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
-    plan = _with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
+    plan = with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
-        plan = _with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
+        plan = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
         surface = plan.surface()
         strained = strained_junction(surface)
@@ -259,7 +259,7 @@ def _step(plan: Plan, result: Result) -> Plan:
         name, tension, _ = strained.remedy
         own = {divider.name for divider in plan.dividers if _is_wall_of(divider, name)}
         areas = [replace(area, tension=tension) if area.name == name else area for area in plan.patches]
-        plan = replace(_with_dividers(plan, own, wall=BALANCED), patches=areas)
+        plan = replace(with_dividers(plan, own, wall=BALANCED), patches=areas)
     return plan
 
 
@@ -282,7 +282,8 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
     return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
 
 
-def _with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:
+def with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:
+    """The plan with new values of the dividers that have these names."""
     return replace(plan, dividers=[replace(d, **new) if d.name in names else d for d in plan.dividers])
 
 
@@ -295,9 +296,8 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
     for number, (hole, new) in enumerate(zip(plan.holes, other.holes, strict=False), 1):
         rows.append((f"[[plan.holes]] number {number}:", hole, new, ("edge", "cable")))
     for number, (divider, line) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
-        rows.append(
-            (f"[[plan.dividers]] number {number} ({divider.name!r}):", divider, line, ("wall", "bottom"))
-        )
+        place = f"[[plan.dividers]] number {number} ({divider.name!r}):"
+        rows.append((place, divider, line, ("wall", "bottom", "upright")))
     risen = {"[plan]" if r.patch is None else f"[plan.patches] {toml_key(r.patch)}:": r.kind for r in instead}
     walls, lines = other.surface().patches, []
     for place, before, after, keys in rows:

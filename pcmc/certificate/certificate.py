@@ -79,7 +79,7 @@ class Certificate:
         *("verdict", "detail", "residual", "scale", "energy", "volume", "index", "eigenvalues", "modes"),
         *("curvature_error", "quality", "walls_quality", "patches", "junctions", "load", "support"),
         *("pinched", "load_ratio", "proofs", "tried", "cables", "cable_ends", "rooms", "symmetric_in"),
-        *("leaning", "crossings", "supports", "balance", "reactions"),
+        *("leaning", "crossings", "supports", "balance", "reactions", "mark"),
     )
 
     @cached_property
@@ -209,6 +209,13 @@ class Certificate:
     def certified(self) -> bool:
         """At rest, and neither a saddle nor degenerate."""
         return self.verdict in (Verdict.STABLE, Verdict.NEUTRAL)
+
+    @property
+    def mark(self) -> str:
+        """What each page, model and .ifc of the surface is marked with; empty for one that is in order."""
+        if not self.certified:
+            return f"NOT CERTIFIED: {self.verdict.value.split(':')[0]}"
+        return "NOT TO BE BUILT: it cuts itself" if len(self.crossings) else ""
 
     def numbers(self) -> dict[str, Any]:
         """The scalar findings, for tables."""
@@ -355,12 +362,6 @@ def certified(surface: Surface, anyway: bool, known: Certificate | None = None) 
     certificate = certify(surface) if known is None else known
     require_certified(certificate, anyway)
     return certificate
-
-
-def warning_mark(certificate: Certificate) -> str:
-    """What each page about a surface that is not certified is marked with; empty for one that is."""
-    verdict = certificate.verdict.value.split(":")[0]
-    return "" if certificate.certified else f"NOT CERTIFIED: {verdict}"
 
 
 def require_certified(certificate: Certificate, anyway: bool) -> None:

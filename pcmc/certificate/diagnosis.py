@@ -188,9 +188,8 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
 
 def vanished_films(surface: Surface) -> list[str]:
     """The films between two junctions that have vanished, by name: narrow, and small beside the others."""
-    area = np.bincount(
-        surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
-    )
+    areas = face_areas(surface.vertices[surface.faces])
+    area = np.bincount(surface.patch_of_face, areas, len(surface.patches))
     names = []
     for patch in np.flatnonzero(area < NARROW * area.max()):
         film = film_of(surface, int(patch))
@@ -208,7 +207,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     used = np.zeros(surface.n, dtype=bool)
     used[surface.faces[surface.patch_of_face == patch]] = True
     top = used & surface.topology.on_junction
-    bottom, top = used & surface.fixed & ~top, top & surface.free
+    bottom, top = used & surface.pinned & ~top, top & ~surface.pinned
     if not (surface.auxiliary[patch] and top.any() and bottom.any()):
         return False
     height = float(np.min(cKDTree(X[bottom]).query(X[top])[0]))

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
-from ..base.tolerances import EXCESS, FORCE_ROUNDING
+from ..base.tolerances import FORCE_ROUNDING
 from ..forces import cable_weights, cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
@@ -304,16 +304,13 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Boo
     X, mirror = surface.vertices, np.array([[False], *([plane.mirror] for plane, _ in surface.on_planes)])
     ground = surface.on_plane | (surface.fixed & lying(surface.plane.height(X), X))
     on = np.array([ground, *(mask for _, mask in surface.on_planes)])
-    clamped = surface.given_supports.fixed_and_sliding()[0]
-    least = EXCESS * float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    clamped = surface.given_supports.fixed_and_sliding()[0] | surface.pinned  # at rest on a held bottom, too
     across = [part - symmetric_part(surface.on_planes, part.copy()) for part in (forces, ends)]
-    for _ in range(2):  # again with those clamped that planes cannot carry, as where a held bottom is pinched
-        here = np.where(clamped, on & mirror, on)
-        carried, of_cables = (
-            _by_normal(_normals(surface), here, np.where(clamped[:, None], mirrored, part))
-            for part, mirrored in zip((forces, ends), across, strict=True)
-        )
-        clamped = clamped | (np.linalg.norm(forces - carried.sum(axis=0), axis=1) > least)
+    here = np.where(clamped, on & mirror, on)
+    carried, of_cables = (
+        _by_normal(_normals(surface), here, np.where(clamped[:, None], mirrored, part))
+        for part, mirrored in zip((forces, ends), across, strict=True)
+    )
     return clamped, on, carried, of_cables
 
 

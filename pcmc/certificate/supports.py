@@ -261,14 +261,16 @@ def _on_plane(acting: Forces, mask: Bools, inside: Bools, kind: str, where: str)
     """What a plane carries away from the held boundary: walls that lie in it, then curves of junctions."""
     surface, topo = acting.surface, acting.surface.topology
     held = (topo.junction_edge | topo.seam_edge) & at_both_ends(mask | acting.clamped, topo.edges)
+    held &= ~at_both_ends(acting.clamped, topo.edges)  # there a line holds, as below a junction at rest
     flat = mask[surface.faces].all(axis=1) & (kind != "ground")
     groups: list[tuple[str, Ints, Ints]] = []
     done = np.zeros_like(inside)
     for wall in np.unique(surface.patch_of_face[flat]).tolist():
         faces = flat & (surface.patch_of_face == wall)
         edges = topo.edges_of(faces)
-        groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), edges[held[edges]]))
         done[surface.faces[faces]] = True
+        if held[edges].any():
+            groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), edges[held[edges]]))
     for curve in topo.curves_among(held & (mask & inside & ~done)[topo.edges].any(axis=1)):
         edges = np.sort(topo.edge_numbers(curve.pairs))
         groups.append((names_of(surface, dict.fromkeys(curve.sheets)), curve.vertices, edges))

@@ -187,7 +187,7 @@ def _net(
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("laying out panels")
         net = roof.panel_net(size, pattern, direction, build.allow_uncertified)
-        works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name)
+        works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name, roof.mark)
         if picture is not None:
             works.append((picture, partial(panel_planarity, net, view=seen)))
         written = write_all(works, progress)

@@ -96,7 +96,7 @@ def pattern(
         roof = build.roof(project, progress)
         progress("cutting strips")
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)
-        jobs: list[Any] = pattern_files(cloth, files, roof.units, own.sheet, roof.name)
+        jobs: list[Any] = pattern_files(cloth, files, roof.units, own.sheet, roof.name, roof.mark)
         if picture is not None:
             jobs.append((picture, partial(strains, cloth, view=seen)))
         written = write_all(jobs, progress)

@@ -46,6 +46,7 @@ from .arguments import (
 from .reports import sweeping, working
 
 if TYPE_CHECKING:
+    from ..project.solving import Changed
     from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
@@ -104,10 +105,8 @@ def solve_(
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
     if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
-        text = (
-            f"--folder: {file.name} writes nothing there by itself; name the files, as -o {folder}/roof.obj"
-        )
-        raise OptionError(text, what="--folder", found=str(folder))
+        text = f"--folder: {file.name} writes nothing there by itself; name the files, as"
+        raise OptionError(f"{text} -o {folder}/roof.obj", what="--folder", found=str(folder))
     project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
@@ -128,11 +127,11 @@ def solve_(
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, progress, changed=loads.change, **how)
-    _print_solved(outcome, project, "--allow-uncertified to write it")
+    _print_solved(outcome, project, "--allow-uncertified to write it", loads.change)
     return OK if outcome.good else NOT_CERTIFIED
 
 
-def _print_solved(outcome: Outcome, project: Project, otherwise: str) -> None:
+def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: Changed | None = None) -> None:
     """Print a roof that was solved, and what its project wants to know; make the mesh check last."""
     reports.report(outcome)
     if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
@@ -140,6 +139,10 @@ def _print_solved(outcome: Outcome, project: Project, otherwise: str) -> None:
     if project.output.paths and not outcome.files:
         print(f"nothing written (use {otherwise})")
     reports.mesh_check(outcome, brief=True)
+    with working() as progress:
+        lines = projects.firmer(outcome, changed, progress)
+    if lines:
+        print("\n  ".join(lines))
     reports.margins(outcome)
 
 

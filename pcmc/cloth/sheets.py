@@ -20,7 +20,7 @@ from ..drawings.drawing_set import CSV, document_files
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import SheetLine, Text, add_frames, length_decimals, table_sheets
 from ..drawings.views import DrawnView, placed
-from ..surface.geometry import cross_2d, unit_vectors
+from ..surface.geometry import cross_2d, lengths_along, unit_vectors
 from .strips import CuttingPattern, Seam, Side, Strip
 
 SUFFIXES, TABLES = (*DRAWINGS, CSV), ("", "seams")  # tables of strips and of seams
@@ -33,7 +33,7 @@ ARROW = 0.3  # of a strip's length: the arrow of its warp
 
 
 def pattern_drawings(
-    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = ""
+    pattern: CuttingPattern, units: str | Units, *, sheet: str = "A1", name: str = "", mark: str = ""
 ) -> DrawingSet:
     """The sheets of a cutting pattern, and a model with all strips flat at true size, for .dxf, .pdf, .svg.
 
@@ -41,7 +41,7 @@ def pattern_drawings(
     ----------
     units : of the lengths: "m", "cm", "mm", "ft" or "in".
     sheet : format of the sheets, "A4" to "A0".
-    name : of the roof, in the title strips.
+    name, mark : of the roof, in the title strips and on every sheet.
 
     >>> from pcmc import Patch, Surface, cutting_pattern
     >>> flat = Surface([[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
@@ -69,11 +69,11 @@ def pattern_drawings(
     sewn = pattern.seam_table.query("kind != 'rim'")[["seam", "kind", "strips", "length", "cut_length"]]
     if len(sewn):
         sheets += table_sheets("Seams", sewn.rename(columns={"cut_length": "cut length"}), sheet, decimals)
-    add_frames(sheets, name, length, pattern.certificate)
+    add_frames(sheets, name, length, pattern.certificate, mark)
     rows = [[str(strip.number), *at, "strip"] for strip, at in _middles(pattern)]
     points = pd.DataFrame(rows, columns=["point", *"xyz", "on"])
     about = pattern.surface, length, pattern.certificate, _curves(pattern)
-    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets)
+    return DrawingSet(*about, (), points, (), None, _side_by_side(pattern, millimetres), sheets, mark=mark)
 
 
 def pattern_files(
@@ -82,10 +82,11 @@ def pattern_files(
     units: str | Units,
     sheet: str = "A1",
     name: str = "",
+    mark: str = "",
 ) -> list[tuple[Path, Callable[[Path], Any]]]:
     """Each file of a cutting pattern with the function that writes it; FileError for an unknown suffix."""
     tables = dict(zip(TABLES, (pattern.table, pattern.seam_table), strict=True))
-    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name)
+    draw = partial(pattern_drawings, pattern, units, sheet=sheet, name=name, mark=mark)
     return document_files(paths, draw, tables, {}, "a cutting pattern")
 
 
@@ -139,9 +140,8 @@ def strip_lines(
             count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
             if count > MOST_NOTCHES:
                 text = f"notches: marks at distances of {step:g} would be {count} on seam {seam.number}, more"
-                raise OptionError(
-                    f"{text} than {MOST_NOTCHES}; give a larger one", what="notches", found=step
-                )
+                text += f" than {MOST_NOTCHES}; give a larger one"
+                raise OptionError(text, what="notches", found=step)
             length = beyond or 0.02 * strip.width
             for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
                 at, inward = _along(seam, side, strip, place)
@@ -187,7 +187,7 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
 
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:
     """The point (2,) of a strip at a length along a seam on the roof, and the unit vector into the strip."""
-    total = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(seam.points, axis=0), axis=1)))
+    total = lengths_along(seam.points)
     k = min(int(np.searchsorted(total, place, side="right")) - 1, len(total) - 2)
     a, b = strip.cut[side.edges[k]]
     share, (x, y) = (place - total[k]) / (total[k + 1] - total[k]), (b - a) / np.linalg.norm(b - a)

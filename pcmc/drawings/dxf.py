@@ -14,7 +14,7 @@ from ..base.units import TABLE, length_factor
 from .sheet import LAYERS, MEMBERS, SMALL, Sheet
 
 VERSION = "R2018"
-MODEL_TEXT = 0.004  # height of letters in the model, in its size
+MODEL_TEXT, MODEL_MARK = 0.004, 0.02  # heights of letters in the model, in its size
 DIMENSION = {"dimtxt": SMALL, "dimtxsty": "PCMC", "dimtad": 1, "dimgap": 0.6, "dimtsz": 0.8, "dimexo": 1.0}
 DIMENSION |= {"dimexe": 1.0, "dimtix": 1, "dimtoh": 0, "dimtih": 0, "dimdsep": ord("."), "dimzin": 0}
 
@@ -93,6 +93,10 @@ def _add_model(space: Any, model: Any) -> None:
         space.add_point(at, dxfattribs={"layer": layer})
         text = space.add_text(name, height=height, dxfattribs={"layer": layer, "style": "PCMC"})
         text.set_placement((at[0] + 0.3 * height, at[1] + 0.3 * height, at[2]))
+    if mark := model.certificate.mark or model.mark:
+        at, low = MODEL_MARK * surface.size, surface.vertices.min(axis=0)
+        text = space.add_text(mark, height=at, dxfattribs={"layer": "PCMC-MARK", "style": "PCMC"})
+        text.set_placement((low[0], low[1] - 2.0 * at, low[2]))
     if model.flat is not None:
         low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         millimetres = length_factor(model.units, "mm")

@@ -24,14 +24,16 @@ SUFFIXES = (*DRAWINGS, CSV, OBJ)
 TABLES = ("", "nodes", "beams")  # of panels, nodes and beams
 
 
-def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: str = "") -> DrawingSet:
+def net_drawings(
+    net: PanelNet, units: str | Units, *, sheet: str = "A1", name: str = "", mark: str = ""
+) -> DrawingSet:
     """The plan of a net, tables of its nodes and panels, and each panel at true size, for .dxf, .pdf, .svg.
 
     Parameters
     ----------
     units : of the lengths: "m", "cm", "mm", "ft" or "in".
     sheet : format of the sheets, "A4" to "A0".
-    name : of the roof, in the title strips.
+    name, mark : of the roof, in the title strips and on every sheet.
 
     >>> from generators import delaunay
     >>> from pcmc import panel_net
@@ -60,11 +62,11 @@ def net_drawings(net: PanelNet, units: str | Units, *, sheet: str = "A1", name: 
         sheets += table_sheets(title, table, sheet, decimals, head)
     panels = polygons_at_true_size(net, millimetres)
     sheets += panel_sheets(panels, sheet)
-    add_frames(sheets, name, length, net.certificate)
+    add_frames(sheets, name, length, net.certificate, mark)
     points = net.nodes[["node", *"xyz"]].rename(columns={"node": "point"}).astype({"point": str})
     points = points.assign(on="panel")
     about = net.mesh, length, net.certificate, curves
-    return DrawingSet(*about, (), points, (), None, flat_panels(panels), sheets)
+    return DrawingSet(*about, (), points, (), None, flat_panels(panels), sheets, mark=mark)
 
 
 def net_files(
@@ -73,8 +75,9 @@ def net_files(
     units: str | Units,
     sheet: str = "A1",
     name: str = "",
+    mark: str = "",
 ) -> list[tuple[Path, Callable[[Path], Any]]]:
     """Each file of a net with the function that writes it; FileError for an unknown suffix."""
     tables = dict(zip(TABLES, (net.panels, net.nodes, net.beams), strict=True))
-    draw = partial(net_drawings, net, units, sheet=sheet, name=name)
+    draw = partial(net_drawings, net, units, sheet=sheet, name=name, mark=mark)
     return document_files(paths, draw, tables, {OBJ: net.write_obj}, "a net of panels")

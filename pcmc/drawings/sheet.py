@@ -15,7 +15,7 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..base.libraries import require
-from ..certificate.certificate import Certificate, warning_mark
+from ..certificate import Certificate
 
 FORMATS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0)}
 FORMATS["A0"] = (1189.0, 841.0)
@@ -28,6 +28,7 @@ DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or
 LENGTHS = {*"xyz", *"abc", "length", "width", "cut length"}  # columns of tables
 DIGITS = 4  # of the largest number of a column, and of the size of a small roof
 
+MISSED = "TARGETS NOT MET"  # mark of a roof that misses them
 MARGIN, STRIP = 10.0, 16.0  # mm: around the frame; height of the title strip within it
 GAP = 8.0  # mm between views
 TINY, SMALL, LARGE = 1.8, 2.5, 3.5  # mm: heights of letters
@@ -161,9 +162,7 @@ class Sheet:
     lines: list[SheetLine] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
     dimensions: list[Dimension] = field(default_factory=list)
-    places: list[tuple[float, Floats]] = field(
-        default_factory=list
-    )  # views: point x is at factor · x + shift
+    places: list[tuple[float, Floats]] = field(default_factory=list)  # of views: x is at factor · x + shift
 
     @property
     def size(self) -> tuple[float, float]:
@@ -224,9 +223,9 @@ def corner() -> Floats:
     return np.array([MARGIN + GAP, MARGIN + STRIP + GAP])
 
 
-def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate) -> None:
+def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate, mark: str = "") -> None:
     """Give each sheet its frame, its title strip with its number, and the mark of a roof that needs one."""
-    mark = warning_mark(certificate)
+    mark = certificate.mark or mark
     for number, sheet in enumerate(sheets, start=1):
         width, height = sheet.size
         low, right, top = MARGIN, width - MARGIN, height - MARGIN

@@ -99,9 +99,8 @@ class StandingPart:
             message = f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only"
             message += " flat triangles have contact; give order=1"
             raise CurvedContactError(message, what="order", found=whole.order, expected=1)
-        if resting.any():
-            expect_no_images(whole, "a junction that comes to rest on the plane")
         if resting.any():  # vertices of the walls left out belong to no face
+            expect_no_images(whole, "a junction that comes to rest on the plane")
             X, held = _put_down(whole, walls, whole.vertices, resting), resting & walls.held
             owner, given = _owners(whole.n, walls, resting), whole.given_supports
             F, left = _standing_faces(whole, walls, resting, owner)
@@ -363,7 +362,7 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
 
     Where held walls meet, they resist a motion d by h(d) = Σ c |d × e|, c = ½ α_w ℓ, most where it is across
     all of them. The direction is the one of the largest ⟨f, d⟩ / h(d): there f ∝ M d, M = Σ c (1 - e eᵀ) /
-    |d × e|, a fixed point (Weiszfeld's).
+    |d × e|, a fixed point (Weiszfeld's). An upright plane takes what is across it.
     """
     direction = walls.side[:, None] * np.array(surface.plane.normal)
     held = resting & walls.held
@@ -382,12 +381,12 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
     number, c, e = np.searchsorted(meet, vertex[here]), c[here], e[here]
     P = c[:, None, None] * (np.eye(3) - e[:, :, None] * e[:, None, :])
     d = direction[meet]
+    free = walls.admissible.projectors(meet)
     for _ in range(WEISZFELD):
         M = np.zeros((len(meet), 3, 3))
-        np.add.at(
-            M, number, P / np.maximum(np.linalg.norm(np.cross(d[number], e), axis=1), ON)[:, None, None]
-        )
-        d = np.linalg.solve(M, force[meet, :, None])[:, :, 0]
+        turned = np.linalg.norm(np.cross(d[number], e), axis=1)
+        np.add.at(M, number, P / np.maximum(turned, ON)[:, None, None])
+        d = (np.linalg.pinv(free @ M @ free, hermitian=True) @ force[meet, :, None])[:, :, 0]
         d /= np.linalg.norm(d, axis=1)[:, None]
     direction[meet] = d
     return direction

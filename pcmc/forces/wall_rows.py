@@ -16,7 +16,7 @@ from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, vertex_sums
 from ..surface.images import expect_no_images
-from ..surface.supports import members
+from ..surface.supports import Admissible, members
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
@@ -92,7 +92,7 @@ def wall_rows(
         top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
         share, whole = height[vertices], top
     else:
-        feet, bottom = foot[ends], surface.fixed
+        feet, bottom = foot[ends], surface.pinned
         fraction = np.round(fraction)  # below one top vertex, so that it pinches with this one
         rows = WallRows(vertices, ends, fraction, zero, none, feet)
         drop = rows.drops(X)
@@ -100,14 +100,12 @@ def wall_rows(
         share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
         whole = top**2
     stands = np.abs(top) > ON * surface.size
-    relative = np.divide(share, whole, out=zero, where=stands)
-    relative = np.clip(relative, 0, 1)
+    relative = np.clip(np.divide(share, whole, out=zero, where=stands), 0.0, 1.0)
     if not stands.all():
         relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges, bottom))
     relative[bottom[vertices]] = 0.0
-    offset = none
-    straight = WallRows(vertices, ends, fraction, relative, offset, feet).places(surface, X)
-    np.divide(X[vertices] - straight, top[:, None], out=offset, where=stands[:, None])
+    straight = WallRows(vertices, ends, fraction, relative, none, feet).places(surface, X)
+    offset = np.divide(X[vertices] - straight, top[:, None], out=none, where=stands[:, None])
     offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
     return WallRows(vertices, ends, fraction, relative, offset, feet)
 
@@ -170,7 +168,7 @@ def held_walls(
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
-    bottom = topo.boundary_edge & (surface.fixed & low)[topo.edges].all(axis=1)
+    bottom = topo.boundary_edge & (surface.pinned & low)[topo.edges].all(axis=1)
     meeting = np.zeros(surface.n, dtype=np.int64)  # the walls whose top edges have the vertex
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = topo.edges_of(surface.patch_of_face == index)
@@ -179,13 +177,13 @@ def held_walls(
         meeting[np.unique(top)] += 1
         if not bottom[of_wall].any() or surface.on_ground[vertices].any():
             continue
-        below = vertices[surface.fixed[vertices] & ~roof_vertex[vertices]]
+        below = vertices[surface.pinned[vertices] & ~roof_vertex[vertices]]
         if not len(top) or not low[below].all():
             continue
         foot = _held_feet(surface.n, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
         if foot is None:
             continue
-        free = np.unique(top)[~surface.fixed[np.unique(top)]]
+        free = np.unique(top)[~surface.pinned[np.unique(top)]]
         gap = np.linalg.norm(X[free] - X[foot[free]], axis=1)
         rests = rests or bool(lying(gap, X).any())
         walls.append((index, topo.edges[of_wall], top, foot))
@@ -204,19 +202,11 @@ def _fit_together(surface: Surface, walls: list[tuple[int, Ints, Ints, Ints]], m
     together = (sides > 0).sum(axis=0)
     one_foot = (np.where(sides > 0, feet, feet.max(axis=0)) == feet.max(axis=0)).all(axis=0)
     alone = (sides == 2) & (together == 1)
-    on_other = members(surface.on_planes, surface.n)
-    joined = (together > 1) & (together == meeting) & one_foot & ~on_other
-    mirrored = [ends_on_planes(surface, top).any(axis=1) for _, _, top, _ in walls]
-    good = alone | joined | ((sides == 1) & (together == 1) & mirrored) | (sides == 0) | surface.fixed
+    mirrors = [pair for pair in surface.on_planes if pair[0].mirror]  # whose other walls are not here
+    joined = (together > 1) & (together == meeting) & one_foot & ~members(mirrors, surface.n)
+    ends = (sides == 1) & (together == 1) & members(surface.on_planes, surface.n)
+    good = alone | joined | ends | (sides == 0) | surface.pinned
     return [bool(row.all()) for row in good]
-
-
-def ends_on_planes(surface: Surface, edges: Ints) -> Floats:
-    """(n,3) the unit normals of other planes than Π, at the ends that curves of edges (k,2) have on them."""
-    normals, alone = np.zeros((surface.n, 3)), np.bincount(edges.ravel(), minlength=surface.n) == 1
-    for plane, on in surface.on_planes:
-        normals[on & alone & ~surface.fixed] = plane.normal
-    return normals
 
 
 def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
@@ -250,7 +240,7 @@ class Walls:
     side: Floats  # (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to
     pinchable: Bools  # (patches,) the patches that are such walls
     foot: Ints  # (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere
-    beyond: Floats  # (n,3) the unit normal of another plane where a top edge ends on one, as in a mirror
+    admissible: Admissible  # how the supports let each vertex move
 
     @property
     def held(self) -> Bools:
@@ -270,7 +260,9 @@ class Walls:
         return self.pinchable & ~held
 
     def across_bottom(self, vectors: Floats, X: Floats) -> Floats:
-        """The part (n,3) of vectors across the held bottom below each top vertex; X, vectors are (n,3)."""
+        """The part (n,3) of vectors across the held bottom below each top vertex, as its supports allow it.
+
+        At an end of a bottom, and where walls meet, they alone say which part; X and vectors are (n,3)."""
         chord, first = np.zeros_like(X), np.zeros_like(X)
         edges = self.top_edges[(self.foot[self.top_edges] >= 0).all(axis=1)]
         start, end = X[self.foot[edges.T]]
@@ -281,11 +273,10 @@ class Walls:
         for v in edges.T:
             sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
             np.add.at(chord, v, sign[:, None] * side)
-        ends = np.bincount(edges.ravel(), minlength=len(X)) != 2
-        chord[ends] = self.beyond[ends]  # where walls meet, none: any pull is across one of them
+        chord[np.bincount(edges.ravel(), minlength=len(X)) != 2] = 0.0
         length = np.linalg.norm(chord, axis=1)[:, None]
         tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
-        return np.asarray(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
+        return self.admissible.part(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
 
 
 def find_walls(surface: Surface, held: bool = False) -> Walls:
@@ -333,5 +324,5 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         side=np.where(np.where(low, push, height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
         foot=foot,
-        beyond=ends_on_planes(surface, top_edges),
+        admissible=surface.admissible,
     )

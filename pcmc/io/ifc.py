@@ -38,6 +38,7 @@ NAMES |= {"N": "", "kN": "KILO", "MN": "MEGA", "lbf": "pound-force", "kip": "kip
 FINDINGS = {  # in the property set of the certificate, by the name there
     "Verdict": ("IfcLabel", "verdict"),
     "Detail": ("IfcText", "detail"),
+    "Mark": ("IfcLabel", "mark"),
     "MorseIndex": ("IfcInteger", "index"),
     "Residual": ("IfcReal", "residual"),
     "CurvatureError": ("IfcReal", "curvature_error"),
@@ -45,7 +46,8 @@ FINDINGS = {  # in the property set of the certificate, by the name there
     "LoadRatio": ("IfcReal", "load_ratio"),
     "LowestEigenvalue": ("IfcReal", "lowest_eigenvalue"),
 }
-TYPES: dict[str, Callable[[Any], Any]] = {"IfcText": str, "IfcInteger": int, "IfcReal": float}
+TYPES: dict[str, Callable[[Any], Any]] = dict.fromkeys(("IfcText", "IfcLabel"), str)
+TYPES |= {"IfcInteger": int, "IfcReal": float}
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
@@ -78,6 +80,7 @@ class _Model:
         import ifcopenshell
 
         self.surface, self.units = surface, units
+        self.name = ", ".join(filter(None, ("Roof", content.certificate.get("mark"))))
         self.replaced = {member.wall for member in content.members}
         self.file: Any = ifcopenshell.file(schema="IFC4")
         self.add = self.file.create_entity
@@ -126,7 +129,8 @@ class _Model:
             self.aggregate(f"{kind} aggregated", whole, [part])
             whole = part
         place = self.placement(place, self.middle)
-        roof = self.rooted("IfcRoof", "roof", Name="Roof", ObjectPlacement=place, PredefinedType="FREEFORM")
+        about = {"Name": self.name, "ObjectPlacement": place, "PredefinedType": "FREEFORM"}
+        roof = self.rooted("IfcRoof", "roof", **about)
         inside = {"RelatedElements": [roof], "RelatingStructure": whole}
         self.rooted("IfcRelContainedInSpatialStructure", "roof contained", **inside)
         return roof
@@ -230,9 +234,8 @@ class _Model:
     def extruded(self, line: Any, section: Any) -> list[Any]:
         """A section along each edge of a line, its width across, its height in the upright plane."""
         solids = []
-        for start, (along, across, _), length in zip(
-            *line.segments(np.array(self.surface.plane.normal)), strict=True
-        ):
+        segments = line.segments(np.array(self.surface.plane.normal))
+        for start, (along, across, _), length in zip(*segments, strict=True):
             position = self.axes(start - self.middle)
             for name, direction in (("Axis", along), ("RefDirection", across)):
                 setattr(position, name, self.add("IfcDirection", DirectionRatios=direction.tolist()))

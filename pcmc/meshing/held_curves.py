@@ -16,6 +16,8 @@ from .refinement import CORNER, Projection, held_midpoints
 HALVINGS = 8  # of each edge of a curve that points are projected onto
 NEAREST = 3  # pieces of curve that are compared
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
+COARSE = 80.0  # degrees: a smooth curve of few vertices turns by up to so much at one
+SHARPER = 5.0  # times the turns beside it: where a curve turns by more at a vertex, that is a corner
 
 
 def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Floats:
@@ -44,7 +46,7 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | N
     return _middles(X, edges, *_arcs_over(X, edges, corner, corners))
 
 
-def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> Floats | None:
+def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> list[Floats]:
     """(k,3) other places for the same vertices, about as far from those as the curve that was meant may be.
 
     Each lies nearer to the middle of its edge, or farther from it. With r, s the rises of the two arcs over
@@ -52,7 +54,13 @@ def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> Floats |
     the error; but not beyond r, which it reaches where s is three times as high, as there may be a corner.
     Beside a corner that is known there is one arc, with the curvature at the edge's other end in place of its
     middle: an error of first order, half of what the arcs over the next edge differ by, to the scale of the
-    edges; where that has no two arcs, all of the rise. None where nothing moves: on circles and lines.
+    edges; where that has no two arcs, all of the rise. Where a curve turns by more than CORNER, but not much
+    more than at the next vertices on both sides, the corner itself is a guess: further places are those
+    without such corners. Empty where nothing moves: on circles and lines.
+
+    Parameters
+    ----------
+    corners : vertices that are known to be corners.
 
     >>> from pcmc import Patch
     >>> angle = 2 * np.pi * np.arange(24) / 24
@@ -60,7 +68,7 @@ def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> Floats |
     >>> plate = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 24 + 1] for k in range(24)], [0] * 24,
     ...                 [Patch("plate", 1.0)], fixed=range(1, 25))
     >>> [float(np.abs(np.hypot(*(x[:, :2] / [2, 1]).T) - 1).max().round(5))
-    ...  for x in (smooth_midpoints(plate), doubted_midpoints(plate))]
+    ...  for x in (smooth_midpoints(plate), *doubted_midpoints(plate))]
     [0.00067, 0.00104]
     """
     X, edges = surface.vertices, held_edges(surface)
@@ -72,16 +80,20 @@ def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> Floats |
     share = np.divide(size, total, out=np.full_like(size, 0.5), where=total > 2.0 * size)
     share = two * np.copysign(share, heights[:, 0] - heights[:, 1])
     moves = share[:, None] * apart
-    change, known = np.zeros_like(X), np.zeros(len(X), dtype=bool)  # of s - r from a vertex on, over length²
+    change, both = np.zeros_like(X), np.zeros(len(X), dtype=bool)  # of s - r from a vertex on, over length²
     for end, sign in ((0, 1.0), (1, -1.0)):
         change[edges[two, end]] = sign * apart[two] / square[two, None]
-        known[edges[two, end]] = True
+        both[edges[two, end]] = True
     beside = edges[one, arcs[one].argmax(axis=1)]
     guess = -0.5 * square[one, None] * change[beside]
-    moves[one] = np.where(known[beside, None], guess, -rises[one].sum(axis=1))
-    if np.all((moves**2).sum(axis=1) <= STRAIGHT**2 * square):
-        return None
-    return _middles(X, edges, rises, arcs) + moves
+    moves[one] = np.where(both[beside, None], guess, -rises[one].sum(axis=1))
+    places = _middles(X, edges, rises, arcs)
+    known = np.empty(0, int) if corners is None else corners
+    smooth = np.setdiff1d(_doubtful_corners(X, edges), known)
+    others = np.union1d(np.setdiff1d(held_corners(surface), smooth), known)
+    without = _middles(X, edges, *_arcs_over(X, edges, COARSE, others)) - places
+    without[~np.isin(edges, smooth).any(axis=1)] = 0.0
+    return [places + m for m in (moves, without) if np.any((m**2).sum(axis=1) > STRAIGHT**2 * square)]
 
 
 def onto_held_curves(surface: Surface, corners: Ints | None = None) -> Projection:
@@ -127,7 +139,7 @@ def held_corners(surface: Surface) -> Ints:
     On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
     """
     edges = held_edges(surface)
-    edge, end, _ = _continuations(surface.vertices, edges, CORNER)
+    edge, end, *_ = _continuations(surface.vertices, edges, CORNER)
     return np.setdiff1d(edges, edges[edge, end])
 
 
@@ -144,7 +156,7 @@ def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> t
     curvature κ = 2 |(b - a) × (c - a)| / (ℓ |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ.
     """
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
-    edge, end, beyond = _continuations(X, edges, corner)
+    edge, end, beyond, _ = _continuations(X, edges, corner)
     if corners is not None:
         smooth = ~np.isin(edges[edge, end], corners)
         edge, end, beyond = edge[smooth], end[smooth], beyond[smooth]
@@ -162,13 +174,23 @@ def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> t
     return rises, arcs
 
 
+def _doubtful_corners(X: Floats, edges: Ints) -> Ints:
+    """Vertices (k,) that are guessed to be corners, but may be on a smooth curve of long edges (e,2)."""
+    edge, end, _, turn = _continuations(X, edges, COARSE)
+    turns, vertex = np.zeros((len(edges), 2)), edges[edge, end]
+    turns[edge, end] = turn
+    beside = np.full(len(X), np.inf)
+    np.minimum.at(beside, vertex, turns[edge, 1 - end])
+    return np.unique(vertex[(turn > CORNER) & (turn <= SHARPER * beside[vertex])])
+
+
 def _middles(X: Floats, edges: Ints, rises: Floats, arcs: Bools) -> Floats:
     """(e,3) half way between the middles of the arcs over edges (e,2)."""
     return np.asarray(X[edges].mean(axis=1) + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None])
 
 
-def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints]:
-    """Edges (c,) that go on beyond one of their ends, which end, and the next vertex of the curve there."""
+def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints, Floats]:
+    """Edges (c,) that go on beyond an end, which end, the curve's next vertex there, its turn in degrees."""
     vertex, other = edges.ravel(), edges[:, ::-1].ravel()
     order = np.argsort(vertex, kind="stable")
     vertex, other = vertex[order], other[order]
@@ -185,4 +207,5 @@ def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, I
             best[one[better]], partner[one[better]] = cosine[better], two[better]
     going_on = np.flatnonzero(partner >= 0)
     going_on = going_on[partner[partner[going_on]] == going_on]
-    return order[going_on] // 2, order[going_on] % 2, other[partner[going_on]]
+    turn = np.degrees(np.arccos(np.minimum(best[going_on], 1.0)))
+    return order[going_on] // 2, order[going_on] % 2, other[partner[going_on]], turn

@@ -48,6 +48,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         add("picture", [(Path(output.picture), partial(painting, outcome.shown.surface))])
     if not output.documents:
         return [job for _, job in made]
+    about = outcome.units, output.sheet, outcome.name, outcome.mark
     if output.report is not None and outcome.wants_mesh_check():
         outcome.check_mesh(progress)
     progress("drawing, sorting panels, modelling")
@@ -60,7 +61,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         if output.net_size is not None:
             progress("laying out panels")
             net = outcome.panel_net(output.net_size, output.net_pattern, output.net_direction, anyway)
-            add("net of panels", net_files(net, output.net, outcome.units, output.sheet, outcome.name))
+            add("net of panels", net_files(net, output.net, *about))
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
             add("structural model", [model_job(Path(output.structure), model)])
@@ -70,7 +71,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         if project.pattern is not None and (output.pattern or output.report):
             progress("cutting strips")
             pattern = outcome.cutting_pattern(project.pattern, anyway)
-            jobs = pattern_files(pattern, output.pattern, outcome.units, output.sheet, outcome.name)
+            jobs = pattern_files(pattern, output.pattern, *about)
             add("cutting pattern", jobs)
         if output.report is not None:
             listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")

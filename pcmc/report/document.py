@@ -14,9 +14,9 @@ import pandas as pd
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate, quantities
-from ..certificate.certificate import certified, warning_mark
+from ..certificate.certificate import certified
 from ..certificate.quantities import Figure
-from ..drawings.sheet import register_fonts
+from ..drawings.sheet import MISSED, register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png
@@ -77,9 +77,9 @@ class RoofReport:
         from .pages import pdf  # needs reportlab
 
         title = f"Report on the roof {self.name}" if self.name else "Report on a roof"
-        mark = warning_mark(self.certificate)
+        mark = self.certificate.mark
         if not mark and self.targets is not None and not self.targets["met"].all():
-            mark = "TARGETS NOT MET"
+            mark = MISSED
         foot = ", ".join(filter(None, (f"pcmc {version('pcmc-surfaces')}", self.date)))
         return pdf(list(self._blocks()), title, foot, mark)
 

@@ -12,9 +12,11 @@ from pcmc import MeshVerdict, Patch, Plane, Room, Surface, certify, check_mesh, 
 from pcmc.accuracy.adaptive import AccuracyStatus
 from pcmc.accuracy.extrapolation import extrapolate
 from pcmc.accuracy.quantities import readings
+from pcmc.meshing.held_curves import held_corners
 from studies.coverage import forms as coverage_forms
 from studies.coverage import weights as coverage_weights
 from studies.coverage.bars import STUDY
+from studies.coverage.meshes import disc, one_patch
 from studies.folder import Folder
 from studies.study import perform
 
@@ -53,6 +55,36 @@ def test_curves_beside_corners_are_in_the_bars(name):
     row = check.row("area", "film")
     assert row.limit_error <= 10.0 * abs(row.limit - case.exact["area", "film"])
     assert check.curve_doubts["area", "film"] > 0.5 * row.limit_error
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_curve_of_few_edges_may_have_no_corners(seed):
+    """A flat film in the wire r = 1 + 0.15 cos 3θ. At some of its 14 vertices it turns by more than 40°.
+
+    These were corners without a doubt, and the bars up to three times too small; those of limits 50 times.
+    """
+    plan, faces, rim = disc(0.45, seed)
+    plan *= 1.0 + 0.15 * np.cos(3.0 * np.arctan2(plan[:, 1], plan[:, 0]))[:, None]
+    film = one_patch(np.pad(plan, ((0, 0), (0, 1))), faces, Patch("film", 1.0, 0.0), rim)
+    assert len(held_corners(film)) >= 4
+    row, exact = check_mesh(solve(film)).row("area", "film"), np.pi * (1.0 + 0.5 * 0.15**2)
+    assert abs(row.value - exact) <= row.error
+    assert abs(row.limit - exact) <= row.limit_error
+
+
+@pytest.mark.parametrize("sides", [5, 6, 8])
+def test_corners_between_straight_lines_or_that_are_named_are_not_doubted(sides):
+    """Each side has two edges; or one, and its ends are named."""
+    angle = np.arange(sides) * 2.0 * np.pi / sides
+    plan = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    middles = 0.5 * (plan + np.roll(plan, -1, axis=0))
+    rim = np.stack([plan, middles], axis=1).reshape(-1, 3)
+    for line, corners in ((rim, ()), (plan, range(1, sides + 1))):
+        n = len(line)
+        fan = [[0, k + 1, (k + 1) % n + 1] for k in range(n)]
+        top = np.concatenate([[[0.0, 0.0, 0.3]], line])
+        roof = Surface(top, fan, [0] * n, [Patch("roof", 1.0)], fixed=range(1, n + 1))
+        assert not check_mesh(solve(roof), 2, corners=corners).curve_doubts
 
 
 def test_an_accuracy_is_not_reached_beyond_what_is_known_of_the_curves():

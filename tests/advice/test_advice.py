@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
-from nightly import night_but
+from nightly import at_night, night_but
 
 from pcmc import cli
 from pcmc.advice.advice import changes
@@ -210,3 +210,32 @@ def test_a_slipping_end_names_its_wall_and_the_key():
     assert text.endswith(
         "only the mesh holds it there; hold the bottom of 'chancel' (in a plan, bottom = \"held\")"
     )
+
+
+ANGLE = "[plan]\noutline = [[0, 0], [14, 0], [14, 9], [8, 9], [8, 14], [0, 14]]\n"
+SLANTING = f"{ANGLE}edge_length = 0.7\n[[plan.dividers]]\ncurve = [[0, 5], [8, 9]]\n"
+FLUSH = f"{ANGLE}edge_length = 0.8\n[[plan.dividers]]\ncurve = [[0, 9], [8, 9]]\n"
+WINGS = "[plan.patches]\nlow = {rise = 2.2, at = [10, 3]}\nhigh = {rise = 2.5, at = [3, 11]}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (SLANTING, "upright = true  (now false)"),
+        *at_night((FLUSH, 'wall = 5.2  (now "balanced")')),
+    ],
+)
+def test_a_roof_that_finer_meshes_lose_gets_a_wall_with_which_they_hold_it(tmp_path, text, line, capsys):
+    path = tmp_path / "roof.toml"
+    path.write_text(text + WINGS)
+    cli.main(["solve", str(path), "--no-cache"])
+    _, held, after = capsys.readouterr().out.partition("held by the mesh: ")
+    assert held
+    head, *lines = after[after.index("type in") :].splitlines()
+    assert head == "type in roof.toml, which was tried and persists:"
+    assert lines == [f"  [[plan.dividers]] number 1 ('wall 1'): {line}"]
+    path.write_text(typed(text + WINGS, [lines[0].strip()]))
+    assert cli.main(["solve", str(path), "--no-cache"]) == cli.OK
+    printed = capsys.readouterr().out
+    assert "persists: finer meshes have the same surface" in printed
+    assert "type in" not in printed

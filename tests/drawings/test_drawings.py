@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from refusals import refused
+from shapes import bubbles
 
 import pcmc
-from generators import hypar_roof, two_squares
+from generators import hypar_roof, spherical_cap, two_squares
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.drawings import drawing_set
+from pcmc.drawings import drawing_set, dxf
 from pcmc.drawings.sheet import box, column
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan
@@ -86,10 +87,21 @@ def test_a_surface_that_is_not_certified_is_refused_or_every_sheet_is_marked():
     with refused(SurfaceError, what="surface"):
         drawing_set(start, "m")
     drawings = drawing_set(start, "cm", tolerance=0.1, panel_sheets=True, sheet="A3", anyway=True)
-    for sheet in drawings.sheets:
-        assert [text.text for text in sheet.texts if text.layer == "PCMC-MARK"] == [
-            "NOT CERTIFIED: not converged"
-        ]
+    assert marks_of(drawings) == {"NOT CERTIFIED: not converged"}
+
+
+def marks_of(drawings):
+    """The marks in the model and on the sheets, each with one."""
+    doc = dxf.document(drawings)
+    found = [space.query("TEXT[layer=='PCMC-MARK']") for space in doc.layouts]
+    assert [len(marks) for marks in found] == [1] * (len(drawings.sheets) + 1)
+    return {mark.dxf.text for marks in found for mark in marks}
+
+
+def test_a_roof_that_cuts_itself_and_one_that_misses_its_targets_are_marked(squares):
+    near = bubbles(0.9 * 2.0 * spherical_cap(0.25).vertices[:, 0].max())
+    assert marks_of(drawing_set(near, "m")) == {"NOT TO BE BUILT: it cuts itself"}
+    assert marks_of(drawing_set(squares, "m", mark="TARGETS NOT MET")) == {"TARGETS NOT MET"}
 
 
 def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, drawings):

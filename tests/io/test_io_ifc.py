@@ -15,6 +15,7 @@ from refusals import refused
 from tents import tent
 
 import pcmc
+from pcmc import cli
 from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
 from pcmc.base.units import FORCES, LENGTHS, Units
 from pcmc.forces.functional import patch_areas
@@ -175,6 +176,19 @@ def test_a_result_brings_its_certificate(tmp_path):
 
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "ft": 0.3048, "in": 0.0254}
+
+
+@pytest.mark.parametrize("again", [False, True], ids=["written", "converted"])
+def test_a_roof_that_is_not_certified_is_named_so(tmp_path, again):
+    start = tent()
+    pcmc.write(tmp_path / "a.pcmc", start, certificate=pcmc.certify(start))
+    if again:
+        assert cli.main(["convert", str(tmp_path / "a.pcmc"), str(tmp_path / "a.ifc")]) == 0
+    else:
+        pcmc.write(tmp_path / "a.ifc", start, certificate=pcmc.certify(start))
+    _model, roof, _parts = roof_of(tmp_path / "a.ifc")
+    assert roof.Name == "Roof, NOT CERTIFIED: no equilibrium"
+    assert get_pset(roof, "Pcmc_Certificate")["Mark"] == "NOT CERTIFIED: no equilibrium"
 
 
 @pytest.mark.parametrize("length", LENGTHS)

@@ -1,0 +1,40 @@
+"""What to type where finer meshes do not hold a roof: walls that stay upright, or stronger ones.
+
+Near its end on a straight outline a junction lies down along one of its sheets, unless its wall holds it in
+a plane or down on its bottom: weak walls have shapes on coarse meshes that no smooth surface has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from ..plan import Plan
+from ..surface import Surface
+from ..surface.pieces import two_digits
+from .advice import changes, with_dividers
+
+STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
+
+
+def firmer_walls(plan: Plan, surface: Surface, file: str, persists: Callable[[Plan], bool]) -> list[str]:
+    """What to type so that finer meshes hold the roof, too: a heading, and a line a change.
+
+    Empty if nothing helps of what is tried. ``surface`` is the roof at rest, ``file`` the name of its
+    project, and ``persists`` says whether the roof of another plan comes to rest, as on finer meshes.
+    """
+    for other in _firmer(plan, surface):
+        if persists(other):
+            return [f"type in {file}, which was tried and persists:", *changes(plan, other)]
+    return []
+
+
+def _firmer(plan: Plan, surface: Surface) -> Iterator[Plan]:
+    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
+
+    near, most = SNAP * plan.edge_length, float(surface.tensions[~surface.auxiliary].max())
+    walls = {divider.name: divider for divider in plan.dividers if divider.wall is not None}
+    straight = {name for name, d in walls.items() if is_straight(d.curve.local(plan.plane), near)}
+    if any(not walls[name].upright for name in straight):
+        yield with_dividers(plan, straight, upright=True)
+    for times in STRONG if walls else ():
+        yield with_dividers(plan, set(walls), wall=two_digits(times * most))
