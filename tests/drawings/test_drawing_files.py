@@ -18,7 +18,7 @@ from shapes import length
 
 import pcmc
 from generators import hypar_roof
-from pcmc.base.errors import FileError
+from pcmc.base.errors import FileError, MissingExtra
 from pcmc.base.units import Units
 from pcmc.drawings import FORMATS, drawing_set
 from pcmc.drawings.sheet import LAYERS, SMALL
@@ -92,6 +92,15 @@ def test_cables_are_whole_curves_with_names_and_masts_are_marked(tmp_path):
     listed = {text.plain_text() for text in doc.layouts.get("Cables").query("TEXT")}
     assert {"force, kN", *names} <= listed
     assert {"S4", "point", "force_z, kN"} <= {t.dxf.text for t in doc.layouts.get("Supports").query("TEXT")}
+
+
+def test_a_pdf_alone_needs_no_ezdxf(tmp_path, monkeypatch, drawings):
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    drawings.write(tmp_path / "roof.pdf")
+    for suffix in (".dxf", ".svg"):
+        with pytest.raises(MissingExtra, match=r"ezdxf is not installed.*pcmc-surfaces\[cad\]"):
+            drawings.write(tmp_path / "roof.pdf", tmp_path / f"roof{suffix}")
+    assert [path.name for path in tmp_path.iterdir()] == ["roof.pdf"]
 
 
 def test_a_name_longer_than_dxf_allows_is_cut(tmp_path, squares):

@@ -329,6 +329,7 @@ class Page {
 
   async save(suffix) {
     find("#export").open = false;
+    find("#export summary").focus(); // the button that had it is gone
     try {
       const body = suffix === ".png"
         ? await this.viewer.picture() : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
