@@ -78,7 +78,8 @@ def perform(
             folder.write_table("measured", pd.DataFrame(rows, columns=["key", "value"]))
         else:
             study.figure(folder)
-            folder.shrink_figures()
+            if not short:  # whose pictures nobody keeps
+                folder.shrink_figures()
         seconds[step] = round(time.perf_counter() - start, 2)
     if "data" in steps:
         write_json(folder.path / "provenance.json", provenance(study, folder, short, seconds))

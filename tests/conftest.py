@@ -3,6 +3,7 @@
 The process that hands out the tests reads this file, too: fixtures import what takes long.
 """
 
+import gc
 import os
 import shutil
 import signal
@@ -40,6 +41,16 @@ def pytest_sessionstart():
             pytest.exit(text, returncode=1)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ["PCMC_CACHE"] = "off"  # no test takes a roof that another run has solved
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Look for no garbage among what stays until the end: a tenth of the time of collecting tests."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.fixture(scope="session")

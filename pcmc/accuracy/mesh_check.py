@@ -200,10 +200,8 @@ def check_mesh(
         finding = other if finding is None or other.verdict is MeshVerdict.CHANGES else finding
     if finding.verdict is MeshVerdict.CHANGES and not finding.advice:
         finer = two_digits(0.5 * float(edge_lengths(first).mean()))
-        advice = (
-            f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh --edge-length {finer:g}"
-        )
-        finding = finding._replace(advice=advice)
+        advice = f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh"
+        finding = finding._replace(advice=f"{advice} --edge-length {finer:g}")
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
     doubts = _curve_doubts(first, known, found, callback) if boundary == "smooth" else {}
     table = _table(found, shape_order(surfaces) if order is None else order, doubts)

@@ -67,8 +67,7 @@ def lost(start: Surface, result: Result) -> Finding:
         what, vertices = "its forces do not come to rest", left.argmax(keepdims=True)
     place, load = start.vertices[vertices].mean(axis=0), overload(surface)
     reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
-    reason += f" near {point_text(place, start.size)}" + ("" if load is None else f"; {load}")
-    return _at(MeshVerdict.HELD_BY_MESH, start, reason, place)
+    return _at(MeshVerdict.HELD_BY_MESH, start, reason, place, "" if load is None else f"; {load}")
 
 
 def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
@@ -80,7 +79,6 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             becomes = "stable" if certificate.index == 0 else f"a saddle of index {certificate.index}"
             was = "stable" if first.index == 0 else f"of index {first.index}"
             reason = f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest"
-            reason += f" near {point_text(place, surface.size)}"
             return _at(MeshVerdict.CHANGES, surface, reason, place)
     size = max(float(np.ptp(surfaces[0].plane.height(surfaces[0].vertices))), FLAT * surfaces[0].size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
@@ -89,15 +87,13 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             return contact
         far, place = float(move.max()), surface.vertices[int(move.argmax())]
         if far > FAR * size:
-            reason = f"on {fine.m} triangles it is another shape, {far:.3g} away near"
-            reason += f" {point_text(place, surface.size)}"
+            reason = f"on {fine.m} triangles it is another shape, {far:.3g} away"
             return _at(MeshVerdict.CHANGES, surface, reason, place)
     if _order(surfaces, moves) < 0.0:
         before, last = (_mean(move) for move in moves[-2:])
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
         moved = f"by {before:.2g}, then {last:.2g} in the mean"
-        reason = f"each finer surface is farther from the last one ({moved}), most near"
-        reason += f" {point_text(place, surfaces[-1].size)}"
+        reason = f"each finer surface is farther from the last one ({moved}), most"
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
     return _stability(surfaces, certificates)
 
@@ -148,8 +144,7 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     if lowest[-1] + FURTHER * step >= 0.0:
         return Finding(MeshVerdict.PERSISTS, reason)
     place = _where_softest(finest, certificates[-1])
-    reason += f": it would be a saddle within {FURTHER} more refinements, by a motion near"
-    reason += f" {point_text(place, finest.size)}"
+    reason += f": it would be a saddle within {FURTHER} more refinements, by a motion"
     return _at(MeshVerdict.HELD_BY_MESH, finest, reason, place)
 
 
@@ -184,10 +179,11 @@ def _resting_lengths(surface: Surface) -> Floats:
     return np.asarray(np.bincount(walls.wall_below, lengths, len(surface.patches)), dtype=float)
 
 
-def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> Finding:
+def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats, more: str = "") -> Finding:
     """A finding about a place, with advice where it is near a junction that ends over a wall that slides."""
     X, sliding = surface.vertices, standing_part(surface).walls.sliding
     nearest, advice, ending = np.inf, "", ""
+    reason += f" near {point_text(place, surface.size)}{more}"
     for curve in surface.topology.junctions:
         ends = [end for end, _ in curve.ends if surface.fixed[end]]
         if not ends or not sliding[list(curve.sheets)].any():

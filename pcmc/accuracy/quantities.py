@@ -120,9 +120,8 @@ def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[Ed
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
     forces = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
-    for curve, name, at, force, most in zip(
-        curves, names, middles, forces, table["per_length_max"].tolist(), strict=True
-    ):
+    largest = table["per_length_max"].tolist()
+    for curve, name, at, force, most in zip(curves, names, middles, forces, largest, strict=True):
         own = name if names.count(name) == 1 else f"{name} near {point_text(at, surface.size)}"
         yield curve, own, force, most
 

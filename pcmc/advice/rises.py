@@ -107,10 +107,9 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     targets, vary = [], []
     for rise in rises:
         if rise.kind != "apex" and np.ptp(heights) > LEVEL * plan.outline.length:
-            text = (
-                f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead"
-            )
-            raise OptionError(f"{text}, the greatest height over the plane", what=rise.kind, where=rise.patch)
+            text = f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex"
+            text += " instead, the greatest height over the plane"
+            raise OptionError(text, what=rise.kind, where=rise.patch)
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
         names: str | list[str] = rise.patch or [
@@ -118,9 +117,8 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         ]
         if not names:
             text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
-            raise OptionError(
-                f"{text} pressure = ..., or tension = ... instead of {rise.kind}", what=rise.kind
-            )
+            text += f" pressure = ..., or tension = ... instead of {rise.kind}"
+            raise OptionError(text, what=rise.kind)
         plan = _retensioned(plan, rise.patch, least, height - level)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
@@ -208,13 +206,10 @@ def point_masts(plan: Plan) -> list[Mast]:
     rim = PlanLine("outline", Kind.OUTLINE, plan.outline.local(plan.plane)).shape
     in_mirror = np.zeros(len(points), dtype=bool)
     for mirror in mirrors:  # there the roof goes on
-        rim, in_mirror = (
-            rim.difference(mirror.shape.buffer(snap)),
-            in_mirror | (mirror.nearest(points[:, :2])[1] <= snap),
-        )
-    away = np.min(
-        [shapely.distance(rim, places), *(line.nearest(points[:, :2])[1] for line in lines)], axis=0
-    )
+        rim = rim.difference(mirror.shape.buffer(snap))
+        in_mirror |= mirror.nearest(points[:, :2])[1] <= snap
+    others = [line.nearest(points[:, :2])[1] for line in lines]
+    away = np.min([shapely.distance(rim, places), *others], axis=0)
     inside = away > snap
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
@@ -255,9 +250,8 @@ def mast_note(plan: Plan) -> str:
     if not masts:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
-    change = (
-        f"hold it on a ring, in [[plan.holes]], instead: {ring_lines(masts[:1], SHARES[-1], drawn=False)[2]}"
-    )
+    curve = ring_lines(masts[:1], SHARES[-1], drawn=False)[2]
+    change = f"hold it on a ring, in [[plan.holes]], instead: {curve}"
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
         radius = f"of radius {cut[0].radius(SHARES[1]):g} around {cut[0].text}"
         change = f"hold it on a ring instead: lead the outline around it on an arc {radius},"

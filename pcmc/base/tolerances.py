@@ -3,7 +3,6 @@
 Lengths are relative to the size of the surface or curve, and forces to those of its triangles, so that no
 unit of a project matters. ``tests/base/test_tolerances.py`` varies each of them: verdict, status and index
 of small surfaces stay. Numbers that steer how fast or where a method searches stay with the method.
-Compiled loops keep the value that they were compiled with: delete their caches after a change.
 """
 
 import numpy as np

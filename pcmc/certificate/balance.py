@@ -260,9 +260,7 @@ def _scaled(surface: Surface) -> list[tuple[int, bool]]:
     """
     parts, used, given = surface.topology.components, surface.faces[:, 0], surface.given_supports
     pressed = np.unique(parts[used[surface.net_pressures[surface.patch_of_face] != 0.0]])
-    held = given.fixed.copy()
-    for _, along in given.on_line:
-        held |= along
+    held = given.fixed_and_sliding()[0]
     held[surface.images] = True  # it goes on: scaled, it would no longer meet itself
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True

@@ -50,9 +50,8 @@ def crossing_table(surface: Surface) -> pd.DataFrame:
         height = plane.height(surface.vertices)[surface.faces] if plane.mirror else np.zeros((surface.m, 3))
         side = np.sign(height.sum())  # that of most
         through = (side * height < -CLEAR * surface.size).any(axis=1)
-        found += [
-            (names[k], str(plane), np.flatnonzero(through & (patch == k))) for k in np.unique(patch[through])
-        ]
+        for k in np.unique(patch[through]):
+            found.append((names[k], str(plane), np.flatnonzero(through & (patch == k))))
     for one, other, faces in found:
         at = middle[faces]
         rows.append([one, other, *at[np.linalg.norm(at - at.mean(axis=0), axis=1).argmin()]])
@@ -76,9 +75,8 @@ def _boxes(corners: Floats) -> Floats:
     for sign, half in ((1.0, slice(0, 3)), (-1.0, slice(3, 6))):
         boxes[leaves : leaves + len(first), half] = np.minimum.reduceat(sign * corners, first)
     while leaves > 1:
-        boxes[leaves // 2 : leaves] = np.minimum(
-            boxes[leaves : 2 * leaves : 2], boxes[leaves + 1 : 2 * leaves : 2]
-        )
+        pairs = boxes[leaves : 2 * leaves]
+        boxes[leaves // 2 : leaves] = np.minimum(pairs[::2], pairs[1::2])
         leaves //= 2
     return boxes * [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
 

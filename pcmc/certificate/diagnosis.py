@@ -188,9 +188,8 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
 
 def vanished_films(surface: Surface) -> list[str]:
     """The films between two junctions that have vanished, by name: narrow, and small beside the others."""
-    area = np.bincount(
-        surface.patch_of_face, face_areas(surface.vertices[surface.faces]), len(surface.patches)
-    )
+    areas = face_areas(surface.vertices[surface.faces])
+    area = np.bincount(surface.patch_of_face, areas, len(surface.patches))
     names = []
     for patch in np.flatnonzero(area < NARROW * area.max()):
         film = film_of(surface, int(patch))

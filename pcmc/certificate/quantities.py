@@ -13,59 +13,42 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base import validate
-from ..base.errors import OptionError, unknown
+from ..base.errors import OptionError
 from ..forces.cables import pull_along
 from ..forces.rooms import refuse_varied_pressure
 from ..surface import Surface, values
+from ..surface.geometry import segment_lengths
 from ..surface.values import part_index, part_values
 from .cables import chord
 from .certificate import Certificate
 
 KINDS = ("tension", "pressure", "volume", "weight", "snow", "cable", "cable_weight")
 FACTOR = 20.0  # a parameter without bounds may change by this factor, up or down
-
-
-class Quantity(NamedTuple):
-    """A quantity of a roof or of a part of it: one word, one meaning, wherever it appears."""
-
-    name: str
-    dimension: str  # its unit, as a name of ``Units``
-    owners: tuple[str, ...]  # what it may belong to; "roof" is all patches that are no walls together
-    formula: str
-
-
-_ROWS = (
-    Quantity("apex", "length", ("roof", "patch"), "greatest height over Π"),
-    Quantity(
-        "height",
-        "length",
-        ("point", "patch"),
-        "height over Π at a point; of a patch the greatest, below Π the least",
-    ),
-    Quantity("rise", "length", ("roof",), "apex less the height of the lowest support"),
-    Quantity("area", "area", ("roof", "patch", "wall"), "Σ A_T"),
-    Quantity("volume", "volume", ("roof", "patch", "room"), "∫ z ν·n dA, the volume between patch and Π"),
-    Quantity("energy", "energy", ("roof",), "E = Σ α A - Σ p V, with cables and weights"),
-    Quantity("tension", "tension", ("patch", "wall"), "α"),
-    Quantity("pressure", "pressure", ("patch", "room"), "p of the air, without snow"),
-    Quantity("snow", "pressure", ("patch",), "s, per area of the plan"),
-    Quantity("net pressure", "pressure", ("patch",), "p - s"),
-    Quantity("weight", "pressure", ("patch",), "w, per area of the patch"),
-    Quantity("curvature", "curvature", ("patch",), "(p - s) / (2 α)"),
-    Quantity("lean", "angle", ("wall",), "largest angle between the wall and Π's normal"),
-    Quantity("force", "force", ("cable",), "τ, the tension of the cable"),
-    Quantity("length", "length", ("cable",), "Σ of its edges"),
-    Quantity("sag", "length", ("cable",), "largest distance from the chord between its ends"),
-    Quantity("load", "force", ("roof",), "pressure, snow and weight along Π's normal"),
-    Quantity("reaction", "force", ("roof", "boundary"), "force of the supports along Π's normal"),
-    Quantity("thrust", "force", ("boundary",), "force of the supports along Π"),
-    Quantity("reaction per length", "tension", ("roof", "patch", "boundary"), "largest |Σ (α + w z) n|"),
-    Quantity("margin", "times", ("roof",), "factor on a load or tension up to which the roof stays stable"),
-    Quantity("lowest eigenvalue", "eigenvalue", ("roof",), "smallest second variation per unit area"),
-)
-
-QUANTITIES = {quantity.name: quantity for quantity in _ROWS}
-"""Every quantity by its name."""
+QUANTITIES = {
+    "apex": "length",  # greatest height over Π
+    "height": "length",  # height over Π at a point; of a patch the greatest, below Π the least
+    "rise": "length",  # apex less the height of the lowest support
+    "area": "area",  # Σ A_T
+    "volume": "volume",  # ∫ z ν·n dA, the volume between patch and Π
+    "energy": "energy",  # E = Σ α A - Σ p V, with cables and weights
+    "tension": "tension",  # α
+    "pressure": "pressure",  # p of the air, without snow
+    "snow": "pressure",  # s, per area of the plan
+    "net pressure": "pressure",  # p - s
+    "weight": "pressure",  # w, per area of the patch
+    "curvature": "curvature",  # (p - s) / (2 α)
+    "lean": "angle",  # largest angle between the wall and Π's normal
+    "force": "force",  # τ, the tension of the cable
+    "length": "length",  # Σ of its edges
+    "sag": "length",  # largest distance from the chord between its ends
+    "load": "force",  # pressure, snow and weight along Π's normal
+    "reaction": "force",  # force of the supports along Π's normal
+    "thrust": "force",  # force of the supports along Π
+    "reaction per length": "tension",  # largest |Σ (α + w z) n|
+    "margin": "times",  # factor on a load or tension up to which the roof stays stable
+    "lowest eigenvalue": "eigenvalue",  # smallest second variation per unit area
+}
+"""Every quantity of a roof or of a part of it, and its unit as a name of ``Units``: one word, one meaning."""
 
 CHANGED = {kind: values.KINDS[f"{kind}s"].dimension for kind in KINDS if kind not in QUANTITIES}
 """The dimensions of kinds of parameters that are no quantities of a roof."""
@@ -77,11 +60,7 @@ def dimension_of(name: str) -> str:
     >>> dimension_of("apex"), dimension_of("reaction per length"), dimension_of("cable")
     ('length', 'tension', 'force')
     """
-    if name in CHANGED:
-        return CHANGED[name]
-    if name not in QUANTITIES:
-        raise OptionError(unknown("quantity", name, QUANTITIES), what="quantity", found=name)
-    return QUANTITIES[name].dimension
+    return CHANGED.get(name) or QUANTITIES[validate.choice("quantity", name, [*QUANTITIES])]
 
 
 class Figure(NamedTuple):
@@ -134,8 +113,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
     for name, lean in zip(leaning.get("wall", ()), leaning.get("lean", ()), strict=True):
         add(str(name), "wall", {"lean": float(lean)})
     for cable in surface.cables:
-        ends = surface.vertices[cable.edges]
-        length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+        length = float(segment_lengths(surface.vertices, cable.edges).sum())
         pull = float(pull_along(surface, cable, cable.edges.ravel()).max())
         add(cable.name, "cable", {"force": pull, "length": length})
         with suppress(OptionError):  # a closed cable has no sag

@@ -144,9 +144,8 @@ def _along_curve(
     """Lengths, |Σ α n + load| (k,) of a curve's edges; its length, middle, largest force left per length."""
     lengths = curve_lengths(surface, curve)
     pulls = sheet_pulls(surface, curve.pairs) + load
-    for plane, on in (
-        pair for pair in surface.on_planes if pair[0].mirror
-    ):  # its image takes the part across
+    mirrors = [pair for pair in surface.on_planes if pair[0].mirror]
+    for plane, on in mirrors:  # its image takes the part across
         pulls -= np.outer(on[curve.pairs].all(axis=1) * (pulls @ plane.normal), plane.normal)
     sums = np.linalg.norm(pulls, axis=1)
     most = float(np.linalg.norm(left, axis=1).max(initial=0.0)) / (float(lengths.mean()) or 1.0)
@@ -225,6 +224,4 @@ def lean_texts(table: pd.DataFrame, size: float, least: float = 0.05) -> list[st
         return []
     leaning = table[table["lean"] >= least].sort_values("lean", ascending=False)
     rows = leaning[["wall", "lean", *"xyz"]].itertuples(index=False, name=None)
-    return [
-        f"{wall!r} by {lean:.1f}° near {point_text(np.array(place), size)}" for wall, lean, *place in rows
-    ]
+    return [f"{wall!r} by {lean:.1f}° near {point_text(np.array(at), size)}" for wall, lean, *at in rows]

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..base.tolerances import COLLAPSED, NEAR_NEUTRAL, NEUTRAL, NOISE, WEAK
-from ..forces.cables import compressed_cables
-from ..forces.triangles import compressed, effective_tensions
+from ..forces.cables import heavy_cable_pulls
+from ..forces.triangles import heavy_triangle_pulls
 from ..stability.modes import Spectrum
 from ..surface import Surface
 from ..surface.pieces import point_text
@@ -204,10 +204,8 @@ def _hidden_forces(f: Findings) -> str:
 
 
 def _hidden_stability(f: Findings) -> list[object]:
-    hidden = f.spectrum.hidden or (
-        "the second variation is singular to rounding, so its negative eigenvalues cannot be counted"
-    )
-    reason = f"the forces balance (relative residual {f.residual:.1e}), but {hidden}"
+    unknown = "the second variation is singular to rounding, so its negative eigenvalues cannot be counted"
+    reason = f"the forces balance (relative residual {f.residual:.1e}), but {f.spectrum.hidden or unknown}"
     tensions = f.surface.tensions[f.surface.tensions > 0.0]
     factor = tensions.max(initial=0.0) / tensions.min(initial=np.inf)
     return [reason, f"the tensions differ by a factor of {factor:.0e}" if factor > FACTOR else ""]
@@ -216,7 +214,8 @@ def _hidden_stability(f: Findings) -> list[object]:
 def _compressed(f: Findings) -> str:
     """Names a patch or cable whose weight leaves no tension; or empty, as where it grew without bound."""
     surface = f.surface
-    faces, edges = np.flatnonzero(compressed(surface)), np.flatnonzero(compressed_cables(surface))
+    pulls = heavy_triangle_pulls(surface)
+    faces, edges = np.flatnonzero(pulls <= 0.0), np.flatnonzero(heavy_cable_pulls(surface) <= 0.0)
     if not len(faces) + len(edges) or f.evidence is Evidence.INFLATED:
         return ""
     if not len(faces):
@@ -227,13 +226,12 @@ def _compressed(f: Findings) -> str:
             f"cable {name!r} is under compression at {place} ({len(edges)} edges of cables are): its weight"
             " leaves τ + g z ≤ 0; raise its tension, or put Π lower"
         )
-    pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
-    worst = faces[pull.argmin()]
+    worst = pulls.argmin()
     name = surface.patches[surface.patch_of_face[worst]].name
     place = point_text(surface.vertices[surface.faces[worst]].mean(axis=0), surface.size)
     return (
         f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
-        f" {pull.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
+        f" {pulls.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
     )
 
 
@@ -267,8 +265,8 @@ RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], s
     (Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
     (Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > WEAK * f.tolerance, _weak_patch),
-    (Verdict.SADDLE, lambda f: compressed(f.surface).any(), _compressed),
-    (Verdict.SADDLE, lambda f: compressed_cables(f.surface).any(), _compressed),
+    (Verdict.SADDLE, lambda f: (heavy_triangle_pulls(f.surface) <= 0.0).any(), _compressed),
+    (Verdict.SADDLE, lambda f: (heavy_cable_pulls(f.surface) <= 0.0).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
     (Verdict.NEUTRAL, lambda f: f.rigid > 0, lambda f: FREE.format(f.rigid, _at_volumes(f))),

@@ -227,9 +227,8 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
             raise OptionError(message, what=flag, found=text)
         new = {name: amount} if name else dict.fromkeys(names, amount)
         if new.keys() & values[bool(name)].keys():
-            raise OptionError(
-                f"{flag}: {name or 'a bare value'} is given twice; keep one", what=flag, found=text
-            )
+            message = f"{flag}: {name or 'a bare value'} is given twice; keep one"
+            raise OptionError(message, what=flag, found=text)
         values[bool(name)] |= new
     return values[False] | values[True]
 

@@ -10,7 +10,7 @@ from .. import project as projects
 from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
-from . import OK, arguments
+from . import arguments, reports
 from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, count, load_project, option, switch
 from .reports import working
 
@@ -61,10 +61,8 @@ def equilibria_(
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
         roof = what.roof(load_project(file, units), progress, whole)
-        options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check}
-        found = find_equilibria(
-            roof.shown.surface, along or "pressure", callback=progress, span=ends, **options
-        )
+        options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check, "span": ends}
+        found = find_equilibria(roof.shown.surface, along or "pressure", callback=progress, **options)
         jobs: list[Any] = []
         for path in files:
             if path.suffix.lower() in PICTURES:
@@ -77,9 +75,7 @@ def equilibria_(
                     jobs += certified_files(one.surface, one.certificate, [_numbered(path, k)], roof.units)
         written = write_all(jobs, progress)
     print(found.text(roof.units))
-    if written:
-        print(f"written: {', '.join(map(str, written))}")
-    return OK
+    return reports.ended(True, written)
 
 
 def _numbered(path: Path, number: int) -> Path:

@@ -105,10 +105,8 @@ def solve_(
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
     if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
-        text = (
-            f"--folder: {file.name} writes nothing there by itself; name the files, as -o {folder}/roof.obj"
-        )
-        raise OptionError(text, what="--folder", found=str(folder))
+        text = f"--folder: {file.name} writes nothing there by itself; name the files, as"
+        raise OptionError(f"{text} -o {folder}/roof.obj", what="--folder", found=str(folder))
     project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:

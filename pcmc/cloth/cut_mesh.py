@@ -17,7 +17,7 @@ from ..base.tolerances import ON
 from ..meshing.curve_cutting import cut_triangles, refined_round
 from ..meshing.quality import edge_lengths
 from ..surface import Surface
-from ..surface.geometry import angles, bounding_size, segment_lengths
+from ..surface.geometry import angles, bounding_size, lengths_along, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.topology import SIDES, Topology, components, edge_places, topology
 
@@ -145,7 +145,7 @@ class CutMesh:
             solver = library.EdgeFlipGeodesicSolver(self.X[vertex], local.reshape(-1, 3))
             for ends in product(*(np.flatnonzero(vertex == v).tolist() for v in (start, end))):
                 path = np.asarray(solver.find_geodesic_path(*ends))
-                found.append((float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), path, piece))
+                found.append((float(lengths_along(path)[-1]), path, piece))
         _, path, piece = min(found, key=lambda one: one[0])
         sides = self.topology.edges_of(self.pieces.piece == piece)
         edges = self.topology.edges[sides]

@@ -14,7 +14,7 @@ from ..base.libraries import load_library
 from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
-from ..surface.geometry import face_areas
+from ..surface.geometry import face_areas, lengths_along
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .cut_mesh import CutMesh, cut_mesh
@@ -88,7 +88,7 @@ def cutting_pattern_of(
     widths = [] if options.net_width is None else [options.net_width]
     counts = [options.of_patch("strips", patch.name) or np.inf for patch in surface.patches]
     widths += [float(width) for width in area**0.5 / counts if width > 0.0]
-    if drawn := sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in options.lines):
+    if drawn := sum(float(lengths_along(line)[-1]) for line in options.lines):
         widths.append(float(area.sum()) / drawn)
     base = with_lines(cut_mesh(surface, min(widths, default=np.inf) / ACROSS), options.lines, surface.plane)
     if not len(base.F):

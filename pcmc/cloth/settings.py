@@ -68,10 +68,8 @@ class CuttingOptions:
         if self.width is not None and self.strips is not None:
             raise OptionError("strips: the width gives their number; leave out one of both", what="strips")
         if self.width is None and self.strips is None and not len(self.seams):
-            text = (
-                "a cutting pattern needs the width of the cloth, a number of strips, or seams; give --width"
-            )
-            raise OptionError(f"{text} or the key width of [pattern]", what="width")
+            text = "a cutting pattern needs the width of the cloth, a number of strips, or seams; give"
+            raise OptionError(f"{text} --width or the key width of [pattern]", what="width")
         if self.compensation is not None and self.stiffness is not None:
             text = "stiffness: the compensation is given; leave out one of both"
             raise OptionError(text, what="stiffness")

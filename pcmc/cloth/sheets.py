@@ -20,7 +20,7 @@ from ..drawings.drawing_set import CSV, document_files
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import SheetLine, Text, add_frames, length_decimals, table_sheets
 from ..drawings.views import DrawnView, placed
-from ..surface.geometry import cross_2d, unit_vectors
+from ..surface.geometry import cross_2d, lengths_along, unit_vectors
 from .strips import CuttingPattern, Seam, Side, Strip
 
 SUFFIXES, TABLES = (*DRAWINGS, CSV), ("", "seams")  # tables of strips and of seams
@@ -140,9 +140,8 @@ def strip_lines(
             count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
             if count > MOST_NOTCHES:
                 text = f"notches: marks at distances of {step:g} would be {count} on seam {seam.number}, more"
-                raise OptionError(
-                    f"{text} than {MOST_NOTCHES}; give a larger one", what="notches", found=step
-                )
+                text += f" than {MOST_NOTCHES}; give a larger one"
+                raise OptionError(text, what="notches", found=step)
             length = beyond or 0.02 * strip.width
             for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
                 at, inward = _along(seam, side, strip, place)
@@ -188,7 +187,7 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
 
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:
     """The point (2,) of a strip at a length along a seam on the roof, and the unit vector into the strip."""
-    total = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(seam.points, axis=0), axis=1)))
+    total = lengths_along(seam.points)
     k = min(int(np.searchsorted(total, place, side="right")) - 1, len(total) - 2)
     a, b = strip.cut[side.edges[k]]
     share, (x, y) = (place - total[k]) / (total[k + 1] - total[k]), (b - a) / np.linalg.norm(b - a)

@@ -15,7 +15,7 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.tables import head_text
 from ..surface import Surface
-from ..surface.geometry import cross_2d, face_areas, segment_lengths
+from ..surface.geometry import cross_2d, face_areas, lengths_along, segment_lengths
 from .settings import CuttingOptions
 
 
@@ -99,7 +99,7 @@ class Seam:
     @property
     def length(self) -> float:
         """On the roof, length."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return float(lengths_along(self.points)[-1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,9 +42,7 @@ class DrawingSet:
     certificate: Certificate  # of the surface
     curves: Sequence[SheetLine]  # ridges, rims, wall lines, cables and members
     sections: Sequence[SheetLine]  # in which each plane cuts the roof
-    points: (
-        pd.DataFrame
-    )  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall, mirror or cable)
+    points: pd.DataFrame  # of setting out: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall, …)
     marks: Sequence[tuple[str, Floats]]  # name and place (3,) of each mast or other support of one point
     schedule: Panels | None  # the panels, if a tolerance was given
     flat: Sheet | None  # all panels at true size, mm, where sheets of panels are asked for
@@ -251,11 +249,8 @@ def _levels(
     """Each height with the lines of its section."""
     low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
     given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
-    chosen = [validate.number("heights", height) for height in given]
-    cuts = [
-        (h, views.cut_lines(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]), without))
-        for h in chosen
-    ]
+    chosen, up = [validate.number("heights", height) for height in given], np.array([0.0, 0.0, 1.0])
+    cuts = [(h, views.cut_lines(surface, h * up, up, without)) for h in chosen]
     for h, found in cuts:
         if not found and heights is not None:
             text = f"heights: z = {h:g} misses the roof, which lies between {low:g} and {high:g}"
@@ -280,9 +275,8 @@ def _profiles(
         if not (np.isfinite(ends).all() and length > 0.0):
             validate.refuse("lines", line, "two different points (x, y)")
         along /= length
-        found = views.cut_lines(
-            surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]), without
-        )
+        normal = np.array([-along[1], along[0], 0.0])
+        found = views.cut_lines(surface, np.append(ends[0], 0.0), normal, without)
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
         if not found and given:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)

@@ -162,9 +162,7 @@ class Sheet:
     lines: list[SheetLine] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
     dimensions: list[Dimension] = field(default_factory=list)
-    places: list[tuple[float, Floats]] = field(
-        default_factory=list
-    )  # views: point x is at factor · x + shift
+    places: list[tuple[float, Floats]] = field(default_factory=list)  # of views: x is at factor · x + shift
 
     @property
     def size(self) -> tuple[float, float]:

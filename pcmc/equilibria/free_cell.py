@@ -172,10 +172,8 @@ def _strains(free: str, volume_kept: bool) -> Floats:
             basis.append(np.zeros((3, 3)))
             basis[-1][[i, j], [j, i]] = 1.0 / root
     if not basis:
-        text = (
-            "free_cell: a cell of one size and one volume has nothing free; give pressure=, or free='lengths'"
-        )
-        raise OptionError(text, what="free", found=free, expected="lengths")
+        text = "free_cell: a cell of one size and one volume has nothing free; give pressure=, or"
+        raise OptionError(f"{text} free='lengths'", what="free", found=free, expected="lengths")
     return np.array(basis)
 
 
@@ -211,8 +209,6 @@ def _expect_free(surface: Surface, what: str) -> None:
     other = np.abs(pressures - of_rooms)
     if other.max() > SAME_PRESSURE * max(np.abs(pressures).max(), surface.tensions.max() / surface.size):
         name = surface.patches[int(other.argmax())].name
-        text = (
-            f"{what}: patch {name!r} has a given pressure, whose volume in a cell is known up to a constant"
-        )
-        text += " only; prescribe the volume with a room, or give it pressure 0"
+        text = f"{what}: patch {name!r} has a given pressure, whose volume in a cell is known up to a"
+        text += " constant only; prescribe the volume with a room, or give it pressure 0"
         raise SurfaceError(text, what="patches", where=name)

@@ -55,13 +55,11 @@ class Shape:
         farthest = max(self.distances(its).max(), other.distances(mine).max())
         return bool(farthest <= SAME * max(self.edge, other.edge))
 
-    def from_here(self, other: Shape) -> float:
-        """The root mean square distance of this surface's points from the other, by area."""
-        return float(np.sqrt(self.area @ other.distances(self.X) ** 2 / self.area.sum()))
-
     def distance(self, other: Shape) -> float:
-        """The same both ways."""
-        return float(np.hypot(self.from_here(other), other.from_here(self)) / np.sqrt(2.0))
+        """The root mean square distance of each surface's points from the other, by area, both ways."""
+        pairs = ((self, other), (other, self))
+        squares = [one.area @ its.distances(one.X) ** 2 / one.area.sum() for one, its in pairs]
+        return float(np.sqrt(np.mean(squares)))
 
 
 def shape_distance(one: Surface, other: Surface) -> float:

@@ -170,12 +170,10 @@ class PageHandler(BaseHTTPRequestHandler):
                 name, body = explorer.export(session, suffix)
                 self._send(body, BYTES, f"attachment; filename*=UTF-8''{quote(name, safe='')}")
             case ["POST", "api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
-                asked, turn = (
-                    json_object(content),
-                    re.fullmatch(r"(\w{1,20}) (\d{1,9})", self.headers.get("X-Turn", "")),
-                )
+                turn = re.fullmatch(r"(\w{1,20}) (\d{1,9})", self.headers.get("X-Turn", ""))
                 place = None if turn is None else (turn[1], int(turn[2]))
-                self._send(explorer.answer("".join(session), act, asked, self._gone, place), BYTES)
+                given = "".join(session), act, json_object(content)
+                self._send(explorer.answer(*given, self._gone, place), BYTES)
             case _:
                 raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
 

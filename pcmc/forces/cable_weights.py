@@ -35,10 +35,10 @@ def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
     """
     nodes, _, weight = surface.cable_sides
     if weight.any():
-        yield moments(surface, X, nodes, weight)
+        yield height_integrals(surface, X, nodes, weight)
 
 
-def moments(surface: Surface, X: Floats, nodes: Ints, weight: Floats) -> Elements:
+def height_integrals(surface: Surface, X: Floats, nodes: Ints, weight: Floats) -> Elements:
     """Σ g ∫ z ds over edges of nodes (c,p+1) and weights (c,) at X (n,3)."""
     n, (N, slope, dt) = np.array(surface.plane.normal), side_shapes(nodes.shape[1] - 1)
     t, speed = along(X, nodes)

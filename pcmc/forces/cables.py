@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
 from ..surface import Surface
 from ..surface.lagrange import side_shapes
@@ -93,14 +93,9 @@ def pull_along(surface: Surface, cable: Cable, vertices: Ints) -> Floats:
     return np.asarray(cable.tension + cable.weight * z)
 
 
-def compressed_cables(surface: Surface) -> Bools:
-    """(c,) edges of cables with a weight where τ + g z̄ ≤ 0."""
-    return (surface.cable_edges.weight != 0.0) & (cable_pulls(surface, surface.vertices) <= 0.0)
-
-
 def heavy_cable_pulls(surface: Surface) -> Floats:
-    """τ + g z̄ of the edges of cables with a weight, force."""
-    return cable_pulls(surface, surface.vertices)[surface.cable_edges.weight != 0.0]
+    """(c,) τ + g z̄ of the edges of cables with a weight, force; infinite for others. ≤ 0 is compression."""
+    return np.where(surface.cable_edges.weight != 0.0, cable_pulls(surface, surface.vertices), np.inf)
 
 
 def squared_cable_forces(surface: Surface, X: Floats) -> Floats:

@@ -98,9 +98,8 @@ def _target_and_scale(surface: Surface) -> tuple[Floats, Floats]:
     target = np.array([p.target_curvature for p in surface.patches])[patch]
     scale, weight, press = target, surface.weights[patch], surface.net_pressures[patch]
     if (heavy := weight != 0.0).any():
-        vector = surface.spread(
-            vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)[0]
-        )
+        vector = vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)[0]
+        vector = surface.spread(vector)
         length = np.linalg.norm(vector, axis=1)
         upright = (vector @ np.array(surface.plane.normal)) / np.where(length > 0.0, length, 1.0)
         pull = surface.tensions[patch] + weight * surface.plane.height(surface.vertices)

@@ -186,5 +186,5 @@ def _cables_by(surface: Surface, rates: Rates, X: Floats, gradient: Floats | Non
     for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):
         each = np.ones(len(cable.edges))
         elements += [cables.lengths(X, cable.edges).times(pull * each)] if pull else []
-        elements += [cable_weights.moments(surface, X, cable.edges, weight * each)] if weight else []
+        elements += [cable_weights.height_integrals(surface, X, cable.edges, weight * each)] if weight else []
     return add_values(elements, gradient)

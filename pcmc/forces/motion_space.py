@@ -186,10 +186,9 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     seen = np.empty((0, 2), dtype=np.int64)
     if surface.periodic:  # along the sides of faces, which do not leave the cell
         place = edge_places(np.stack([np.stack([curve, b], axis=1) for b in beside.T], axis=1), topo.edges)
-        later = topo.edges[place, 1] == curve[:, None]
-        seen, beside = (
-            np.where(later == end, topo.sides[place, 1], topo.sides[place, 0]) for end in (True, False)
-        )
+        later = topo.edges[place, 1] == curve[:, None]  # than the neighbour, in the edge
+        low, high = topo.sides[place].transpose(2, 0, 1)
+        seen, beside = np.where(later, high, low), np.where(later, low, high)
     return VertexClasses(active, faces, patch, topo, kind, curve, beside, seen, idle, level, nodes)
 
 

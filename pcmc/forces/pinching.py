@@ -99,9 +99,8 @@ class StandingPart:
             message = f"order: the junction comes down to the plane at vertex {resting.argmax()}, and only"
             message += " flat triangles have contact; give order=1"
             raise CurvedContactError(message, what="order", found=whole.order, expected=1)
-        if resting.any():
-            expect_no_images(whole, "a junction that comes to rest on the plane")
         if resting.any():  # vertices of the walls left out belong to no face
+            expect_no_images(whole, "a junction that comes to rest on the plane")
             X, held = _put_down(whole, walls, whole.vertices, resting), resting & walls.held
             owner, given = _owners(whole.n, walls, resting), whole.given_supports
             F, left = _standing_faces(whole, walls, resting, owner)
@@ -385,9 +384,8 @@ def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Float
     free = walls.admissible.projectors(meet)
     for _ in range(WEISZFELD):
         M = np.zeros((len(meet), 3, 3))
-        np.add.at(
-            M, number, P / np.maximum(np.linalg.norm(np.cross(d[number], e), axis=1), ON)[:, None, None]
-        )
+        turned = np.linalg.norm(np.cross(d[number], e), axis=1)
+        np.add.at(M, number, P / np.maximum(turned, ON)[:, None, None])
         d = (np.linalg.pinv(free @ M @ free, hermitian=True) @ force[meet, :, None])[:, :, 0]
         d /= np.linalg.norm(d, axis=1)[:, None]
     direction[meet] = d

@@ -7,6 +7,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.tolerances import ONLY_SLIDES
 from ..surface import Circle, Surface
+from ..surface.supports import members
 from .motion_space import MotionSpace, perpendicular
 
 
@@ -18,9 +19,7 @@ def rigid_motions(surface: Surface) -> Floats:
     """
     size = surface.size or 1.0  # 0 where all vertices are at one point
     arm = (surface.vertices - surface.vertices.mean(axis=0)) / size
-    held, free = surface.fixed, np.eye(6)
-    for _, along in surface.on_line:
-        held = held & ~along
+    held, free = surface.fixed & ~members(surface.on_line, surface.n), np.eye(6)
     if surface.periodic or not surface.free.all():
         rows = [_row(arm[held], axis) for axis in np.eye(3)]
         for line, along in surface.on_line:

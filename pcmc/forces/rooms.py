@@ -27,7 +27,7 @@ from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
 from ..surface.pieces import point_text
-from ..surface.supports import apply_supports
+from ..surface.supports import apply_supports, members
 from ..surface.topology import components
 from .functional import energy, patch_volumes, weighted
 
@@ -36,8 +36,8 @@ MOST_FACES = 4000  # of a room, among which the nearest is sought
 CLEAR = 0.3  # of a sixth of the cell: how far the places may be off
 
 
-def room_volumes(surface: Surface) -> Floats:
-    """(r,) the volume enclosed by each room of prescribed volume, length³.
+def room_volumes(surface: Surface, X: Floats | None = None) -> Floats:
+    """(r,) the volume enclosed by each room of prescribed volume, length³, also with vertices at X (n,3).
 
     SurfaceError if the patches of a room leave an edge open that nothing holds.
 
@@ -49,11 +49,13 @@ def room_volumes(surface: Surface) -> Floats:
     True
     """
     expect_surface(surface)
-    return volumes_at(surface, surface.vertices)
+    if not surface.rooms:
+        return np.zeros(0)
+    return surface.room_signs @ patch_volumes(surface, X) + closing_volumes(surface)
 
 
-def room_volume_gradients(surface: Surface) -> Floats:
-    """(r,n,3) ∂V_r/∂X, supports applied, length².
+def room_volume_gradients(surface: Surface, X: Floats | None = None) -> Floats:
+    """(r,n,3) ∂V_r/∂X at X (n,3) or where the surface is, supports applied, length².
 
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
@@ -63,20 +65,8 @@ def room_volume_gradients(surface: Surface) -> Floats:
     [0.0, 0.0, 1.333333333333]
     """
     expect_surface(surface)
-    return volume_gradients_at(surface, surface.vertices)
-
-
-def volumes_at(surface: Surface, X: Floats) -> Floats:
-    """(r,) the volumes of the rooms of a surface with its vertices at X (n,3)."""
-    if not surface.rooms:
-        return np.zeros(0)
-    return surface.room_signs @ patch_volumes(surface, X) + closing_volumes(surface)
-
-
-def volume_gradients_at(surface: Surface, X: Floats) -> Floats:
-    """(r,n,3) the gradients of the rooms' volumes at X (n,3), supports applied."""
     gradients = [apply_supports(surface, weighted(surface, 0.0, -s, X)[2], X) for s in surface.room_signs]
-    return np.array(gradients).reshape(len(surface.rooms), *X.shape)
+    return np.array(gradients).reshape(len(surface.rooms), surface.n, 3)
 
 
 def prescribed_volumes(surface: Surface) -> Floats:
@@ -218,10 +208,8 @@ def _whole_sixths(surface: Surface) -> Floats:
     unclear = np.flatnonzero(np.abs(found - np.round(found)) > CLEAR)
     if len(unclear):
         name = surface.rooms[unclear[0]].name
-        message = (
-            f"room {name!r}: the mesh is too coarse to tell which side of its patches lies in it; refine it"
-        )
-        raise SurfaceError(f"{message}, and check their signs", what="rooms", where=name)
+        text = f"room {name!r}: the mesh is too coarse to tell which side of its patches lies in it; refine"
+        raise SurfaceError(f"{text} it, and check their signs", what="rooms", where=name)
     return np.asarray(np.round(found) * sixth)
 
 
@@ -284,9 +272,7 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
 
 def _closed_by_support(surface: Surface, edges: Ints, lying: Bools) -> Bools:
     """(e,) edges that something closes: on Π or another sliding plane, fixed, or along one straight line."""
-    fixed = surface.fixed.copy()
-    for _, along in surface.on_line:
-        fixed &= ~along
+    fixed = surface.fixed & ~members(surface.on_line, surface.n)
     closed = fixed[edges].all(axis=1) | (lying & surface.held[edges].all(axis=1))
     for _, mask in surface.on_planes:
         closed |= mask[edges].all(axis=1)

@@ -256,13 +256,8 @@ def _add_projected(block: Floats, v: int, w: int, space: MotionSpace, pattern: P
 @compiled
 def _add_triangle_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> None:
     """Add (∂²E) d to change (n,3): how ∇E of ``measure_block`` changes along D."""
-    F, rows, origin, ground, n = (
-        mesh.faces,
-        mesh.rows,
-        vector(mesh.origin),
-        vector(mesh.ground),
-        vector(mesh.normal),
-    )
+    F, rows, n = mesh.faces, mesh.rows, vector(mesh.normal)
+    origin, ground = vector(mesh.origin), vector(mesh.ground)
     for f in range(len(F)):
         i, j, k, patch = F[f, 0], F[f, 1], F[f, 2], mesh.patch[f]
         a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
 from ..surface import Surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
@@ -172,16 +172,10 @@ def effective_tensions(surface: Surface, X: Floats, faces: Ints, patch: Ints) ->
     return np.asarray(tension + surface.weights[patch] * surface.plane.height(X)[faces].mean(axis=1))
 
 
-def compressed(surface: Surface) -> Bools:
-    """(m,) triangles with a weight where α + w z̄ ≤ 0."""
-    pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)
-    return np.asarray((surface.weights[surface.patch_of_face] != 0.0) & (pull <= 0.0))
-
-
 def heavy_triangle_pulls(surface: Surface) -> Floats:
-    """α + w z̄ of the triangles with a weight, force/length."""
+    """(m,) α + w z̄ of the triangles with a weight, force/length; infinite for others. ≤ 0 is compression."""
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)
-    return np.asarray(pull[surface.weights[surface.patch_of_face] != 0.0])
+    return np.where(surface.weights[surface.patch_of_face] != 0.0, pull, np.inf)
 
 
 class Block(NamedTuple):

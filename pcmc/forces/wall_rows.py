@@ -100,14 +100,12 @@ def wall_rows(
         share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
         whole = top**2
     stands = np.abs(top) > ON * surface.size
-    relative = np.divide(share, whole, out=zero, where=stands)
-    relative = np.clip(relative, 0, 1)
+    relative = np.clip(np.divide(share, whole, out=zero, where=stands), 0.0, 1.0)
     if not stands.all():
         relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges, bottom))
     relative[bottom[vertices]] = 0.0
-    offset = none
-    straight = WallRows(vertices, ends, fraction, relative, offset, feet).places(surface, X)
-    np.divide(X[vertices] - straight, top[:, None], out=offset, where=stands[:, None])
+    straight = WallRows(vertices, ends, fraction, relative, none, feet).places(surface, X)
+    offset = np.divide(X[vertices] - straight, top[:, None], out=none, where=stands[:, None])
     offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
     return WallRows(vertices, ends, fraction, relative, offset, feet)
 

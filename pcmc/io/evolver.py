@@ -104,9 +104,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
         own = np.flatnonzero(mask[tail] & mask[head])
         if number > 1 and len(own):
             x, y, z = (pieces.apex[own[0]] / -6.0).tolist()
-            text += (
-                f"CONTENT\nC1: ({y!r})*z - ({z!r})*y\nC2: ({z!r})*x - ({x!r})*z\nC3: ({x!r})*y - ({y!r})*x\n"
-            )
+            text += f"CONTENT\nC1: ({y!r})*z - ({z!r})*y\nC2: ({z!r})*x - ({x!r})*z\n"
+            text += f"C3: ({x!r})*y - ({y!r})*x\n"
     for k, (patch, normal) in enumerate(zip(pieces.end_patch, pieces.normal, strict=True)):
         pull = _linear((-surface.net_pressures[patch] * normal).tolist())
         text += f"QUANTITY corner_{k} ENERGY METHOD VERTEX_SCALAR_INTEGRAL\nSCALAR_INTEGRAND: {pull}\n"

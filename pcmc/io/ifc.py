@@ -234,9 +234,8 @@ class _Model:
     def extruded(self, line: Any, section: Any) -> list[Any]:
         """A section along each edge of a line, its width across, its height in the upright plane."""
         solids = []
-        for start, (along, across, _), length in zip(
-            *line.segments(np.array(self.surface.plane.normal)), strict=True
-        ):
+        segments = line.segments(np.array(self.surface.plane.normal))
+        for start, (along, across, _), length in zip(*segments, strict=True):
             position = self.axes(start - self.middle)
             for name, direction in (("Axis", along), ("RefDirection", across)):
                 setattr(position, name, self.add("IfcDirection", DirectionRatios=direction.tolist()))

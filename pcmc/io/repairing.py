@@ -20,13 +20,13 @@ from ..base.files import as_path
 from ..base.libraries import read_arrays, require, unreadable
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
+from ..surface.geometry import face_areas
 from .mesh_data import MeshData, converted, to_surface, within
 from .metadata import Metadata
 from .reading import contents, format_opened
 
 WELD = 1e-5  # of the size
 HOLES = 8  # edges of a hole
-MOST = 20_000_000  # triangles; more mean a mistake in the edge length
 MESHLAB_READS = (".obj", ".ply", ".stl")
 TURNS = {"x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]], "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "z": np.eye(3)}
 """The rotations that turn an axis to be z."""
@@ -111,9 +111,9 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     size = float(np.linalg.norm(np.ptp(finite, axis=0))) if len(finite) else 0.0
     several = len(data.patches) > 1
     if edge_length is not None:
-        a, b, c = (X[corner] for corner in F.T)
-        area = 0.5 * float(np.nansum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
-        least = math.sqrt(area / (math.sqrt(0.1875) * MOST))
+        from ..meshing.remeshing import MOST, triangles_for  # takes long to import
+
+        least = math.sqrt(np.nansum(triangles_for(face_areas(X[F]), np.ones(len(F)))) / MOST)
         if edge_length < least:
             text = f"edge_length = {edge_length:g} would make more than {MOST} triangles"
             text = f"{text}; use {1.01 * least:.2g} or more"

@@ -67,9 +67,8 @@ def linear_expression(expression: str, known: Mapping[str, float], fail: Fail) -
             warnings.simplefilter("ignore")  # Python's own, about what it would not write so
             return _term(ast.parse(source, mode="eval").body, known)
     except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
-        raise fail(
-            f"{expression.strip()[:60]!r} ({error.args[0] if error.args else type(error).__name__})"
-        ) from None
+        reason = error.args[0] if error.args else type(error).__name__
+        raise fail(f"{expression.strip()[:60]!r} ({reason})") from None
 
 
 SUM: Mapping[type, Callable[[Any, Any], Any]] = {ast.Add: operator.add, ast.Sub: operator.sub}

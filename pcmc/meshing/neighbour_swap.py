@@ -71,9 +71,8 @@ def swap(surface: Surface, patch: str) -> Surface:
     if way is None:
         del patches[film.patch]
         mesh = replace(mesh, patch=mesh.patch - (mesh.patch > film.patch))
-        return _rebuilt(
-            surface, mesh, target, patches, [_with_sign(room, patch, 0) for room in surface.rooms]
-        )[0]
+        rooms = [_with_sign(room, patch, 0) for room in surface.rooms]
+        return _rebuilt(surface, mesh, target, patches, rooms)[0]
     # along an edge the values of A, C and the new film cancel, each with the sense in which it runs there
     sense = [mesh.sense(mesh.at_edge(k, *edges[0]), *edges[0]) for k in film.one_side]
     values = np.array([surface.pressures, surface.snows, *surface.room_signs])[:, list(film.one_side)]

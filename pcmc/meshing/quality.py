@@ -39,11 +39,6 @@ TURNS = 2.0 * np.pi * np.arange(8) / 8.0
 REACHES = (0.02, 0.06, 0.15)  # of the longest edge of the star
 
 
-def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
-    """Whether a triangle turns over on the way from X to Y, and the worst quality at X and at Y."""
-    return turns_over(X, Y, F), worst_quality(X, F), worst_quality(Y, F)
-
-
 @inlined
 def _area_and_edges(X: Floats, F: Ints, f: int) -> tuple[float, float]:
     """4√3 area and Σ edge² of triangle f."""

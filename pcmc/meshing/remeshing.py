@@ -19,6 +19,7 @@ from ..forces.pinching import lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
+from ..surface.pieces import two_digits
 from ..surface.topology import SIDES, edge_places
 from .curve_cutting import CurveMesh, check_sizes, cut_curves, limit_growth, sizes_at, triangles_for
 from .quality import edge_lengths, improve_angles
@@ -141,7 +142,7 @@ def _refuse_too_many(surface: Surface, size: Floats, name: str) -> None:
     if count <= MOST:
         return
     found = float(size.min())
-    least = _rounded_up(found * math.sqrt(count / MOST))
+    least = two_digits(found * math.sqrt(count / MOST), math.ceil)
     message = f"remesh: {name} = {found:g} would make about {count:.2g} triangles, more than {MOST}"
     raise OptionError(f"{message}; use {least:g} or more", what=name, found=found, expected=least)
 
@@ -157,19 +158,10 @@ def _refuse_flat_chord(surface: Surface, chord: float, size: float) -> None:
     reached = curved * (SHORTEST * size) ** 2 / 6.0
     if reached <= BEYOND * chord:
         return
-    least = _rounded_up(reached / BEYOND)
+    least = two_digits(reached / BEYOND, math.ceil)
     message = f"remesh: chord = {chord:g} is out of reach of an edge length of {size:g}"
     message += f"; use {least:g} or more, or a smaller edge length"
     raise OptionError(message, what="chord", found=chord, expected=least)
-
-
-def _rounded_up(value: float) -> float:
-    """The next larger number with two digits.
-
-    >>> _rounded_up(0.00123), _rounded_up(4.0)
-    (0.0013, 4.0)
-    """
-    return float(f"{value:.1e}") if float(f"{value:.1e}") >= value else float(f"{1.05 * value:.1e}")
 
 
 def _sizes(mesh: CurveMesh, size: Floats, growth: float) -> Floats:

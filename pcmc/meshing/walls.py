@@ -13,7 +13,7 @@ from ..base.errors import OptionError, SurfaceError, unknown
 from ..base.tolerances import ON
 from ..surface import HeldCurve, Patch, Plane, Surface
 from ..surface.curves import polyline
-from ..surface.geometry import bounding_size
+from ..surface.geometry import bounding_size, lengths_along
 from ..surface.pieces import to_space
 from ..surface.topology import EdgeCurve
 from .planar import triangulate
@@ -207,8 +207,7 @@ class _Builder:
     def add_wall(self, top: UpperEdge) -> None:
         self.check(top)
         chain, supported = top.vertices, self.held if top.held else self.sliding
-        steps = np.linalg.norm(np.diff(self.local[chain, :2], axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
+        along = lengths_along(self.local[chain, :2])
         left, right = self.line(int(chain[0]), supported), self.line(int(chain[-1]), supported)
         middle = chain[1:-1]
         foot = self.add_points(np.column_stack([self.local[middle, :2], self.floor[middle]]))

@@ -21,7 +21,7 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
-from ..meshing.quality import compare, worst_quality
+from ..meshing.quality import turns_over, worst_quality
 from ..solvers import solve_once
 from ..surface import Surface
 from ..surface.distance import distances
@@ -50,9 +50,7 @@ class FewerFamilies:
     change: float  # the largest distance of a panel's corner from the shape before, length
     moved: float  # the largest motion of a panel's corner, along the shape for the most part, length
     rounds: int  # how many were made
-    steps: (
-        pd.DataFrame
-    )  # on the way, the ``families`` and ``change`` that no other had both fewer and less of
+    steps: pd.DataFrame  # the ``families`` and ``change`` that no other had both fewer and less of
 
     @property
     def surface(self) -> Surface:
@@ -248,7 +246,7 @@ class _Search:
         while share >= SHORTEST:
             slid = onto_circles(surface, X + share * motion)
             Y = place_wall_rows(surface, part.walls, slid, space)
-            turned, _, worst = compare(X, Y, self.faces)
+            turned, worst = turns_over(X, Y, self.faces), worst_quality(Y, self.faces)
             if not turned and worst >= self.quality and (self.at_rest or self.leaves(Y) <= self.change):
                 return Y
             share *= 0.5

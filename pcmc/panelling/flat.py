@@ -54,13 +54,10 @@ def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
     lead = np.repeat(start, count)  # the first triangle at each edge: angles are seen from it
     face, side = order // 3, order % 3
     along, normal = edge_vectors(X[F])[face, side], area_vectors(X[F])[face]
-    inward, normal = (
-        v / np.maximum(np.linalg.norm(v, axis=1), 1e-300)[:, None] for v in (np.cross(normal, along), normal)
-    )
-    angle = np.arctan2(
-        -np.einsum("ij,ij->i", inward, normal[lead]), np.einsum("ij,ij->i", inward, inward[lead])
-    )
-    angle = np.degrees(angle) % 360.0
+    both = np.stack([np.cross(normal, along), normal])
+    inward, normal = both / np.maximum(np.linalg.norm(both, axis=2), 1e-300)[..., None]
+    sine, cosine = (np.einsum("ij,ij->i", inward, of[lead]) for of in (-normal, inward))
+    angle = np.degrees(np.arctan2(sine, cosine)) % 360.0
     angle[start] = 0.0
     turn = np.lexsort((angle, edge))
     edge, face, angle = edge[turn], face[turn], angle[turn]

@@ -24,9 +24,7 @@ from .planar import before, polygon_areas
 from .sheet import SheetMesh
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])  # corners of the panels from their place
-HEXAGON = np.array(
-    [[0, 1 / 6], [1, -1 / 6], [2, 1 / 6], [2, 5 / 6], [1, 7 / 6], [0, 5 / 6]]
-)  # and i + j even
+HEXAGON = np.array([[0, 1], [6, -1], [12, 1], [12, 5], [6, 7], [0, 5]]) / 6.0  # and i + j even
 NUDGE = 1e-6  # of a step: a vertex is at least so far from every line
 GRID = 1e-10  # of a step: cuts lie on a grid so fine
 SAME = 1e-8  # of the size: points that are so near are one
@@ -89,9 +87,8 @@ def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
     Values marked ``up`` (k,) are moved upwards.
     """
     line = np.rint(values)
-    inward = np.bincount(
-        place.ravel(), (values[place].mean(axis=1)[:, None] - line[place]).ravel(), len(values)
-    )
+    away = values[place].mean(axis=1)[:, None] - line[place]
+    inward = np.bincount(place.ravel(), away.ravel(), len(values))
     down = inward < 0.0 if up is None else (inward < 0.0) & ~up
     away = line + NUDGE * np.where(down, -1.0, 1.0)
     return np.where(np.abs(values - line) < NUDGE, away, values)[place]

@@ -109,9 +109,7 @@ class PanelNet:
         middle = np.add.reduceat(self.points[self.corner], self.start[:-1]) / count[:, None]
         faces = np.stack([self.corner[before(self.start)], self.corner, len(self.points) + owner], axis=1)
         tensions = {patch.name: patch.tension for patch in self.surface.patches}
-        patches = tuple(
-            Patch(f"panel {k}", tensions[name]) for k, name in enumerate(self.panels["patch"], start=1)
-        )
+        patches = tuple(Patch(f"panel {k}", tensions[name]) for k, name in enumerate(self.panels["patch"], 1))
         X = np.concatenate([self.points, middle])
         return Surface(X, faces, owner, patches, fixed=np.ones(len(X), dtype=bool), plane=self.surface.plane)
 

@@ -209,12 +209,9 @@ def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:
     pairs = joints(surface.vertices, surface.faces[faces], topo.edge_of_face[faces])
     edge = pairs["edge"].to_numpy()
     junction, boundary = (topo.junction_edge | topo.seam_edge)[edge], topo.boundary_edge[edge]
-    table = pairs[["edge"]].assign(
-        kind=np.select(
-            [junction, surface.mirror_edge[edge], boundary], ["junction", "mirror", "boundary"], "inside"
-        ),
-        length=segment_lengths(surface.vertices, topo.edges[edge]),
-    )
+    kinds = {"junction": junction, "mirror": surface.mirror_edge[edge], "boundary": boundary}
+    kind = np.select([*kinds.values()], [*kinds], "inside")
+    table = pairs[["edge"]].assign(kind=kind, length=segment_lengths(surface.vertices, topo.edges[edge]))
     return table.assign(panel=pairs["first"] + 1, neighbour=pairs["second"] + 1, dihedral=pairs["dihedral"])
 
 

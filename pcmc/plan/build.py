@@ -256,10 +256,9 @@ def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> 
     bare = np.flatnonzero(owner < 0)
     if len(bare):
         place = centroid[bare[0]]
-        problem = f"the part of the plan around {point_text(place)} has no patch ({len(bare)} such parts)"
-        raise PlanError(
-            f"{problem}; add one with at= inside it", what="patches", where=place.round(3).tolist()
-        )
+        problem = f"the part of the plan around {point_text(place)} has no patch ({len(bare)} such parts);"
+        problem += " add one with at= inside it"
+        raise PlanError(problem, what="patches", where=place.round(3).tolist())
     return owner
 
 
@@ -331,9 +330,8 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
     """
     curves = []
     supports = [PlanLine("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
-    fixed = dict(
-        zip(map(tuple, draft.edges.ends.tolist()), draft.edges.among("fixed", "held", "inside"), strict=True)
-    )
+    edges = draft.edges
+    fixed = dict(zip(map(tuple, edges.ends.tolist()), edges.among("fixed", "held", "inside"), strict=True))
     for chain in draft.drawn.chains:
         line = draft.lines[chain.line]
         if line.kind is Kind.DIVIDER:

@@ -134,19 +134,15 @@ def _arranged(plan: Plan) -> tuple[list[PlanLine], list[Curve], Arrangement]:
 
 def _check_size(plan: Plan, lines: Sequence[PlanLine]) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
-    points = sum(
-        len(curve.dense) for curve in (*(c.curve for c in plan.cables), *(one.curve for one in lines))
-    )
+    points = sum(len(part.curve.dense) for part in (*plan.cables, *lines))
     if points > MAX_POINTS:
         problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
         raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
     _check_count(plan, lines[0].xy, 0)
     size = bounding_size(lines[0].xy)
     if plan.edge_length > size:
-        problem = (
-            f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to corner"
-        )
-        raise PlanError(f"{problem}; use a smaller one", what="edge_length", found=plan.edge_length)
+        problem = f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to"
+        raise PlanError(f"{problem} corner; use a smaller one", what="edge_length", found=plan.edge_length)
     if plan.rise is not None and plan.rise > MAX_RISE * size:
         problem = f"rise={plan.rise:g} is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a"
         raise PlanError(f"{problem} smaller one", what="rise", found=plan.rise)
@@ -157,10 +153,8 @@ def _check_size(plan: Plan, lines: Sequence[PlanLine]) -> None:
     for line in lines:
         extent = float(np.ptp(line.xy, axis=0).max())
         if line.kind is Kind.HOLE and extent <= SNAP * plan.edge_length:
-            problem = (
-                f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g}; leave it"
-            )
-            raise line.error(f"{problem} out, or use a smaller edge_length", found=extent)
+            problem = f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g};"
+            raise line.error(f"{problem} leave it out, or use a smaller edge_length", found=extent)
 
 
 def _check_count(plan: Plan, outline: Floats, edges: int) -> None:
@@ -220,12 +214,8 @@ def walls_of(draft: Draft, roof: Roof) -> tuple[WallMesh, list[Patch], list[Side
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
         place = draft.drawn.points[mixed[0]]
-        problem = "a wall with a sloped bottom meets one whose bottom is on the plane"
-        raise PlanError(
-            f"at {point_text(place)} {problem}; give both the same bottom",
-            what="bottom",
-            where=place.tolist(),
-        )
+        problem = f"at {point_text(place)} a wall with a sloped bottom meets one whose bottom is on the"
+        raise PlanError(f"{problem} plane; give both the same bottom", what="bottom", where=place.tolist())
     laws, room = np.vstack([roof.laws, np.zeros(3)]), np.append(roof.room, NONE)  # of no triangle, -1
     kinds: dict[Sides, list[tuple[Ints, Ints]]] = {}
     for (number, vertices), faces in zip(walled, _beside(draft, [v for _, v in walled]), strict=True):
@@ -312,9 +302,8 @@ def rooms_of(plan: Plan, walls: Sequence[Patch], sides: Sequence[Sides]) -> list
     """The rooms of prescribed volume: below their patches, between the walls to other rooms."""
     rooms = []
     for number, (name, room) in enumerate(plan.rooms.items()):
-        signs = {
-            wall.name: (s.left == number) - (s.right == number) for wall, s in zip(walls, sides, strict=True)
-        }
-        around = dict.fromkeys(room.patches, 1) | {wall: sign for wall, sign in signs.items() if sign}
+        signs = [(s.left == number) - (s.right == number) for s in sides]
+        between = {wall.name: sign for wall, sign in zip(walls, signs, strict=True) if sign}
+        around = dict.fromkeys(room.patches, 1) | between
         rooms.append(Room(name, tuple(around.items()), room.volume))
     return rooms

@@ -137,10 +137,8 @@ class _Reader:
         if len(loops) > 1:
             ends = ", ".join(f"{listed(loop.labels)} at {point_text(loop.ends[0])}" for loop in loops[:3])
             where = f"layer {loops[0].layer!r}"
-            text = f"{where} has {len(loops)} closed curves ({ends}); a roof has one outline"
-            text += (
-                ": put the edges of openings on a layer 'hole NAME', and draw another roof in its own file"
-            )
+            text = f"{where} has {len(loops)} closed curves ({ends}); a roof has one outline: put the edges"
+            text += " of openings on a layer 'hole NAME', and draw another roof in its own file"
             raise PlanError(text, what=where, found=len(loops), expected=1)
         outline, self.layers["the outline"] = loops[0].curve, loops[0].source
         holes: dict[str, Curve] = {}
@@ -209,18 +207,15 @@ class _Reader:
         open_paths = [path for path in paths if not path.curve.closed]
         if open_paths and len(open_paths) < len(paths):
             stray = open_paths[0]
-            text = (
-                f"{stray.source} from {point_text(stray.ends[0])} to {point_text(stray.ends[1])} is no part"
-            )
-            text += " of the closed curve there; delete it, or put it on the layer of what it is"
+            text = f"{stray.source} from {point_text(stray.ends[0])} to {point_text(stray.ends[1])} is no"
+            text += " part of the closed curve there; delete it, or put it on the layer of what it is"
             raise PlanError(text, what=where, where=_plain(stray.ends[0]))
         for path in open_paths:
             for end, count in zip(path.ends, path.strokes_at_ends, strict=True):
                 if count > 2:
-                    text = (
-                        f"{where}: {count} curves meet at {point_text(end)} ({listed(path.labels)}); a closed"
-                    )
-                    raise PlanError(f"{text} edge has two at each point", what=where, where=_plain(end))
+                    text = f"{where}: {count} curves meet at {point_text(end)} ({listed(path.labels)});"
+                    text += " a closed edge has two at each point"
+                    raise PlanError(text, what=where, where=_plain(end))
         if open_paths:  # the smallest gap between two of the ends
             ends = [(path.labels[-k], point) for path in open_paths for k, point in enumerate(path.ends)]
             points = np.array([point for _, point in ends])
@@ -270,10 +265,8 @@ class _Reader:
                     continue
                 foot, top = sorted(path.ends, key=lambda point: float(point[2]))
                 if np.linalg.norm((top - foot)[:2]) > self.gap:
-                    text = (
-                        f"{path.source} from {point_text(foot)} to {point_text(top)} is neither vertical nor"
-                    )
-                    text += " a closed ring; draw a mast as a vertical line, or its top as a point"
+                    text = f"{path.source} from {point_text(foot)} to {point_text(top)} is neither vertical"
+                    text += " nor a closed ring; draw a mast as a vertical line, or its top as a point"
                     raise PlanError(text, what=f"layer {path.layer!r}", where=_plain(foot))
                 tops.append(top)
             return [path for path in paths if path.curve.closed]

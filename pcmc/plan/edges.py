@@ -82,10 +82,8 @@ def boundary(plan: Plan, lines: Sequence[PlanLine], on_edge: Sequence[Curve], dr
         own = cable[along & (cable >= with_cable.sum())] - with_cable.sum()
         if len(own):
             name = cable_label(plan.cables[own[0]], int(own[0]) + 1)
-            problem = (
-                f"{name} runs along mirror {number}, which is inside the whole roof; draw the whole roof,"
-            )
-            raise PlanError(f"{problem} with a divider that has the cable", what=name)
+            problem = f"{name} runs along mirror {number}, which is inside the whole roof; draw the whole"
+            raise PlanError(f"{problem} roof, with a divider that has the cable", what=name)
         state[along], cable[along] = np.where(supported[along], "inside", "mirror"), NONE
     return Boundary(ends, line, state, cable, tuple(cables))
 
@@ -149,10 +147,8 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
         chosen = edges.cable == index
         ends, line = edges.ends[chosen], edges.line[chosen]
         new = held[ends[:, 0]] | (ends[:, 0] != np.roll(ends[:, 1], 1)) | (line != np.roll(line, 1))
-        group = np.cumsum(new) - 1
-        group = np.maximum(
-            np.where(group < 0, group.max(initial=0), group), 0
-        )  # the first go on from the last
+        group = np.cumsum(new) - 1  # the first edges go on from the last
+        group = np.maximum(np.where(group < 0, group.max(initial=0), group), 0)
         stretches = [ends[group == k] for k in np.unique(group)]
         for k, stretch in enumerate(stretches, start=1):
             own = f"cable {next(numbers)}" if not name else f"{name}-{k}" if len(stretches) > 1 else name

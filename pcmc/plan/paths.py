@@ -60,9 +60,8 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
     layer, single = drawn[0].layer, _single(curves, tolerance)
     curves, labels = list(compress(curves, single)), [stroke.label for stroke in compress(drawn, single)]
     doubles = [stroke.label for stroke, alone in zip(drawn, single, strict=True) if not alone]
-    notes = (
-        [f"layer {layer!r}: drawn twice or without length, left out: {listed(doubles)}"] if doubles else []
-    )
+    doubled = f"layer {layer!r}: drawn twice or without length, left out: {listed(doubles)}"
+    notes = [doubled] if doubles else []
     if not curves:
         return [], notes
     ends = np.concatenate([_ends(curve) for curve in curves])
@@ -132,10 +131,8 @@ def _walk(curves: Sequence[Curve], layer: str, labels: Sequence[str], nodes: Int
                 goes_on = node != begin and count[node] == 2
                 following = [other for other in at_node[node] if other in left] if goes_on else []
             if pieces:
-                path = Curve(tuple(pieces), closed=node == begin)
-                paths.append(
-                    JoinedPath(path, layer, tuple(dict.fromkeys(names)), (count[begin], count[node]))
-                )
+                path, once = Curve(tuple(pieces), closed=node == begin), tuple(dict.fromkeys(names))
+                paths.append(JoinedPath(path, layer, once, (count[begin], count[node])))
     return paths
 
 
@@ -157,9 +154,8 @@ def meet_lines(
     last = np.cumsum(np.bincount(group))
     members = [own.tolist() for own in np.split(np.argsort(group, kind="stable"), last[:-1])]
     in_corner = [own[-1] >= len(drawn) for own in members]
-    place = np.array(
-        [points[m[-1:] if at else m].mean(axis=0) for m, at in zip(members, in_corner, strict=True)]
-    )
+    met = (own[-1:] if at else own for own, at in zip(members, in_corner, strict=True))
+    place = np.array([points[own].mean(axis=0) for own in met])
     result = dict(curves)
     for others in ((), tuple(curves)):  # onto the edges first, then onto each other
         named = [name for name in others if _extent(result[name])]
@@ -197,9 +193,8 @@ def meet_edges(
         nearest[apart <= tolerance] = corners[corner[apart <= tolerance]]
     steps = _steps(nearest - xy, tolerance)
     result: list[Floats | Curve] = []
-    for support, own in zip(
-        supports, np.split(steps, np.cumsum([len(j) for j in joints])[:-1]), strict=False
-    ):
+    of_support = np.split(steps, np.cumsum([len(j) for j in joints])[:-1])
+    for support, own in zip(supports, of_support, strict=False):
         if isinstance(support, Curve):
             parts = zip(support.pieces, own, np.roll(own, -1, axis=0), strict=False)
             result.append(replace(support, pieces=tuple(_bent(*part) for part in parts)))

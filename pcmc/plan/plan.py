@@ -142,10 +142,8 @@ class Plan:
             if getattr(self, key) is not None:
                 validate.positive(key, getattr(self, key))
         if bool(self.patches) == (self.tension is not None):
-            problem = (
-                "a plan needs one tension= (in a project, tension or rise) or patches, each with its own"
-            )
-            raise OptionError(problem, what="tension")
+            problem = "a plan needs one tension= (in a project, tension or rise) or patches, each with its"
+            raise OptionError(f"{problem} own", what="tension")
         for key, usual in (("pressure", 1.0), ("weight", 0.0)) if self.patches else ():
             if getattr(self, key) != usual:
                 problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"

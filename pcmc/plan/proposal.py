@@ -253,9 +253,8 @@ def _patches(
             at = [any(shapely.contains_xy(part.area, *point) for point in points) for part in parts]
             chosen = list(compress(specs, at))
         if not chosen:
-            problem = unknown(
-                "patch of the drawing", name, dict.fromkeys(str(spec["name"]) for spec in specs)
-            )
+            known = dict.fromkeys(str(spec["name"]) for spec in specs)
+            problem = unknown("patch of the drawing", name, known)
             raise OptionError(f"{drawing.path}: {problem}", what="patches", where=name)
         for spec in chosen:
             spec |= {"name": name} | {key: value for key, value in attributes.items() if key != "at"}
@@ -286,10 +285,8 @@ def _labels(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:
             raise PlanError(f"{problem}; move it into the part that it names", what="patch", where=label.name)
         other = owner.setdefault(inside[0], label).name
         if other != label.name:
-            problem = (
-                f"{drawing.path}: {other!r} and {label.name!r} name one part of the plan; draw a divider"
-            )
-            raise PlanError(f"{problem} between them, or delete one", what="patch", where=label.name)
+            problem = f"{drawing.path}: {other!r} and {label.name!r} name one part of the plan; draw a"
+            raise PlanError(f"{problem} divider between them, or delete one", what="patch", where=label.name)
         owner[inside[0]] = label
     return owner
 

@@ -93,9 +93,8 @@ def _plain_ticks(axis: Any) -> None:
     if not 1e-4 < low < high < 100.0 * low:
         return
     decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high))
-    steps = (
-        (1, 1.5, 2, 3, 4, 5, 6, 8) if high < 5.0 * low else (1, 2, 3, 5) if high < 30.0 * low else (1, 2, 5)
-    )
+    few = (1, 2, 3, 5) if high < 30.0 * low else (1, 2, 5)
+    steps = (1, 1.5, 2, 3, 4, 5, 6, 8) if high < 5.0 * low else few
     ticks = [step * decade for decade in decades for step in steps if low <= step * decade <= high]
     axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
     axis.set_ticks([], minor=True)

@@ -35,18 +35,8 @@ from .outcome import Outcome
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
 OWN = "[0-9a-f]" * 64 + ".pcmc"  # its files: the folder that ``PCMC_CACHE`` names may have others
-PARTS = [
-    "plan",
-    "mesh",
-    "method",
-    "options",
-    "wanted",
-    "search",
-    "remeshing",
-    "targets",
-    "vary",
-    "target_tolerance",
-]
+PARTS = ["plan", "mesh", "method", "options", "wanted", "search"]
+PARTS += ["remeshing", "targets", "vary", "target_tolerance"]
 NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a result
 
 

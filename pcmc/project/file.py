@@ -226,10 +226,8 @@ def project_of(
             members_of(structure.members, plan)
             for name, member in structure.members.items():
                 if name not in named and not any(member.get(key) for key in ("on", "along", "bars")):
-                    text = (
-                        f"member {name!r} is nowhere; name it in a divider or a hole of the plan, give it on,"
-                    )
-                    raise OptionError(f"{text} along or bars, or remove it", what="member", found=name)
+                    text = f"member {name!r} is nowhere; name it in a divider or a hole of the plan, give it"
+                    raise OptionError(f"{text} on, along or bars, or remove it", what="member", found=name)
                 if plan is None and member.get("bars"):
                     text = f"member {name!r}: bars stand at points of a plan, and here is a mesh; remove bars"
                     raise OptionError(text, what="bars", where=name)

@@ -104,21 +104,16 @@ class Outcome:
 
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""
-        certificate = self.shown.certificate
-        lines = [certificate.verdict.value]
-        if not certificate.certified and certificate.detail:
-            lines.append(certificate.detail)
-        if certificate.certified and certificate.cuts_itself:
-            lines.append(certificate.cuts_itself)
-        if self.design is not None:
-            lines.append(f"targets {self.design.text(self.units)}")
-        if self.files:
-            lines.append(f"written: {', '.join(map(str, self.files))}")
-        if self.advice:
-            lines.append("\n  ".join(self.advice))
-        if self.units:
-            lines.append(self.units.sentence)
-        return "\n".join([*lines, repr(self.shown.surface)])
+        (surface, certificate), design, units = self.shown, self.design, self.units
+        lines = [
+            certificate.verdict.value,
+            certificate.cuts_itself if certificate.certified else certificate.detail,
+            "" if design is None else f"targets {design.text(units)}",
+            f"written: {', '.join(map(str, self.files))}" if self.files else "",
+            "\n  ".join(self.advice),
+            units.sentence if units else "",
+        ]
+        return "\n".join([*filter(None, lines), repr(surface)])
 
     @property
     def solved(self) -> Result:
@@ -260,7 +255,8 @@ class Outcome:
         from ..report import roof_report
         from .members import model_with_members, warn_of_members
 
-        analysis = self.analysis(anyway)
+        analysis, project = self.analysis(anyway), self.project
+        wanted = None if project is None else project.pattern
         if analysis is None:
             warn_of_members(self, "report", held=True)
         return roof_report(
@@ -272,8 +268,8 @@ class Outcome:
             margins=self.margins,
             analysis=analysis,
             model=model_with_members(self) if analysis is None else None,
-            pattern=None if (wanted := self.pattern_wanted) is None else self.cutting_pattern(wanted, anyway),
-            theorem=self.theorem if self.project is not None and self.project.verify else None,
+            pattern=None if wanted is None else self.cutting_pattern(wanted, anyway),
+            theorem=self.theorem if project is not None and project.verify else None,
             targets=None if self.design is None else self.design.targets,
             files=files,
             date=output.date,
@@ -303,11 +299,6 @@ class Outcome:
             text += " images; draw the whole plan, without mirrors, or leave out whole"
             raise OptionError(text, what="whole")
         return model
-
-    @property
-    def pattern_wanted(self) -> CuttingOptions | None:
-        """The cutting pattern that the project asks for."""
-        return None if self.project is None else self.project.pattern
 
     def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
         """The cutting pattern of what is shown, of the cloth in [structure]; made once for [pattern]."""

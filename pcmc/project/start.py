@@ -41,10 +41,9 @@ def start_of(project: Project) -> Outcome:
         surface, data = read_mesh(project.path, project.mesh, project.units)
         own, force = data.units.force, project.units.force
         if own and force not in ("", own):
-            text = f"{project.path}: force = {force!r}, but the tensions in {project.mesh.file} are in {own}"
-            raise OptionError(
-                f"{text}; make it {own!r}, or leave it out", what="force", found=force, expected=own
-            )
+            text = f"{project.path}: force = {force!r}, but the tensions in {project.mesh.file} are in {own};"
+            text += f" make it {own!r}, or leave it out"
+            raise OptionError(text, what="force", found=force, expected=own)
         units = Units(data.units.length, force or own)
         surface, targets, vary = first_tensions(surface, project.mesh)
         if targets:

@@ -94,9 +94,7 @@ def _axes(surface: Surface) -> Floats:
 
 def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list[Bools], Ints]:
     """The masks (n,) of the vertices that are free along some axis, and (3,) which of them each axis has."""
-    held = surface.fixed.copy()
-    for _, along in surface.meeting_lines:
-        held &= ~along
+    held = surface.pinned
     on_plane = surface.on_plane | surface.given_supports.on_plane
     planes = ((surface.plane, on_plane), *surface.on_planes)
     masks = []

@@ -12,6 +12,7 @@ from ..forces.wall_rows import find_walls
 from ..meshing.quality import in_the_middle, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import cross_2d
+from ..surface.pieces import to_space
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
 WIDE = 1.5  # of that extent: a plan that is wider is not kept
@@ -31,8 +32,12 @@ def low_start(surface: Surface) -> Surface | None:
     >>> low_start(spire).vertices[4].round(3).tolist()
     [0.0, 0.0, 0.283]
     """
-    if not _spans_a_surface(surface):
-        return None
+    points, normal = surface.vertices[surface.fixed], np.array(surface.plane.normal)
+    if len(points) < 3 or any(abs(normal @ plane.normal) > PARALLEL for plane, _ in surface.on_planes):
+        return None  # too few points, or a plane besides Π holds heights
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if lengths[1] <= ON * lengths[0]:
+        return None  # they lie on one line
     walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
     roof = np.zeros(surface.n, dtype=bool)
@@ -70,15 +75,6 @@ def low_start(surface: Surface) -> Surface | None:
     return moved.moved(place_wall_rows(moved, walls_below, moved.vertices))
 
 
-def _spans_a_surface(surface: Surface) -> bool:
-    """Whether its fixed vertices do not lie on one line, and no plane besides Π holds heights."""
-    points, normal = surface.vertices[surface.fixed], np.array(surface.plane.normal)
-    if len(points) < 3 or any(abs(normal @ plane.normal) > PARALLEL for plane, _ in surface.on_planes):
-        return False
-    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(lengths[1] > ON * lengths[0])
-
-
 def _diagonal(place: Floats) -> float:
     """Diagonal of the bounding box along Π of coordinates (k,3)."""
     return float(np.linalg.norm(np.ptp(place[:, :2], axis=0)))
@@ -86,5 +82,4 @@ def _diagonal(place: Floats) -> float:
 
 def _at(surface: Surface, place: Floats) -> Surface:
     """The surface with its vertices at coordinates (n,3) on and above Π, or where supports let them be."""
-    X = place @ surface.plane.axes + np.array(surface.plane.point)
-    return surface.moved(surface.onto_supports(X))
+    return surface.moved(surface.onto_supports(to_space(place, surface.plane)))

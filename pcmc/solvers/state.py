@@ -18,10 +18,10 @@ from ..forces.pinching import (
     standing_part,
     top_spacing,
 )
-from ..forces.rooms import closing_volumes, volume_gradients_at, volumes_at, with_room_pressures
+from ..forces.rooms import closing_volumes, room_volume_gradients, room_volumes, with_room_pressures
 from ..forces.wall_rows import Walls, find_walls
 from ..meshing.elevation import blended, flat_places
-from ..meshing.quality import compare, edge_lengths, redistribute, worst_quality
+from ..meshing.quality import edge_lengths, redistribute, turns_over, worst_quality
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.checks import reachable
@@ -120,10 +120,10 @@ class SolverState:
         surface, wanted = self.at.surface, self.at.volume_defects + self.at.wanted_volumes
         area = vertex_area_vectors(X, self.at.classes.faces, self.at.classes.topology.faces)[1]
         for _ in range(VOLUME_STEPS):
-            left = wanted - volumes_at(surface, X)
+            left = wanted - room_volumes(surface, X)
             if (np.abs(left) <= ROOM_VOLUME * np.abs(self.at.wanted_volumes)).all():
                 break
-            G = volume_gradients_at(surface, X)
+            G = room_volume_gradients(surface, X)
             even = G / np.where(area > 0.0, area, 1.0)[:, None]
             small = np.einsum("rnd,snd->rs", G, even)
             X = X + surface.spread(np.tensordot(np.linalg.lstsq(small, left)[0], even, axes=1))
@@ -160,8 +160,9 @@ class SolverState:
         """Whether the move to X turns a triangle over, makes the worst much worse or leads too far out."""
         if not reachable(X):
             return True
-        turned, before, after = compare(self.at.X, X, self.quality_faces)
-        return turned or after < 0.7 * min(before, self.min_quality)
+        if turns_over(self.at.X, X, self.quality_faces):
+            return True
+        return worst_quality(X, self.quality_faces) < 0.7 * min(self.quality, self.min_quality)
 
     def maintain_mesh(self) -> bool:
         """Redistribute the vertices along the shape while triangles are poor; True if they moved.

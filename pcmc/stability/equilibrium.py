@@ -21,7 +21,7 @@ from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motio
 from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.pinching import StandingPart, excess_pull, standing_part
 from ..forces.rigid_motions import net_forces, rigid_field, rigid_modes, rigid_motions
-from ..forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at
+from ..forces.rooms import prescribed_volumes, room_volume_gradients, room_volumes
 from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
@@ -165,7 +165,7 @@ class Equilibrium:
     @cached_property
     def volume_defects(self) -> Floats:
         """(r,) V - V̄, length³."""
-        return volumes_at(self.surface, self.X) - self.wanted_volumes
+        return room_volumes(self.surface, self.X) - self.wanted_volumes
 
     @cached_property
     def volume_units(self) -> Floats:
@@ -175,7 +175,7 @@ class Equilibrium:
     @cached_property
     def volume_gradients(self) -> Floats:
         """(r,n,3) ∂V/∂X, supports applied, length²."""
-        return volume_gradients_at(self.surface, self.X)
+        return room_volume_gradients(self.surface, self.X)
 
     @cached_property
     def volume_columns(self) -> Floats:

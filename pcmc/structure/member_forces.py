@@ -16,7 +16,7 @@ from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
-from ..surface.geometry import vertex_sums
+from ..surface.geometry import lengths_along, vertex_sums
 from .frames import BarFrame
 from .loads import Step
 from .members import PlacedMember
@@ -46,7 +46,7 @@ class MemberForces:
     @cached_array
     def along(self) -> Floats:
         """(k,) the length along it from its first point."""
-        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1)))
+        return lengths_along(self.points)
 
     @property
     def span(self) -> float:

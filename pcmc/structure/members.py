@@ -18,13 +18,13 @@ from ..certificate.forces import Forces
 from ..forces.pinching import standing_part
 from ..surface import Surface
 from ..surface.curves import Curve
-from ..surface.geometry import segment_lengths, unit_vectors
+from ..surface.geometry import lengths_along, segment_lengths, unit_vectors
 from ..surface.pieces import point_text, to_space
 from ..surface.topology import EdgeCurve
 from .frames import bar_axes
 from .material import Material, Profile
 
-DRAW = "draw the whole plan, without mirrors"
+DRAW, WHOLE = "draw the whole plan, without mirrors", "take the whole roof, whole = true"
 KINDS = ("beam", "cable")
 ENDS = ("hinged", "clamped")
 BESIDE = 0.02  # of the length of edges: so near to a curve their ends are on it
@@ -116,7 +116,7 @@ class PlacedMember(EdgeCurve):
 
     @property
     def length(self) -> float:
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        return float(lengths_along(self.path)[-1])
 
     @property
     def direction(self) -> Floats:
@@ -167,9 +167,7 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
             edges = surface.topology.edge_numbers(line.pairs)
             problem = "runs where another one does; leave one of them out" if taken[edges].any() else ""
             if cut[line.vertices].any():
-                problem = "meets a mirror plane; " + (
-                    "take the whole roof, whole = true" if line.wall else DRAW
-                )
+                problem = f"meets a mirror plane; {WHOLE if line.wall else DRAW}"
             if problem:
                 raise OptionError(f"member {line.name!r} {problem}", what="members", where=line.name)
             taken[edges] = True

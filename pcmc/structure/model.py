@@ -198,9 +198,8 @@ class StructuralModel:
         usual = self.cable_material or replace(self.materials[0], weft=None, shear=None)
         mirrors = [mask for plane, mask in self.standing.on_planes if plane.mirror]
         found = [(c, *own.get(c.name, (others.get(c.name, 0.0), usual))) for c in self.standing.cables]
-        return tuple(
-            (area * 0.5 ** sum(bool(mask[c.edges].all()) for mask in mirrors), of) for c, area, of in found
-        )
+        cuts = [sum(bool(mask[c.edges].all()) for mask in mirrors) for c, *_ in found]
+        return tuple((area * 0.5**k, of) for k, (_, area, of) in zip(cuts, found, strict=True))
 
     def cable_edges(self) -> Iterator[tuple[Cable, float, Material, Ints, Floats]]:
         """Each cable, the area of its section, its material, and the numbers (k,) and directions (k,3) of its

@@ -61,18 +61,7 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
             message = f"cable {cable.name!r}: its edges are no whole sides of elements of order {order};"
             message += " let it run from corner to corner, or give order=1"
             raise SurfaceError(message, what="order", where=cable.name, found=order, expected=1)
-    return {
-        "order": order,
-        "vertices": X,
-        "faces": F,
-        "patch_of_face": patch,
-        "patches": patches,
-        **resolved,
-        "on_planes": planes,
-        "cables": cables,
-        "rooms": rooms,
-        "curves": curves,
-        "given_supports": supports.frozen(),
-        "images": images,
-        "topology": topo,
-    }
+    arrays = {"vertices": X, "faces": F, "patch_of_face": patch, "images": images, "topology": topo}
+    supported = {"given_supports": supports.frozen(), "on_planes": planes, **resolved}
+    named = {"patches": patches, "cables": cables, "rooms": rooms, "curves": curves}
+    return {"order": order, **arrays, **supported, **named}

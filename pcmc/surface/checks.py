@@ -28,12 +28,9 @@ def positions(vertices: Any, what: str = "vertices") -> Floats:
     if X.ndim != 2 or X.shape[1] != 3 or not len(X):
         refuse_shape(what, X, "(n, 3) with n > 0")
     if not reachable(X):
-        bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
-        if len(bad):
-            refuse_rows(what, X, bad, "is not finite", hint="replace or remove it")
-        bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
-        hint = "use a larger unit of length"
-        refuse_rows(what, X, bad, f"is farther out than {LARGEST:g}", hint=hint)
+        refuse_rows(what, X, ~np.isfinite(X).all(axis=1), "is not finite", "replace or remove it")
+        far = (np.abs(X) > LARGEST).any(axis=1)
+        refuse_rows(what, X, far, f"is farther out than {LARGEST:g}", "use a larger unit of length")
     return X
 
 
@@ -62,9 +59,7 @@ def face_array(faces: Any, n: int) -> Ints:
     if F.ndim != 2 or F.shape[1] != 3 or not len(F):
         refuse_shape("faces", F, "(m, 3) with m > 0")
     _within("faces", F, n, "vertex")
-    bad = np.flatnonzero((F[:, [1, 2, 0]] == F).any(axis=1))
-    if len(bad):
-        refuse_rows("faces", F, bad, "has a vertex twice", hint="remove the face")
+    refuse_rows("faces", F, (F[:, [1, 2, 0]] == F).any(axis=1), "has a vertex twice", "remove the face")
     return F.astype(np.int32)
 
 
@@ -110,12 +105,8 @@ def edge_array(edges: Any, what: str) -> Ints:
     E = _integers(edges, what)
     if E.ndim != 2 or E.shape[1] != 2 or not len(E):
         refuse_shape(what, E, "(k, 2) with k > 0")
-    E = np.sort(E, axis=1)
-    order = np.lexsort((E[:, 1], E[:, 0]))
-    E = E[order]
-    bad = np.flatnonzero((E[1:] == E[:-1]).all(axis=1))
-    if len(bad):
-        refuse_rows(what, E, bad, "is given twice", hint="remove one")
+    E, times = np.unique(np.sort(E, axis=1), axis=0, return_counts=True)
+    refuse_rows(what, E, times > 1, "is given twice", "remove one")
     return E.astype(np.int32)
 
 
@@ -127,9 +118,8 @@ def mesh(
     Within a patch an edge has at most two faces, and those run along it in opposite directions.
     """
     names = [p.name for p in patches]
-    unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
-    if len(unused):
-        refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
+    unused = np.bincount(F.ravel(), minlength=len(X)) == 0
+    refuse_rows("vertices", X, unused, "belongs to no face", "remove it and renumber the faces")
     flat = _flat(X, F)
     if flat.any():
         # a wall whose junction rests on Π has no height: it shares a vertex on Π, which no support holds,
@@ -142,10 +132,9 @@ def mesh(
         pinched = np.zeros(len(patches), dtype=bool)
         pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
         flat &= ~(wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1))
-    bad = np.flatnonzero(flat)
-    if len(bad):
-        fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
-        refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
+    if flat.any():
+        fault = f"of patch {names[patch[flat.argmax()]]!r} has zero area"
+        refuse_rows("faces", F, flat, fault, "merge its vertices or remesh")
     if not _perhaps_at_fault(topo.faces, patch, topo.edge_of_face, len(topo.edges)):
         return
     F = topo.faces  # images and their vertices as one
@@ -250,10 +239,8 @@ def _integers(values: Any, what: str) -> Ints:
 
 def _within(what: str, rows: Ints, count: int, kind: str) -> None:
     """Refuse the first row (k,) or (k,d) with a number outside 0..count - 1."""
-    bad = np.flatnonzero(((rows < 0) | (rows >= count)).reshape(len(rows), -1).any(axis=1))
-    if len(bad):
-        span = f"0..{count - 1}"
-        refuse_rows(what, rows, bad, f"names a {kind} outside the range {span}", expected=span)
+    bad, span = ((rows < 0) | (rows >= count)).reshape(len(rows), -1).any(axis=1), f"0..{count - 1}"
+    refuse_rows(what, rows, bad, f"names a {kind} outside the range {span}", expected=span)
 
 
 def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
@@ -263,13 +250,14 @@ def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
 
 
 def refuse_rows(
-    what: str, rows: Any, bad: Ints, fault: str, hint: str = "", expected: str | None = None
-) -> NoReturn:
-    """Refuse the first of the bad rows, with their number."""
-    first = int(bad[0])
-    count = f" ({len(bad)} such entries)" if len(bad) > 1 else ""
-    message = f"{what}[{first}] = {rows[first].tolist()} {fault}{count}{hint and f'; {hint}'}"
-    raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)
+    what: str, rows: Any, bad: Any, fault: str, hint: str = "", expected: str | None = None
+) -> None:
+    """Refuse the first of the rows that are ``bad`` (k,) bool, with their number; none may be."""
+    if bad.any():
+        first, number = int(bad.argmax()), int(bad.sum())
+        count = f" ({number} such entries)" if number > 1 else ""
+        message = f"{what}[{first}] = {rows[first].tolist()} {fault}{count}{hint and f'; {hint}'}"
+        raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)
 
 
 def refuse_snow(surface: Any, edges: Ints) -> NoReturn:

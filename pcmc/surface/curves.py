@@ -15,6 +15,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..base.tolerances import ON
+from .geometry import lengths_along
 from .guides import Plane
 from .pieces import Alike, Piece
 
@@ -80,8 +81,7 @@ class Curve:
     @cached_property
     def lengths(self) -> Floats:
         """(k,) the length along the curve up to each dense parameter."""
-        steps = np.linalg.norm(np.diff(self.at(self.dense), axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return lengths_along(self.at(self.dense))
 
     @property
     def length(self) -> float:
@@ -166,11 +166,6 @@ class Curve:
         """``parameter`` of lengths (n,) that may go around a closed curve twice."""
         return self.parameter(np.where(length > self.length, length - self.length, length))
 
-    @cached_property
-    def _lengths_twice(self) -> Floats:
-        """(2k - 2,) the lengths up to the dense parameters, of a curve run twice."""
-        return np.concatenate([self.lengths[:-1], self.lengths[:-1] + self.length])
-
     def _lengths_at(self, t: Floats) -> Floats:
         """(n,) the length along the curve up to parameters t, which may go around a closed curve twice."""
         around = t > len(self.pieces)
@@ -178,7 +173,7 @@ class Curve:
 
     def _turning(self, low: float, high: float) -> float:
         """The angle through which the smooth pieces turn between two lengths along the curve."""
-        inner = self._lengths_twice
+        inner = np.concatenate([self.lengths[:-1], self.lengths[:-1] + self.length])
         first, last = np.searchsorted(inner, low, side="right"), np.searchsorted(inner, high)
         if last == first:
             return 0.0

@@ -6,9 +6,6 @@ k: c - b, a - c, b - a. Its area vector is A ν = ½ (b - a) × (c - a), of leng
 There are two layers. Compiled loops use three-vectors, tuples of floats, with inlined operations: ``point``,
 ``cross``, ``dot`` and others. All other code uses whole arrays: a function of ``P`` (…,m,3,3) takes the
 corners of m triangles, ``X[F]`` for vertices X (n,3) and faces F (m,3).
-
-Numba caches a compiled loop by the file it stands in. After a change of the inlined operations here, delete
-the caches of the loops that use them (``__pycache__/*.nb?``).
 """
 
 from __future__ import annotations
@@ -146,6 +143,15 @@ def file_origin(X: Floats, size: float) -> Floats:
     """
     middle = X.mean(axis=0)
     return np.round(middle) if np.linalg.norm(middle) > FAR * size else np.zeros(3)
+
+
+def lengths_along(points: Floats) -> Floats:
+    """(k,) the length of the polyline through points (k,d) up to each of them.
+
+    >>> lengths_along(np.array([[0, 0], [3, 4], [3, 5]])).tolist()
+    [0.0, 5.0, 6.0]
+    """
+    return np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
 
 
 def segment_lengths(X: Floats, ends: Ints) -> Floats:

@@ -57,10 +57,9 @@ class Imaged:
 
     def topology_of(self, faces: Ints, patch_of_face: Ints) -> Topology:
         """The topology of some of the faces (m,3), images and their vertices as one."""
-        n = len(self.vertices)
-        return (
-            glued(faces, patch_of_face, self.original) if self.periodic else topology(faces, patch_of_face, n)
-        )
+        if self.periodic:
+            return glued(faces, patch_of_face, self.original)
+        return topology(faces, patch_of_face, len(self.vertices))
 
     @cached_property
     def cell(self) -> Any:
@@ -212,20 +211,17 @@ def checked_images(
         ),
     )
     for bad, fault, hint in tests:
-        if bad.any():
-            checks.refuse_rows("images", pairs, np.flatnonzero(bad), fault, hint=hint)
+        checks.refuse_rows("images", pairs, bad, fault, hint)
     original = originals(pairs, len(X))
     G = original[F]
-    own = np.flatnonzero((G[:, [1, 2, 0]] == G).any(axis=1))
-    if len(own):
-        checks.refuse_rows("faces", F, own, "joins a vertex with its image", hint=COARSE)
+    own = (G[:, [1, 2, 0]] == G).any(axis=1)
+    checks.refuse_rows("faces", F, own, "joins a vertex with its image", COARSE)
     topo = glued(F, np.zeros(len(F), dtype=np.int32), original)
     one = X[topo.sides[:, 1]] - X[topo.sides[:, 0]]
     along = (X[F[:, [2, 0, 1]]] - X[F[:, [1, 2, 0]]]) * topo.sense[..., None]
     apart = np.linalg.norm(along - one[topo.edge_of_face], axis=2).max(axis=1) > near
-    if apart.any():
-        fault = "has an edge between two vertices that are joined otherwise elsewhere, by their images"
-        checks.refuse_rows("faces", F, np.flatnonzero(apart), fault, hint=COARSE)
+    fault = "has an edge between two vertices that are joined otherwise elsewhere, by their images"
+    checks.refuse_rows("faces", F, apart, fault, COARSE)
     return read_only(pairs)
 
 
@@ -235,6 +231,5 @@ def check_translations(before: Surface, X: Floats) -> None:
         image, vertex = before.images.T
         t = before.vertices[image] - before.vertices[vertex]
         away = np.linalg.norm(X[image] - X[vertex] - t, axis=1) > ON * before.size
-        if away.any():
-            hint = "move both alike, or change the cell with rebuilt(vertices=...)"
-            checks.refuse_rows("images", before.images, np.flatnonzero(away), "is no longer one", hint=hint)
+        hint = "move both alike, or change the cell with rebuilt(vertices=...)"
+        checks.refuse_rows("images", before.images, away, "is no longer one", hint)

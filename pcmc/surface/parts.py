@@ -251,14 +251,10 @@ def checked_cables(given: Any, topo: Topology) -> tuple[Cable, ...]:
     taken = np.zeros(len(topo.edges), dtype=bool)
     for cable in parts:
         place, what = topo.edge_numbers(cable.edges), f"cable {cable.name!r}: edges"
-        if (place < 0).any():
-            fault = "joins vertices that no edge of the mesh joins"
-            bad = np.flatnonzero(place < 0)
-            checks.refuse_rows(what, cable.edges, bad, fault, hint="name the two ends of an edge")
-        if taken[place].any():
-            hint = "make it one cable with the sum of their tensions"
-            bad = np.flatnonzero(taken[place])
-            checks.refuse_rows(what, cable.edges, bad, "carries another cable, too", hint=hint)
+        fault, hint = "joins vertices that no edge of the mesh joins", "name the two ends of an edge"
+        checks.refuse_rows(what, cable.edges, place < 0, fault, hint)
+        hint = "make it one cable with the sum of their tensions"
+        checks.refuse_rows(what, cable.edges, taken[place], "carries another cable, too", hint)
         taken[place] = True
     return parts
 

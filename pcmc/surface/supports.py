@@ -234,10 +234,8 @@ def checked_lines(given: Any, X: Floats) -> tuple[tuple[Guide, Bools], ...]:
     """The lines and circles that vertices X (n,3) slide along, each with their mask; no vertex on two."""
     expected = "a mapping from Lines or Circles to vertices"
     lines: tuple[tuple[Guide, Bools], ...] = guide_masks("on_line", given, len(X), Guide, expected)
-    double = np.flatnonzero(np.sum([along for _, along in lines], axis=0) > 1)
-    if len(double):
-        hint = "hold it with fixed= instead"
-        checks.refuse_rows("vertices", X, double, "slides along two lines", hint=hint)
+    double = np.sum([np.zeros(len(X), dtype=int), *(along for _, along in lines)], axis=0) > 1
+    checks.refuse_rows("vertices", X, double, "slides along two lines", "hold it with fixed= instead")
     check_on(lines, X, bounding_size(X))
     return lines
 
@@ -250,18 +248,15 @@ def check_on(guides: Iterable[tuple[Plane | Guide, Bools]], X: Floats, size: flo
     near = max(ON * size, RESTING_ROUNDED * float(np.abs(X).max(initial=0.0)))
     for number, (guide, mask) in enumerate(guides):
         away = guide.distance(X)
-        bad = np.flatnonzero(mask & (np.abs(away) > near))
-        if not len(bad):
-            continue
+        bad = mask & (np.abs(away) > near)
         kind = type(guide).__name__.lower()
         if isinstance(guide, Plane):
             place = f"on the {guide if number else kind}"
         else:
             where = f"around {guide.centre}" if isinstance(guide, Circle) else f"through {guide.point}"
             place = f"along the {kind} {where}"
-        fault = f"slides {place}, but is {away[bad[0]]:.3g} away from it"
-        hint = f"move it onto the {kind} or hold it with fixed="
-        checks.refuse_rows("vertices", X, bad, fault, hint=hint)
+        fault = f"slides {place}, but is {away[bad.argmax()]:.3g} away from it"
+        checks.refuse_rows("vertices", X, bad, fault, f"move it onto the {kind} or hold it with fixed=")
 
 
 def checked_planes(
@@ -285,9 +280,9 @@ def checked_planes(
         sides = before, behind = int((height > near).sum()), int((height < -near).sum())
         if before and behind:
             text = (
-                f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind"
+                f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind;"
             )
-            text += "; keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
+            text += " keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
             raise SurfaceError(text, what="on_planes", where=str(plane), found=sides)
         refuse_in_mirror(plane, mask, F, patch, names)
     return tuple(planes)

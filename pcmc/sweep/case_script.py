@@ -96,7 +96,7 @@ def import_case(case: str) -> None:
     gc.disable()
     resolve(case)
     postpone("numpy.f2py")  # scipy imports all of numpy; this part takes long and no case needs it
-    provenance()
+    environment()
 
 
 def answer_case(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def answer_case(case: str, parameters: Mapping[str, Any], time_limit: float | No
     if not gc.isenabled():  # the first case has imported the rest
         gc.freeze()
         gc.enable()
-    return {**fields, "wall_time": seconds, "provenance": {"started": started, **extra, **provenance()}}
+    return {**fields, "wall_time": seconds, "provenance": {"started": started, **extra, **environment()}}
 
 
 def postpone(name: str) -> None:
@@ -137,7 +137,7 @@ def postpone(name: str) -> None:
 
 
 @cache
-def provenance() -> dict[str, Any]:
+def environment() -> dict[str, Any]:
     """Host, process and versions."""
     packages = {name: version(name) for name in ("pcmc", "numpy", "scipy", "numba")}
     return {"host": platform.node(), "pid": os.getpid(), "python": platform.python_version(), **packages}

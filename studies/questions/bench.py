@@ -43,7 +43,7 @@ from pcmc import Surface, certify, energy, solve
 from pcmc.base.arrays import Floats
 from pcmc.base.errors import PcmcError
 from pcmc.forces.functional import energy_and_gradient, patch_areas
-from pcmc.forces.rooms import prescribed_volumes, volume_gradients_at, volumes_at, with_room_pressures
+from pcmc.forces.rooms import prescribed_volumes, room_volume_gradients, room_volumes, with_room_pressures
 from pcmc.solvers import solve_once
 from pcmc.solvers.result import Progress
 from pcmc.stability.equilibrium import Equilibrium
@@ -106,10 +106,10 @@ def scipy_lbfgs(surface: Surface) -> End:
         X = x.reshape(-1, 3)
         value, gradient = energy_and_gradient(surface, X)
         if surface.rooms:
-            excess = volumes_at(surface, X) - wanted
+            excess = room_volumes(surface, X) - wanted
             push = stiffness * excess - pressures
             value += float(((0.5 * stiffness * excess) - pressures) @ excess)
-            gradient = gradient + np.tensordot(push, volume_gradients_at(surface, X), axes=1)
+            gradient = gradient + np.tensordot(push, room_volume_gradients(surface, X), axes=1)
         return value, apply_supports(surface, gradient).ravel()
 
     def watch(intermediate_result: object) -> None:
@@ -125,7 +125,7 @@ def scipy_lbfgs(surface: Surface) -> End:
             X, said = found.x.reshape(-1, 3), str(found.message)
             if time.perf_counter() - begin > LIMIT or ended(surface, X) is None:
                 break
-            pressures = pressures - stiffness * (volumes_at(surface, X) - wanted)
+            pressures = pressures - stiffness * (room_volumes(surface, X) - wanted)
     return End(time.perf_counter() - begin, ended(surface, X), said)
 
 

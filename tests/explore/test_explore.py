@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
 import threading
 from importlib.resources import files
 
@@ -303,3 +304,9 @@ def test_importing_pcmc_does_not_import_the_server():
     code = "import sys, pcmc; assert pcmc.explore.serve; print('http.server' in sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "False"
+
+
+def test_only_disabled_buttons_are_faded():
+    style = files("pcmc.explore").joinpath("page", "style.css").read_text(encoding="utf-8")
+    faded = re.findall(r"^([^{}]*) \{[^{}]*opacity: \.45", style, re.M)
+    assert faded == ["button:disabled"]

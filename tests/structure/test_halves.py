@@ -124,7 +124,7 @@ def test_what_a_project_names_holds_for_its_images(tmp_path):
     tables = [one.analysis().patches.set_index(["case", "patch"])["largest_force"] for one in (half, whole)]
     assert "side (2)" in names
     assert tables[1]["wind", "side (2)"] == pytest.approx(tables[0]["wind", "side"], rel=1e-5)
-    strips = whole.cutting_pattern(whole.pattern_wanted).table.groupby("patch")["warp"]
+    strips = whole.cutting_pattern(whole.project.pattern).table.groupby("patch")["warp"]
     assert strips.count()["side (2)"] == 2
     assert strips.max()["side (2)"] == pytest.approx(strips.max()["side"])
 

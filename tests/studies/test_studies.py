@@ -62,18 +62,21 @@ def test_mesh_comes_back_with_a_stage_that_has_collapsed(tmp_path):
     assert len(set(hashes.values())) == 2
 
 
-def test_large_figures_shrink_and_small_ones_stay(tmp_path):
+def test_large_figures_shrink_and_small_ones_stay_as_all_of_a_short_run(tmp_path):
     from PIL import Image
 
     noise = np.random.default_rng(1).integers(0, 255, (300, 300, 3), dtype=np.uint8)
-    folder = Folder(tmp_path)
-    Image.fromarray(noise).save(folder.figure("large"))
-    Image.fromarray(noise[:50, :50]).save(folder.figure("small"))
-    before = {p.stem: p.stat().st_size for p in tmp_path.glob("*.png")}
-    folder.shrink_figures()
-    after = {p.stem: p.stat().st_size for p in tmp_path.glob("*.png")}
-    assert after["large"] < 0.5 * before["large"]
-    assert after["small"] == before["small"]
+
+    def figure(folder):
+        Image.fromarray(noise).save(folder.figure("large"))
+        Image.fromarray(noise[:50, :50]).save(folder.figure("small"))
+
+    sizes = {}
+    for short in (True, False):
+        perform(_study(figure=figure), tmp_path, short=short, steps=["figure"])
+        sizes[short] = {p.stem: p.stat().st_size for p in (tmp_path / "tiny").glob("*.png")}
+    assert sizes[False]["large"] < 0.5 * sizes[True]["large"]
+    assert sizes[False]["small"] == sizes[True]["small"]
 
 
 def test_shrunken_figures_keep_rare_colours(tmp_path):
@@ -103,7 +106,7 @@ def test_missing_file_says_which_study_writes_it(tmp_path):
 # ------------------------------------------------------------------------------------ steps
 
 
-def _study(name="tiny", fail=""):
+def _study(name="tiny", fail="", figure=lambda folder: None):
     def data(folder, short):
         if fail == "data":
             raise OptionError("no data")
@@ -112,7 +115,7 @@ def _study(name="tiny", fail=""):
     def table(folder):
         return {"x": folder.read_table("records").x[0]}
 
-    return Study(name, "a test", data, table, lambda folder: None, parameters={"a": 1})
+    return Study(name, "a test", data, table, figure, parameters={"a": 1})
 
 
 def test_steps_are_taken_in_order_and_the_provenance_is_apart_from_the_numbers(tmp_path):
