@@ -187,6 +187,9 @@ def check_mesh(
     for _ in range(meshes - 1):
         start = _refined(surfaces[-1], boundary, sharp)
         result = _solved(start, callback)
+        if not result.converged and certificate.index == 0:  # downhill it may come to rest all the same
+            again = _solved(start, callback, "minimum")
+            result = again if again.converged else result
         if not result.converged or result.certificate.index is None:
             finding, order = lost(start, result), -np.inf
             break
@@ -220,8 +223,8 @@ def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Sur
     return refine(surface, 1, boundary if callable(boundary) else None)
 
 
-def _solved(start: Surface, callback: Callback | None) -> Result:
-    result = solve_once(start, "newton", callback, target="stationary", iterations=STEPS)
+def _solved(start: Surface, callback: Callback | None, target: str = "stationary") -> Result:
+    result = solve_once(start, "newton", callback, target=target, iterations=STEPS)
     if result.status is Status.STOPPED:
         raise KeyboardInterrupt
     return result
