@@ -212,8 +212,8 @@ def _fit_together(surface: Surface, walls: list[tuple[int, Ints, Ints, Ints]], m
 def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
-    As many steps along the top and along the bottom from each end of the wall make a pair. It ends at corners,
-    where top and bottom meet, and in planes that one vertex of each lies in.
+    As many steps along the top and along the bottom from each end of the wall make a pair. It ends where top
+    and bottom meet, and in planes that one vertex of each lies in.
     """
     n, tops, bottoms = surface.n, np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)
