@@ -186,7 +186,7 @@ class Equilibria:
         return "\n".join(filter(None, [*lines, *ways, *self.searched, *self.failed, given, half, INCOMPLETE]))
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
-        """A line for each barrier: from where, over which saddle, to where, its energy; then those missing."""
+        """A line for each barrier: from where, over which saddle, to where, its energy; last the unknown."""
         lines = list[str]()
         for b in self.barriers:
             end = b.end if b.to is None else f"to {b.to}"
