@@ -213,7 +213,7 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
     As many steps along the top and along the bottom from each end of the wall make a pair. It ends where top
-    and bottom meet, and in planes that one vertex of each lies in.
+    and bottom meet, and in planes that one vertex of each lies in; a closed one where they are nearest.
     """
     n, tops, bottoms = surface.n, np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)
@@ -222,8 +222,13 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
         pair = [edge[on_plane[edge]] for edge in (tops, bottoms)]
         if len(pair[0]) == len(pair[1]) == 1:
             ends.append(np.array(pair))
+    if count != len(bottoms):
+        return None
+    closed = len(top_edges) == len(bottom_edges) == count
+    if closed and sum(map(np.size, ends)) == 0:
+        ends = [_nearest_edges(surface.vertices, top_edges, bottom_edges)]
     top_ends, bottom_ends = np.concatenate(ends, axis=1)
-    if not len(top_ends) or count != len(bottoms):
+    if not len(top_ends):
         return None
     steps = [_steps(top_edges, top_ends, n)[:, tops].T, _steps(bottom_edges, bottom_ends, n)[:, bottoms].T]
     label = np.unique(np.concatenate(steps), axis=0, return_inverse=True)[1].reshape(2, -1)
@@ -233,6 +238,13 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
     foot = np.full(n, -1, dtype=np.int64)
     foot[tops[above]] = bottoms[below]
     return foot
+
+
+def _nearest_edges(X: Floats, top_edges: Ints, bottom_edges: Ints) -> Ints:
+    """(2,2) the ends of the top edge and of the bottom edge that are nearest, in the same sense."""
+    ways = np.concatenate([bottom_edges, bottom_edges[:, ::-1]])
+    apart, way = cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6))
+    return np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 from nightly import at_night
+from scipy.integrate import quad
+from scipy.optimize import brentq
 from shapes import placed, rotation
 from starts import four_fans, stationary, two_squares
 
@@ -387,3 +389,24 @@ def test_between_two_mirrors_it_rests_as_in_a_long_roof(upright, most):
         for r, angle in [(6.0, np.arcsin(0.5)), (4.0, np.arcsin(0.75))]
     )
     assert found.energy / 0.6 == pytest.approx(arcs, rel=3e-4)
+
+
+def test_a_closed_wall_comes_down_at_the_pull_of_both_sides():
+    """Over the ring r sin = r²/10 + c, with no rise; the mesh is coarse, so that a tenth more does not do."""
+
+    def slope(r, c):
+        sine = r / 10.0 + c / r
+        return sine / np.sqrt(1.0 - sine**2)
+
+    c = brentq(lambda c: quad(slope, 3.0, 6.0, args=(c,))[0], -2.5, -1.0)
+    pull = 1.5 - 5.0 * (0.3 + c / 3.0)
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    patches = {"in": {"tension": 5.0, "at": [0, 0]}, "out": {"tension": 5.0, "at": [4.5, 0]}}
+    for factor in (0.95, 1.25):
+        wall = Divider((3.0 * circle).tolist(), wall=factor * pull)
+        found = solve(Plan((6.0 * circle[:-1]).tolist(), [wall], edge_length=0.6, patches=patches).surface())
+        assert found.certificate.verdict is Verdict.STABLE
+        resting = standing_part(found.surface).resting
+        assert resting.sum() == (find_walls(found.surface).top_free.sum() if factor > 1.0 else 0)
+    assert resting.any()
