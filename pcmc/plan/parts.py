@@ -296,7 +296,7 @@ def rooms_of(spec: Any, patches: Sequence[PatchSpec], given: Any = ()) -> dict[s
 
     ``given`` are the patches as plain data, whose pressures are refused there."""
     rooms = {a.name: RoomData((a.name,), a.volume) for a in patches if a.volume is not None}
-    if not isinstance(spec, Mapping | None):
+    if not isinstance(spec, Mapping | None) and not (isinstance(spec, tuple) and not spec):
         validate.refuse("rooms", spec, "a mapping from names to patches and a volume")
     for name, room in (spec or {}).items():
         values = vars(room) if isinstance(room, RoomData) else room
