@@ -367,3 +367,23 @@ def test_in_a_half_it_rests_as_in_the_whole(oblique, tension, at_mirror):
     assert at_rest.any()
     assert (at_rest & middle).any() == at_mirror
     assert 2 * at_rest.sum() - (at_rest & middle).sum() == standing_part(whole.surface).resting.sum()
+
+
+@pytest.mark.parametrize(
+    ("upright", "most"), [(True, 6.0), (False, np.hypot(6.0, np.sqrt(27.0) - np.sqrt(7.0)))]
+)
+def test_between_two_mirrors_it_rests_as_in_a_long_roof(upright, most):
+    """Arcs of radii 6 and 4 over 6 pull the wall up with 3 each, and across it with √27 - √7."""
+    patches = {"west": {"tension": 6.0}, "east": {"tension": 4.0}}
+    outline, mirrors = [[0, 0], [12, 0], [12, 0.6], [0, 0.6]], [[[0, y], [12, y]] for y in (0, 0.6)]
+    for factor in (0.99, 1.01):
+        divider = Divider([[6, 0], [6, 0.6]], wall=factor * most, upright=upright)
+        plan = Plan(outline, [divider], edge_length=0.3, patches=patches, mirrors=mirrors)
+        found = solve(plan.surface())
+        assert found.certificate.verdict is Verdict.STABLE
+        assert standing_part(found.surface).resting.sum() == (3 if factor > 1.0 else 0)
+    arcs = sum(
+        r**2 * (angle + 0.5 * np.sin(2.0 * angle))
+        for r, angle in [(6.0, np.arcsin(0.5)), (4.0, np.arcsin(0.75))]
+    )
+    assert found.energy / 0.6 == pytest.approx(arcs, rel=3e-4)
