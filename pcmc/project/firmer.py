@@ -20,7 +20,7 @@ def firmer(outcome: Outcome, changed: Changed | None = None, progress: OnStep = 
     ``run_project``.
     """
     check, project = outcome.mesh_check, outcome.project
-    if check is None or check.verdict is not check.verdict.HELD_BY_MESH or check.advice or outcome.advice:
+    if check is None or check.verdict.name != "HELD_BY_MESH" or check.advice or outcome.advice:
         return []
     if project is None or project.plan is None:
         return []
