@@ -243,7 +243,8 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
 def _nearest_edges(X: Floats, top_edges: Ints, bottom_edges: Ints) -> Ints:
     """(2,2) the ends of the top edge and of the bottom edge that are nearest, in the same sense."""
     ways = np.concatenate([bottom_edges, bottom_edges[:, ::-1]])
-    apart, way = cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6))
+    found = cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6))
+    apart, way = map(np.asarray, found)
     return np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])
 
 
