@@ -197,14 +197,14 @@ def _mended(task: Task, plan: Plan, result: Result) -> Mended:
 def _tried(task: Task, plan: Plan, result: Result) -> Result | None:
     """How a plan ends on a mesh that is not fine; None where it has none, as with a patch inside a ring."""
     try:
-        return solve(_coarse(plan, result).surface(), task.method, **task.options)
+        return solve(coarse(plan, result.surface).surface(), task.method, **task.options)
     except PcmcError:
         return None
 
 
-def _coarse(plan: Plan, result: Result) -> Plan:
-    """The plan with a mesh that is not fine."""
-    return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(result.surface.m / TRIANGLES)))
+def coarse(plan: Plan, surface: Surface) -> Plan:
+    """The plan of a surface with a mesh that is not fine."""
+    return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(surface.m / TRIANGLES)))
 
 
 def _with_targets(
@@ -216,7 +216,7 @@ def _with_targets(
         if candidate is task.plan or candidate is None:  # tried already, or nothing to loosen
             continue
         try:
-            trial = try_plan(candidate, _coarse(candidate, result).surface(), targets)
+            trial = try_plan(candidate, coarse(candidate, result.surface).surface(), targets)
         except PcmcError:  # such as a target that the coarse mesh cannot measure
             continue
         if trial.good:

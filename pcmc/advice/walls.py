@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from ..plan import Plan
 from ..surface import Surface
 from ..surface.pieces import two_digits
-from .advice import changes, straight_walls, with_dividers
+from .advice import changes, coarse, straight_walls, with_dividers
 
 STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
 
@@ -23,7 +23,7 @@ def firmer_walls(plan: Plan, surface: Surface, file: str, persists: Callable[[Pl
     project, and ``persists`` says whether the roof of another plan comes to rest, as on finer meshes.
     """
     for other in _firmer(plan, surface):
-        if persists(other):
+        if persists(coarse(other, surface)):
             return [f"type in {file}, which was tried and persists:", *changes(plan, other)]
     return []
 

@@ -34,7 +34,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     if outcome.design is not None:
         print(f"targets {outcome.design.text(units)}")
         if outcome.design.met:  # otherwise the message has the values
-            print(outcome.values_found)
+            print(outcome.design.values(outcome.units))
     for note in outcome.notes:
         print(note)
     if verdict:

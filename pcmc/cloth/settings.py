@@ -137,9 +137,9 @@ class CuttingOptions:
         return replace(self, **{key: with_images(given, images) for key, given in by_patch.items()})
 
     def of_patch(self, key: str, name: str) -> Any:
-        """The value of a key of ``BY_PATCH`` for a patch; None where there is none."""
+        """The value of a key of ``BY_PATCH`` for a patch, by default that of the key."""
         given = getattr(self, key)
-        return given.get(name) if isinstance(given, Mapping) else given
+        return given.get(name, getattr(CuttingOptions, key)) if isinstance(given, Mapping) else given
 
     def stretch(self, tension: float, patch: str = "") -> tuple[float, float]:
         """Cut length over length on the roof of a patch, along warp and weft, under a tension, force/length.

@@ -99,6 +99,10 @@ class Design:
         """``text`` without units."""
         return self.text()
 
+    def values(self, units: Units = NO_UNITS) -> str:
+        """The values of the targets, and those of the parameters with which they are met."""
+        return ", with ".join(values_text(table, units) for table in (self.targets, self.parameters))
+
     def text(self, units: Units = NO_UNITS) -> str:
         """A sentence, with the nearest reachable value of each target that is not met."""
         text = self.status.value

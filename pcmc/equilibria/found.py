@@ -186,12 +186,20 @@ class Equilibria:
         return "\n".join(filter(None, [*lines, *ways, *self.searched, *self.failed, given, half, INCOMPLETE]))
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
-        """A line for each barrier: from where, over which saddle, to where, and its energy."""
+        """A line for each barrier: from where, over which saddle, to where, its energy; last the unknown."""
         lines = list[str]()
         for b in self.barriers:
             end = b.end if b.to is None else f"to {b.to}"
             energy = f"{b.energy:.6g}{units.behind('energy')}"
             lines.append(f"barrier from {b.start} over saddle {b.saddle} {end}: {energy}")
+        joined = list[list[int]]()
+        for k in self.stable:
+            group = next((group for group in joined if self.barrier(group[0], k) < math.inf), None)
+            joined.append([k]) if group is None else group.append(k)
+        for group in joined[1:]:
+            others = ", ".join(map(str, group))
+            text = f"barrier from {joined[0][0]} to {others}: not known, as no saddle was found between them"
+            lines.append(text)
         return lines
 
     def __repr__(self) -> str:

@@ -186,7 +186,7 @@ def held_walls(
         below = vertices[surface.pinned[vertices] & ~roof_vertex[vertices]]
         if not len(top) or not low[below].all():
             continue
-        foot = _held_feet(surface.n, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
+        foot = _held_feet(surface, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
         if foot is None:
             continue
         free = np.unique(top)[~surface.pinned[np.unique(top)]]
@@ -215,16 +215,23 @@ def _fit_together(surface: Surface, walls: list[tuple[int, Ints, Ints, Ints]], m
     return [bool(row.all()) for row in good]
 
 
-def _held_feet(n: int, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
+def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | None:
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
-    As many steps along the top and along the bottom from each corner, where the wall ends, make a pair.
+    As many steps along the top and along the bottom from each end of the wall make a pair. It ends where top
+    and bottom meet, and in planes that one vertex of each lies in.
     """
-    tops, bottoms = np.unique(top_edges), np.unique(bottom_edges)
+    n, tops, bottoms = surface.n, np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)
-    if not len(corners) or count != len(bottoms):
+    ends = [np.array([corners, corners])]
+    for _, on_plane in surface.on_planes:
+        pair = [edge[on_plane[edge]] for edge in (tops, bottoms)]
+        if len(pair[0]) == len(pair[1]) == 1:
+            ends.append(np.array(pair))
+    top_ends, bottom_ends = np.concatenate(ends, axis=1)
+    if not len(top_ends) or count != len(bottoms):
         return None
-    steps = [_steps(top_edges, corners, n)[:, tops].T, _steps(bottom_edges, corners, n)[:, bottoms].T]
+    steps = [_steps(top_edges, top_ends, n)[:, tops].T, _steps(bottom_edges, bottom_ends, n)[:, bottoms].T]
     label = np.unique(np.concatenate(steps), axis=0, return_inverse=True)[1].reshape(2, -1)
     above, below = label.argsort(axis=1)
     if any((np.sort(labels) != np.arange(count)).any() for labels in label):

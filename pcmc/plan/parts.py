@@ -210,6 +210,9 @@ def divider_of(spec: Any, number: int) -> Divider:
         validate.refuse("upright", part.upright, "True or False", what)
     line, cable = curve_of(part.curve, what), _cable(part, what)
     wall, kind = (None, "divider") if part.wall is None or part.wall is False else (part.wall, "wall")
+    if wall is None and part.bottom != Divider.bottom:
+        message = f"{what}: bottom = {part.bottom!r} is of a wall, and here is none; leave it out"
+        raise OptionError(message, what="bottom", where=what, found=part.bottom)
     return replace(part, curve=line, wall=wall, name=part.name or f"{kind} {number}", **cable)
 
 

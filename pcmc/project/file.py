@@ -21,7 +21,7 @@ from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..structure.section import Structure, members_of
+from ..structure.section import Structure, check_members
 from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
@@ -223,7 +223,7 @@ def project_of(
             plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
         named = [] if plan is None else [p.member for p in (*plan.dividers, *plan.holes) if p.member]
         if structure is not None:
-            members_of(structure.members, plan)
+            check_members(structure.members, plan)
             for name, member in structure.members.items():
                 if name not in named and not any(member.get(key) for key in ("on", "along", "bars")):
                     text = f"member {name!r} is nowhere; name it in a divider or a hole of the plan, give it"

@@ -174,14 +174,6 @@ class Outcome:
         return message, detail
 
     @property
-    def values_found(self) -> str:
-        """The values of the targets, and of the parameters found; empty without targets."""
-        from ..design.outcome import values_text
-
-        tables = () if self.design is None else (self.design.targets, self.design.parameters)
-        return ", with ".join(values_text(table, self.units) for table in tables)
-
-    @property
     def mark(self) -> str:
         """What drawings are marked with where the certificate has no mark."""
         from ..drawings.sheet import MISSED

@@ -219,6 +219,10 @@ class Output:
         if bool(self.net) != (self.net_size is not None):
             text = "files of a net need net_size = LENGTH, the edge of its panels, and net_size needs net"
             raise OptionError(f"net: {text}", what="net_size" if self.net else "net")
+        for name in () if self.net else ("net_pattern", "net_direction"):
+            if getattr(self, name) != getattr(Output, name):
+                text = f"{name}: counts only with net = [...]; give it, too, or leave {name} out"
+                raise OptionError(text, what=name, found=getattr(self, name))
         for name in ("panels", "panel_sheets"):
             if getattr(self, name) and self.tolerance is None:
                 text = f"{name}: needs the largest difference of edges in a family; add tolerance = LENGTH"

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
-from ..advice.walls import firmer_walls
-from ..base.errors import BalanceWarning, OptionError, PcmcError
+from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
 from ..certificate.balance import unbalanced
@@ -217,35 +216,6 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         return solve_project(plain, surface)
 
     return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
-
-
-def firmer(outcome: Outcome, changed: Changed | None = None, progress: OnStep = ignore) -> list[str]:
-    """What to type so that finer meshes hold a roof, too, where its mesh check finds that they do not.
-
-    A line each; empty for other roofs, and where nothing helps of what is tried; ``changed`` as of
-    ``run_project``.
-    """
-    check, project = outcome.mesh_check, outcome.project
-    if check is None or check.verdict is not check.verdict.HELD_BY_MESH or check.advice or outcome.advice:
-        return []
-    if project is None or project.plan is None:
-        return []
-
-    def persists(plan: Plan) -> bool:
-        progress("looking for advice")
-        plain = replace(project, plan=plan, remeshing=(), wanted=AccuracyWanted())
-        try:
-            start = plan.surface()
-            trial = solve_project(plain, start if changed is None else changed(start))
-        except PcmcError:
-            return False
-        found = trial.check_mesh() if trial.good else None
-        return found is not None and found.persists
-
-    file = project.path.with_suffix(".toml").name
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the project's own warnings were shown
-        return firmer_walls(project.plan, outcome.surface, file, persists)
 
 
 def _check_wishes(project: Project, surface: Surface) -> None:

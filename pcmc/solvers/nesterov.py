@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.errors import OptionError
 from ..surface import Surface
 from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
@@ -58,6 +59,11 @@ class NesterovOptions:
         validate.integer("floor_power", self.floor_power)
         validate.flag("momentum", self.momentum)
         validate.flag("line_search", self.line_search)
+        for switch, names in (("momentum", ["gamma"]), ("line_search", ["tau", "floor_power"])):
+            for name in () if getattr(self, switch) else names:
+                if getattr(self, name) != getattr(NesterovOptions, name):
+                    text = f"{name}: counts only with {switch}; leave one of both out"
+                    raise OptionError(text, what=name, found=getattr(self, name))
         validate.choice("armijo", self.armijo, ("printed", "sufficient"))
         if self.tolerance is not None:
             validate.number("tolerance", self.tolerance, least=0.0)

@@ -369,6 +369,9 @@ def checked_areas(given: object, surface: Surface, without: Container[str] = ())
         raise OptionError(message, what="cable_area", where=name)
     if given is not None and not isinstance(given, Mapping):
         validate.number("cable_area", given, **limits)
+        if not wanting:
+            text = "cable_area: no cable of the surface needs it; leave it out"
+            raise OptionError(text, what="cable_area", found=given)
     areas = [(name, area) for name, area in _each(given, surface.cables, "cable") if name not in without]
     return {name: validate.number("cable_area", area, where=name, **limits) for name, area in areas}
 

@@ -203,6 +203,13 @@ class Structure:
         if self.gravity is not None and not self._heavy:
             text = "gravity: nothing has a weight; give a density, too, or leave it out"
             raise OptionError(text, what="gravity", found=self.gravity)
+        cloths = [self.weft is not None or "weft" in own for own in self.patches.values()]
+        warped = [own for own, cloth in zip(self.patches.values(), cloths, strict=True) if not cloth]
+        if any("warp" in own for own in warped) or (
+            tuple(self.warp) != Structure.warp and self.weft is None and not any(cloths)
+        ):
+            text = "warp: is of a cloth; give its weft and shear, too, or leave it out"
+            raise OptionError(text, what="warp")
         check_combinations(self.combinations, self.loads(()))
 
     @property
@@ -343,3 +350,17 @@ def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tup
             raise OptionError(text, what="member", where=owner, found=name)
         members.append(known[name].member(name, on))
     return tuple(members)
+
+
+def check_members(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> None:
+    """Refuse keys of [structure.members] that count for nothing where the plan has the members."""
+    curves = {member.name for member in members_of(given, plan) if isinstance(member.on, Curve)}
+    for name, table in given.items():
+        for key, counts, of in (
+            ("propped", name in curves, "a member along edges or around a hole"),
+            ("strength", table.get("bars"), "columns and stays, bars ="),
+            ("ends", table.get("kind") != "cable", "a beam"),
+        ):
+            if table.get(key, getattr(MemberSection, key)) != getattr(MemberSection, key) and not counts:
+                text = f"member {name!r}: {key} is of {of}; leave it out"
+                raise OptionError(text, what=key, where=name, found=table[key])

@@ -340,6 +340,8 @@ def test_the_stretch_is_what_a_tension_undoes():
     assert warp * (1.0 + 4.0 * 0.75 / 200.0) == pytest.approx(1.0)
     assert weft * (1.0 + 4.0 / 100.0 - 0.25 * 4.0 / 200.0) == pytest.approx(1.0)
     usual = CuttingOptions(strips=1, stiffness=(200.0, 100.0)).stretch(4.0)[1]
+    by_patch = CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson={"other": 0.2})
+    assert usual == by_patch.stretch(4.0, "roof")[1]
     assert usual == CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson=0.3).stretch(4.0)[1]
     assert CuttingOptions(strips=1, compensation=(20.0, 0.0)).stretch(4.0) == (0.8, 1.0)
     with pytest.raises(OptionError, match="compensation"):

@@ -167,6 +167,8 @@ def test_walls_that_lean_to_either_side_are_two_equilibria():
     assert upright.energy < left.energy
     mirrored = left.surface.moved(left.surface.vertices * [-1.0, 1.0, 1.0])
     assert shape_distance(mirrored, right.surface) < 0.1 * shape_distance(left.surface, right.surface)
+    for other in (2, 3):
+        assert f"barrier from 1 to {other}: not known" in str(found)
 
 
 def test_where_contact_hides_a_change_of_index_the_branch_is_followed_in_shorter_steps(monkeypatch):
@@ -316,6 +318,22 @@ def test_the_way_out_of_a_minimum_leads_to_another_shape():
     ways = [(3, 2, None), (4, 1, 1), (5, 1, 2)]
     ways = tuple(WayDown(saddle, to) for saddle, *both in ways for to in both)
     assert Equilibria(found, ways, (), {}).barrier(1) == 3.0
+
+
+def test_minima_that_no_saddle_joins_are_named():
+    """Over saddle 6 a way leads from 2 to 3, over 5 from 1 out of all minima; 4 has none."""
+    shapes = [(index, float(energy)) for energy, index in enumerate([0, 0, 0, 0, 1, 1])]
+    found = tuple(SimpleNamespace(index=index, energy=energy) for index, energy in shapes)
+    ways = tuple(
+        WayDown(saddle, to, "" if to else "inflates") for saddle, to in [(5, 1), (5, None), (6, 2), (6, 3)]
+    )
+    assert Equilibria(found, ways, (), {}).barrier_lines() == [
+        "barrier from 1 over saddle 5 inflates: 4",
+        "barrier from 2 over saddle 6 to 3: 4",
+        "barrier from 3 over saddle 6 to 2: 3",
+        "barrier from 1 to 2, 3: not known, as no saddle was found between them",
+        "barrier from 1 to 4: not known, as no saddle was found between them",
+    ]
 
 
 def test_a_search_that_is_stopped_keeps_what_it_has():

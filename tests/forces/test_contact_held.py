@@ -384,53 +384,21 @@ def test_in_a_half_it_rests_as_in_the_whole(oblique, tension, at_mirror):
     assert 2 * at_rest.sum() - (at_rest & middle).sum() == standing_part(whole.surface).resting.sum()
 
 
-def hall(east, wall, upright=True, edge_length=0.8):
-    """Two bays of 6 by 8 with tensions 6 and ``east``, and a wall between them."""
-    patches = {"west": {"tension": 6.0}, "east": {"tension": east}}
-    divider = Divider([[6, 0], [6, 8]], wall=wall, upright=upright)
-    outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
-    return Plan(outline, [divider], edge_length=edge_length, patches=patches).surface()
-
-
-def test_a_strong_upright_wall_comes_down_as_any_other():
-    """On the bottom all along both are the two roofs of the bays alone."""
-    upright, free = solve(hall(2.0, 9.0)), solve(hall(2.0, 9.0, upright=False))
-    assert upright.certificate.verdict is free.certificate.verdict is Verdict.STABLE
-    at_rest = standing_part(upright.surface).resting
-    assert at_rest.sum() == standing_part(free.surface).resting.sum() == 9
-    assert upright.energy == pytest.approx(free.energy, rel=1e-4)
-    # one line holds the junction, and the plane nothing
-    rows = [result.certificate.supports[["name", "kind"]].to_numpy().tolist() for result in (upright, free)]
-    assert rows[0] == rows[1]
-    assert rows[0][-1] == ["west | east | wall 1, inside", "line"]
-
-
-def test_the_plane_of_an_upright_wall_takes_the_pull_across_it():
-    """Sheets of 6 and 2 pull across with 4, which a wall of 3.5 alone cannot hold."""
-    found = solve(hall(2.0, 3.5, edge_length=0.5))
-    assert found.certificate.verdict is Verdict.STABLE
-    part = standing_part(found.surface)
-    assert 0 < part.resting.sum() < 9
-    pull, capacity = pull_and_capacity(part.surface, part.walls, part.resting)
-    assert (np.abs(pull) <= capacity)[part.resting].all()
-    direction = directions_of_pull(part.surface, part.walls, part.resting)[part.resting]
-    assert np.allclose(direction, [0.0, 0.0, 1.0])
-    force = -energy_and_gradient(part.surface, supports=False)[1][part.resting]
-    assert (np.linalg.norm(force, axis=1) > capacity[part.resting]).all()
-    supports = found.certificate.supports.set_index("kind")
-    assert supports.loc["upright plane", "force_x"] > 20.0
-    assert found.certificate.balance["force_share"].iloc[-1] < 0.005
-
-
-@pytest.mark.parametrize("upright", [(True, True), (True, False), (False, True)])
-def test_upright_walls_that_meet_come_down_together(upright):
-    lines = [[[9, 0], [9, 8]], [[9, 4], [16, 4]]]
-    dividers = [Divider(line, wall=8.0, upright=up) for line, up in zip(lines, upright, strict=True)]
-    patches = {"a": {"tension": 3.2, "at": [3, 3]}, "b": {"tension": 1.9, "at": [12, 2]}}
-    patches["c"] = {"tension": 2.1, "at": [12, 6]}
-    plan = Plan([[0, 0], [16, 0], [16, 8], [0, 8]], dividers, edge_length=0.8, patches=patches)
-    found = solve(plan.surface())
-    assert found.certificate.verdict is Verdict.STABLE
-    walls = find_walls(found.surface)
-    assert standing_part(found.surface).resting[walls.held].all()
-    assert walls.meeting.sum() == 1
+@pytest.mark.parametrize(
+    ("upright", "most"), [(True, 6.0), (False, np.hypot(6.0, np.sqrt(27.0) - np.sqrt(7.0)))]
+)
+def test_between_two_mirrors_it_rests_as_in_a_long_roof(upright, most):
+    """Arcs of radii 6 and 4 over 6 pull the wall up with 3 each, and across it with √27 - √7."""
+    patches = {"west": {"tension": 6.0}, "east": {"tension": 4.0}}
+    outline, mirrors = [[0, 0], [12, 0], [12, 0.6], [0, 0.6]], [[[0, y], [12, y]] for y in (0, 0.6)]
+    for factor in (0.99, 1.01):
+        divider = Divider([[6, 0], [6, 0.6]], wall=factor * most, upright=upright)
+        plan = Plan(outline, [divider], edge_length=0.3, patches=patches, mirrors=mirrors)
+        found = solve(plan.surface())
+        assert found.certificate.verdict is Verdict.STABLE
+        assert standing_part(found.surface).resting.sum() == (3 if factor > 1.0 else 0)
+    arcs = sum(
+        r**2 * (angle + 0.5 * np.sin(2.0 * angle))
+        for r, angle in [(6.0, np.arcsin(0.5)), (4.0, np.arcsin(0.75))]
+    )
+    assert found.energy / 0.6 == pytest.approx(arcs, rel=3e-4)

@@ -159,7 +159,7 @@ def test_targets_find_it(sail):
     assert roof.good, roof
     (found,) = set(weights_of(roof.surface).values())
     assert found == pytest.approx(0.3, rel=1e-5)
-    assert roof.values_found.endswith(f"weight of {' and '.join(ropes)} {found:.6g} kN/m")
+    assert roof.design.values(roof.units).endswith(f"weight of {' and '.join(ropes)} {found:.6g} kN/m")
 
 
 def test_the_page_has_a_slider_for_it(sail):

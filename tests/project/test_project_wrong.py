@@ -10,7 +10,7 @@ from refusals import refused
 from small_project import SMALL
 
 from pcmc import cli
-from pcmc.base.errors import FileError, PlanError
+from pcmc.base.errors import FileError, OptionError, PlanError
 from pcmc.project import load, run
 from pcmc.project.start import surface_of
 
@@ -68,7 +68,10 @@ def test_lines_that_make_no_plan_are_refused_with_a_rise_as_without(tmp_path, pl
 ARCH = (
     "\n[structure]\nyoung = 1e6\nthickness = 0.001\n[structure.members.arch]\nyoung = 1e8\ndiameter = 0.1\n"
 )
+CLOTH = "[structure]\nyoung = 1e6\nthickness = 0.001\n"
 FLAT = "[plan]\noutline = [[0, 0], [6, 0], [6, 4]]\ntension = 3.0\n"
+HALF = FLAT + "[[plan.dividers]]\ncurve = [[3, 0], [3, 4]]\n"
+FLOW = FLAT + "[solve]\nmethod = 'nesterov'\n"
 
 
 @pytest.mark.parametrize(
@@ -77,11 +80,34 @@ FLAT = "[plan]\noutline = [[0, 0], [6, 0], [6, 4]]\ntension = 3.0\n"
         (f"mesh = 'roof.obj'\n{FLAT}", "plan"),
         (FLAT + ARCH, "member"),
         (f"mesh = 'roof.obj'{ARCH}on = ['wall 1']\nbars = [[[0, 0], [0, 0, -3]]]\n", "bars"),
+        (f"{HALF}wall = false\nbottom = 'sliding'\n", "bottom"),
+        (f"{HALF}member = 'arch'\n{ARCH}propped = true\n", "propped"),
+        (f"{HALF}member = 'arch'\n{ARCH}strength = 1e5\n", "strength"),
+        (f"{HALF}member = 'arch'\n{ARCH}kind = 'cable'\nends = 'clamped'\n", "ends"),
+        (FLAT + CLOTH + "warp = [0, 1, 0]\n", "warp"),
+        (FLAT + CLOTH + "patches = {roof = {warp = [0, 1, 0]}}\n", "warp"),
+        (with_output("net_pattern = 'quads'"), "net_pattern"),
+        (with_output("net_pattern = 'quads'\nnet_direction = 30.0"), "net_pattern"),
+        (FLOW + "momentum = false\ngamma = 0.5\n", "gamma"),
+        (FLOW + "line_search = false\ntau = 0.7\n", "tau"),
+        (FLOW + "line_search = false\nfloor_power = 3\n", "floor_power"),
     ],
 )
 def test_what_a_project_would_leave_out_is_refused(tmp_path, text, what):
-    with refused(FileError, what=what):
+    with refused(FileError, what=what) as caught:
         load(project(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_an_area_of_cables_without_cables_is_refused(tmp_path):
+    text = f"units = 'm'\nforce = 'kN'\n{FLAT}{CLOTH}cable_area = 1e-4\n[output]\nstructure = 'a.inp'\n"
+    with refused(OptionError, what="cable_area"):
+        run(project(tmp_path, text))
+
+
+def test_a_warp_of_all_patches_counts_where_one_is_a_cloth(tmp_path):
+    text = FLAT + CLOTH + "warp = [0, 1, 0]\npatches = {roof = {weft = 4e5, shear = 1e4}}\n"
+    assert load(project(tmp_path, text)).structure.warp == [0, 1, 0]
 
 
 def test_a_number_out_of_range_is_named_with_its_line(tmp_path):

@@ -141,7 +141,7 @@ def test_combinations_add_loads_with_their_factors():
     """On a film that answers in proportion the deflections add up, self-weight with its own factor."""
     loads = [SelfWeight(), Snow(1e-4, patches=["film"]), Wind({"film": 2e-4})]
     sums = {"uls": {"snow": 1.5, "wind": 0.5}, "light": {"self-weight": 0.0, "snow": 1.0}}
-    found = analyse(model_of(square(8), loads=loads, combinations=sums, anyway=True, cable_area=1e-4))
+    found = analyse(model_of(square(8), loads=loads, combinations=sums, anyway=True))
     weight, snow, wind, uls, light = (case.results.deflections for case in found.cases[1:])
     scale = np.abs(weight).max()
     np.testing.assert_allclose(uls, weight + 1.5 * (snow - weight) + 0.5 * (wind - weight), atol=1e-3 * scale)
