@@ -210,7 +210,10 @@ def check_mesh(
 
 def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
     """The numbers (k,) of the corners, checked."""
-    numbers = np.asarray(corners)
+    try:
+        numbers = np.asarray(corners)
+    except ValueError:  # of rows of several lengths
+        numbers = np.array([""])
     whole = numbers.size == 0 or (numbers.ndim == 1 and np.issubdtype(numbers.dtype, np.integer))
     if not whole or (numbers.size and not (numbers.min() >= 0 and numbers.max() < n)):
         validate.refuse("corners", corners, f"whole numbers of vertices, 0..{n - 1}")

@@ -354,6 +354,8 @@ def certified(surface: Surface, anyway: bool, known: Certificate | None = None) 
     SurfaceError if the surface is not certified, unless ``anyway``, and if ``known`` is another surface's.
     """
     validate.flag("anyway", anyway)
+    if not isinstance(known, Certificate | None):
+        validate.refuse("certificate", known, "a Certificate, as of certify")
     if known is not None:
         own = energy(surface)
         if len(known.reactions) != surface.n or not math.isclose(known.energy, own, rel_tol=1e-9):

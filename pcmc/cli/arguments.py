@@ -21,6 +21,7 @@ from ..base.units import LENGTHS
 from ..io import FORMATS, READ_ONLY
 from ..project import Outcome, Output, Project
 from ..project.drawn import files_of
+from ..project.file import is_project
 from ..project.outcome import MOST_CHECKED, OnStep
 from ..project.varied import with_loads
 from ..project.writing import check_outputs
@@ -145,9 +146,7 @@ class Shown(Loads):
 
     def roof(self, project: Project, progress: OnStep, whole: bool) -> Outcome:
         """The roof of a project; the ``whole`` one if asked for."""
-        if self.start and not project.specified:
-            text = f"--start: {project.path.name} is a surface, shown as it is; leave out --start"
-            raise OptionError(text, what="--start")
+        check_start(self.start, project.path)
         how: dict[str, Any] = {"changed": self.change, "start": self.start, "use_cache": self.cache}
         roof = projects.opened(project, progress, **how)
         return replace(roof, unfold=whole or roof.unfold)
@@ -262,6 +261,13 @@ def _value(text: str) -> Any:
     except (ValueError, SyntaxError):
         return text
     return number if isinstance(number, int | float) else text
+
+
+def check_start(start: bool, file: Path) -> None:
+    """Refuse --start for a file that holds a surface."""
+    if start and not is_project(file):
+        text = f"--start: {file.name} is a surface, shown as it is; leave out --start"
+        raise OptionError(text, what="--start")
 
 
 def numbers(

@@ -151,6 +151,7 @@ def explore(
         progress("building")
         if file is not None:
             arguments.check_suffix(file)
+            arguments.check_start(start_shape, file)
             read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
             roof, again = read(progress=progress, report=reports.report), read if watch else None
         else:

@@ -61,6 +61,8 @@ def equilibria_(
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
     if axis != "height" and not any(path.suffix.lower() in PICTURES for path in files):
         raise OptionError("--axis: is of the diagram; add -o diagram.svg, or leave it out", what="--axis")
+    if seed and not starts:
+        raise OptionError("--seed: is of random starts; leave out --starts 0, or the seed", what="--seed")
     ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
     with working() as progress:
         roof = what.roof(load_project(file, units), progress, whole)

@@ -22,6 +22,7 @@ NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
     "poisson": {"least": 0.0, "below": 1.0},
     **{key: {"least": 0.0} for key in ("allowance", "hem", "notches")},
 }
+PAIR = "two numbers, [warp, weft]"
 PAIRS = ("compensation", "stiffness")  # keys of two numbers, [warp, weft]
 BY_PATCH = ("strips", "direction", "stiffness", "poisson")  # keys that may be tables
 
@@ -67,12 +68,14 @@ class CuttingOptions:
     def __post_init__(self) -> None:
         if self.width is not None and self.strips is not None:
             raise OptionError("strips: the width gives their number; leave out one of both", what="strips")
-        if self.width is None and self.strips is None and not len(self.seams):
+        if self.width is None and self.strips is None and not validate.listed("seams", self.seams):
             text = "a cutting pattern needs the width of the cloth, a number of strips, or seams; give"
             raise OptionError(f"{text} --width or the key width of [pattern]", what="width")
         if self.compensation is not None and self.stiffness is not None:
             text = "stiffness: the compensation is given; leave out one of both"
             raise OptionError(text, what="stiffness")
+        if not isinstance(self.poisson, Mapping):
+            validate.number("poisson", self.poisson, **NUMBERS["poisson"])
         if self.stiffness is None and self.poisson != CuttingOptions.poisson:
             text = "poisson: it counts with the stiffness of the cloth alone; give stiffness, or leave it out"
             raise OptionError(text, what="poisson", found=self.poisson)
@@ -80,8 +83,8 @@ class CuttingOptions:
             validate.integer("strips", count, least=1)
         for name, limits in NUMBERS.items():
             for value in self._values(name):
-                if name in PAIRS and (isinstance(value, str) or np.ndim(value) != 1 or len(value) != 2):
-                    validate.refuse(name, value, "two numbers, [warp, weft]")
+                if name in PAIRS and len(validate.listed(name, value, PAIR)) != 2:
+                    validate.refuse(name, value, PAIR)
                 for number in value if name in PAIRS else [value]:
                     validate.number(name, number, **limits)
         self.lines  # noqa: B018 — refuses lines that are none
@@ -110,7 +113,7 @@ class CuttingOptions:
     def lines(self) -> list[Floats]:
         """The drawn seams as arrays (k,2) or (k,3)."""
         lines = []
-        for number, line in enumerate(self.seams, 1):
+        for number, line in enumerate(validate.listed("seams", self.seams), 1):
             try:
                 points = np.asarray(line, dtype=float)
             except (TypeError, ValueError):

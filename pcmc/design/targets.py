@@ -73,13 +73,13 @@ class Target:
     name: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "quantity", SHORT.get(self.quantity, self.quantity))
-        validate.choice("quantity", self.quantity, tuple(MEASURES))
+        quantity = validate.choice("quantity", SHORT.get(str(self.quantity), self.quantity), tuple(MEASURES))
+        object.__setattr__(self, "quantity", quantity)
         if self.quantity == "height":
             object.__setattr__(self, "of", _point(self.of))
         elif not (isinstance(self.of, str) or (self.of is None and self.quantity not in NAMED)):
             kind = NAMED.get(self.quantity, "patch")
-            message = f"{self.quantity}: expected the name of a {kind}, found {self.of!r}"
+            message = f"{self.quantity}: expected the name of a {kind}, found {validate.shown(self.of)}"
             raise OptionError(message, what="of", found=self.of)
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:

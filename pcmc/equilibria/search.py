@@ -138,7 +138,9 @@ def find_equilibria(
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a sentence")
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
-    every = [along] if isinstance(along, str | Direction | BoundaryMotion) else list(along)
+    every = (
+        [along] if isinstance(along, str | Direction | BoundaryMotion) else validate.listed("along", along)
+    )
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
     search = _Search(given, lines, chosen, callback)
     try:

@@ -184,7 +184,7 @@ class PatchSpec:
             return
         try:
             points = np.atleast_2d(np.asarray(self.at, dtype=float))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             points = np.empty(0)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             validate.refuse("at", self.at, "a point [x, y] or a list of points", self.name)
@@ -206,6 +206,9 @@ def divider_of(spec: Any, number: int) -> Divider:
     validate.choice(f"bottom of {what}", part.bottom, BOTTOMS)
     if isinstance(part.wall, str):
         validate.choice(f"wall of {what}", part.wall, (BALANCED,))
+    elif part.wall is not None and part.wall is not False:
+        validate.number("wall", part.wall, least=0.0, where=what)
+    checked_name(f"{what}.name", part.name, empty=True)
     if not isinstance(part.upright, bool):
         validate.refuse("upright", part.upright, "True or False", what)
     line, cable = curve_of(part.curve, what), _cable(part, what)
@@ -221,7 +224,7 @@ def hole_of(spec: Any, number: int) -> Hole:
     what = f"hole {number}"
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
-    name = hole_label(checked_name(f"{what}.name", part.name, empty=True)) if part.name else what
+    name = hole_label(part.name) if checked_name(f"{what}.name", part.name, empty=True) else what
     curve = curve_of(part.curve, what, closed=True)
     return replace(part, curve=curve, name=name, **edge_cable(part, name))
 
@@ -243,7 +246,7 @@ def edge_cable(part: Any, what: str) -> dict[str, Any]:
         message += ", and patches with pressure = 0.0"
         raise OptionError(message, what="cable", where=what)
     if edge != "cable" and cable is not None:
-        message = f'{what}: cable = {cable!r} needs edge = "cable", found "{edge}"'
+        message = f'{what}: cable = {validate.shown(cable)} needs edge = "cable", found "{edge}"'
         raise OptionError(message, what="edge", where=what, found=edge, expected="cable")
     return _cable(part, what)
 
@@ -266,6 +269,7 @@ def cable_of(spec: Any, number: int) -> CableLine:
         spec = CableLine(**spec)
     if not isinstance(spec, CableLine):
         raise OptionError(f"{what}: expected a curve with a tension, found {spec!r}", what=what, found=spec)
+    checked_name(f"{what}.name", spec.name, empty=True)
     tension = validate.number("tension", spec.tension, least=0.0, where=spec.name or what)
     weight = validate.number("weight", spec.weight, where=spec.name or what)
     return CableLine(curve_of(spec.curve, cable_label(spec, number)), tension, spec.name, weight)
@@ -292,6 +296,8 @@ def rooms_of(spec: Any, patches: Sequence[PatchSpec], given: Any = ()) -> dict[s
 
     ``given`` are the patches as plain data, whose pressures are refused there."""
     rooms = {a.name: RoomData((a.name,), a.volume) for a in patches if a.volume is not None}
+    if not isinstance(spec, Mapping | None) and not (isinstance(spec, tuple) and not spec):
+        validate.refuse("rooms", spec, "a mapping from names to patches and a volume")
     for name, room in (spec or {}).items():
         values = vars(room) if isinstance(room, RoomData) else room
         check_keys(values, RoomData, f"room {name!r}", ("patches", "volume"), name)
@@ -327,6 +333,8 @@ def _part_of(kind: Any, spec: Any, what: str) -> Any:
 def patches_of(spec: Any) -> tuple[PatchSpec, ...]:
     """The patches of a mapping from names to their attributes, or of a sequence."""
     if not isinstance(spec, Mapping):
+        if not all(isinstance(one, PatchSpec) for one in spec):
+            validate.refuse("patches", spec, "PatchSpecs, or a mapping from names to their attributes")
         return tuple(spec)
     patches = []
     for name, values in spec.items():

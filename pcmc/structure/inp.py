@@ -8,13 +8,12 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints, format_rows
-from ..base.files import atomic_write, check_name, suffix_of, writing
+from ..base.files import as_path, atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
 from ..forces.motion_space import perpendicular
@@ -45,7 +44,7 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     ``path`` has the suffix .inp; the file appears whole or not at all. FileError for another suffix, and
     where it cannot be written.
     """
-    path = Path(path)
+    path = as_path(path)
     check_name(path)
     suffix_of(path, (".inp",), "a structural model")
     expect_model(model)

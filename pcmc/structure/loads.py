@@ -76,7 +76,7 @@ class Snow:
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
         vars(self).update(load=load, patches=tuple(self.patches), **_checked_zone("Snow", self))
-        if self.slides:
+        if len(validate.listed("Snow.slides", self.slides)):
             vars(self)["slides"] = _checked_slopes("Snow.slides", self.slides)
         _check_name(self.name)
 
@@ -276,7 +276,7 @@ def _checked_zone(kind: str, load: Snow | Wind) -> dict[str, Any]:
     try:
         points = np.array(load.area, dtype=float)
         good = not len(load.area) or (points.ndim == 2 and points.shape[1] == 2 and len(points) > 2)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         good = False
     if not (good and np.isfinite(points).all()):
         validate.refuse(f"{kind}.area", load.area, "three or more points [x, y]")

@@ -119,9 +119,10 @@ class StructuralModel:
             validate.refuse("gas", self.gas, "a Gas or None")
         if self.gas is not None:
             self.gas.check(surface, self.units)
-        if not all(isinstance(member, Member) for member in self.members):
+        members = tuple(validate.listed("members", self.members, "a sequence of Members"))
+        if not all(isinstance(member, Member) for member in members):
             validate.refuse("members", self.members, "a sequence of Members")
-        vars(self)["members"] = tuple(self.members)
+        vars(self)["members"] = members
         self.cable_sections, self.bars  # noqa: B018
         of_lines = [line.member.material for line in self.beams] + [of for _, of in self.cable_sections]
         if self.weights and not any(material.density for material in (*self.materials, *of_lines)):

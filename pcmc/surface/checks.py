@@ -232,8 +232,8 @@ def _integers(values: Any, what: str) -> Ints:
         bad = np.argwhere((given != np.floor(given)) | (np.abs(given) > 2**53))
         if len(bad):
             place = tuple(bad[0].tolist())
-            message = f"{what}{list(place)}: expected a whole number, found {given[place]}"
-            raise SurfaceError(message, what=what, where=place if len(place) > 1 else place[0])
+            message = f"{what}{list(place) or ''}: expected a whole number, found {given[place]}"
+            raise SurfaceError(message, what=what, where=place[0] if len(place) == 1 else place)
     return np.asarray(given.astype(np.int64))
 
 

@@ -190,10 +190,9 @@ def checked_images(
 
     Both must be held alike, and with weights translations must lead along Π.
     """
-    pairs = np.asarray(given)
-    if not pairs.size:
+    if isinstance(given, tuple | list | np.ndarray) and not len(given):
         return NONE
-    pairs = checks.pair_array(pairs, len(X))
+    pairs = checks.pair_array(given, len(X))
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     image, vertex = pairs.T
     near = ON * bounding_size(X)

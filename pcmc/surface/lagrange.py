@@ -44,7 +44,7 @@ class Shapes(NamedTuple):
     weight: Floats  # (q,)
 
 
-def known_order(order: object, error: type[PcmcError] = SurfaceError) -> int:
+def known_order(order: Any, error: type[PcmcError] = SurfaceError) -> int:
     """The order, if there are such elements.
 
     >>> known_order(3)
@@ -52,7 +52,7 @@ def known_order(order: object, error: type[PcmcError] = SurfaceError) -> int:
         ...
     pcmc.base.errors.SurfaceError: order: expected 1, 2, 4 or 8, found 3
     """
-    if isinstance(order, bool) or order not in ORDERS:
+    if isinstance(order, bool) or np.ndim(order) or order not in ORDERS:
         validate.refuse("order", order, "1, 2, 4 or 8", error=error)
     return next(known for known in ORDERS if known == order)
 

@@ -213,9 +213,13 @@ class Room:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", checked_name("Room.name", self.name, error=SurfaceError))
-        pairs = tuple(self.patches.items() if isinstance(self.patches, Mapping) else self.patches)
+        expected = "a mapping from names of patches to 1 or -1"
+        given = self.patches.items() if isinstance(self.patches, Mapping) else self.patches
+        pairs = [
+            validate.listed("patches", pair, expected, SurfaceError)
+            for pair in validate.listed("patches", given, expected, SurfaceError)
+        ]
         if not pairs or not all(len(pair) == 2 and pair[1] in (1, -1) for pair in pairs):
-            expected = "a mapping from names of patches to 1 or -1"
             validate.refuse("patches", self.patches, expected, self.name, error=SurfaceError)
         object.__setattr__(self, "patches", tuple((str(name), int(sign)) for name, sign in pairs))
         volume = validate.number("volume", self.volume, where=self.name, error=SurfaceError)

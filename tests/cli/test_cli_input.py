@@ -45,6 +45,7 @@ def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, argument
         (["pattern", "roof.toml", "--width", "2", "--view", "plan"], "--view: is of the picture"),
         ([*SWEEP, "--all"], "--all: is of the table in a file"),
         (["equilibria", "roof.toml", "--axis", "energy"], "--axis: is of the diagram"),
+        (["equilibria", "roof.toml", "--starts", "0", "--seed", "4"], "--seed: is of random starts"),
         (["certify", "roof.toml", "--margin", "foo"], "'foo'"),
         (["certify", "roof.toml", "--margin", "pressure", "--margin", "tension of roo"], "'tension of roo'"),
     ],
@@ -60,7 +61,7 @@ def test_an_option_that_counts_for_nothing_is_refused_before_the_work(
     assert message in err
 
 
-@pytest.mark.parametrize("command", [["certify"], ["convert"]])
+@pytest.mark.parametrize("command", [["certify"], ["convert"], ["explore"]])
 def test_a_surface_has_no_start_shape(folder, capsys, command):
     write("roof.pcmc", two_squares())
     files = ["roof.pcmc", *["b.pcmc"] * (command == ["convert"])]
