@@ -250,7 +250,9 @@ def _step(plan: Plan, result: Result) -> Plan:
     sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
     plan = with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
-        plan = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
+        balanced = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
+        own = straight_walls(plan)
+        plan = balanced if changes(plan, balanced) else with_dividers(plan, own, upright=True)
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
         surface = plan.surface()
         strained = strained_junction(surface)
@@ -280,6 +282,14 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
     if plan.tension is not None:
         return replace(plan, tension=higher(plan.tension))
     return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
+
+
+def straight_walls(plan: Plan) -> set[str]:
+    """The names of the dividers whose walls could be upright."""
+    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
+
+    near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None]
+    return {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
 
 
 def with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:
@@ -313,6 +323,8 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
                 if new == old:  # balanced as it is
                     continue
             why = f"instead of {kind}" if kind else f"now {_shown(old)}"
+            if isinstance(before, Divider) and vars(before) == vars(Divider(before.curve, name=before.name)):
+                why += f"; a curve alone becomes {{curve = ..., {key} = {_shown(new)}}}"
             lines.append(f"{place} {key} = {_shown(new)}  ({why})")
     return lines
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from ..plan import Plan
 from ..surface import Surface
 from ..surface.pieces import two_digits
-from .advice import changes, coarse, with_dividers
+from .advice import changes, coarse, straight_walls, with_dividers
 
 STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
 
@@ -29,11 +29,8 @@ def firmer_walls(plan: Plan, surface: Surface, file: str, persists: Callable[[Pl
 
 
 def _firmer(plan: Plan, surface: Surface) -> Iterator[Plan]:
-    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
-
-    near, most = SNAP * plan.edge_length, float(surface.tensions[~surface.auxiliary].max())
+    most, straight = float(surface.tensions[surface.roof].max()), straight_walls(plan)
     walls = {divider.name: divider for divider in plan.dividers if divider.wall is not None}
-    straight = {name for name, d in walls.items() if is_straight(d.curve.local(plan.plane), near)}
     if any(not walls[name].upright for name in straight):
         yield with_dividers(plan, straight, upright=True)
     for times in STRONG if walls else ():

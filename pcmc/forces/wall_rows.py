@@ -92,8 +92,14 @@ def wall_rows(
         top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
         share, whole = height[vertices], top
     else:
-        feet, bottom = foot[ends], surface.pinned
         fraction = np.round(fraction)  # below one top vertex, so that it pinches with this one
+        # a junction may lean along its wall, so the top edge nearest to a foot may be another one's
+        tops, edge = np.flatnonzero(foot >= 0), np.empty(surface.n, dtype=np.int64)
+        edge[top_edges.ravel()] = np.repeat(np.arange(len(top_edges)), 2)
+        _, known, at = np.intersect1d(vertices, foot[tops], return_indices=True)
+        ends[known] = top_edges[edge[tops[at]]]
+        fraction[known] = ends[known, 1] == tops[at]
+        feet, bottom = foot[ends], surface.pinned
         rows = WallRows(vertices, ends, fraction, zero, none, feet)
         drop = rows.drops(X)
         top = np.linalg.norm(drop, axis=1)

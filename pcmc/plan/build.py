@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, toml
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..forces.rooms import check_rooms
 from ..meshing.planar import PlanarMesh, locate, signed_areas
@@ -38,6 +38,7 @@ SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
 LEAST = 0.15  # of that slope: smallest slope, so that walls have room
 REACH = 3.0 * SNAP  # of the edge length: farther from a curve no vertex is put where lines meet
 FAR = 0.5  # of the size of the outline: of a divider that ends farther beyond it a warning tells
+CORNERS = 8  # of the outline, at most, that are named as supports
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
@@ -51,7 +52,9 @@ def build_surface(plan: Plan) -> Surface:
     fixed, sliding = _supports(draft)
     held = fixed | sliding
     if not held.any():
-        raise PlanError("nothing holds the roof; fix an edge or give supports", what="supports")
+        corners = toml([piece.points[0].tolist() for piece in plan.outline.pieces[:CORNERS]])
+        hint = f"fix an edge or give supports, such as supports = {corners} under [plan]"
+        raise PlanError(f"nothing holds the roof; {hint}", what="supports")
     if held.all():
         raise PlanError("every vertex of the mesh is held; use a smaller edge_length", what="edge_length")
     _warn_of_free_edges(draft, held)

@@ -45,6 +45,9 @@ def curve(spec: Any, closed: bool = False) -> Curve:
         return polyline(spec, closed=closed)
     besides = {"closed": "polyline", "weights": "bezier"}
     kinds = [key for key in spec if key not in besides]
+    if "join" in kinds:
+        problem = "a curve of several pieces is a list of them, without join: [{polyline = ...}, {arc = ...}]"
+        raise OptionError(problem, what="curve", found=list(spec), expected=CURVES)
     for key in kinds:
         validate.choice("curve", key, CURVES)
     if len(kinds) != 1:

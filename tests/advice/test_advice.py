@@ -11,6 +11,7 @@ from nightly import at_night, night_but
 
 from pcmc import cli
 from pcmc.advice.advice import changes
+from pcmc.advice.walls import firmer_walls
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.project import load, run_project
@@ -88,6 +89,42 @@ def test_a_line_advised_for_a_name_with_a_quote_is_read_by_toml():
     assert tomllib.loads(f"{key} = 6") == {name: 6}
     key = Chosen({name: 5.0}).text.split("to change: ")[1].split(" under")[0]
     assert tomllib.loads(key.replace("...", "6")) == {name: {"tension": 6}}
+
+
+def test_a_line_for_a_divider_that_may_be_a_curve_alone_says_what_that_becomes():
+    lines = [Divider([[4, 0], [4, 6]]), Divider([[8, 0], [8, 6]], 2.0)]
+    hall = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], lines, edge_length=0.8, tension=5.0)
+    upright = replace(hall, dividers=[replace(line, upright=True) for line in hall.dividers])
+    alone, table = changes(hall, upright)
+    assert alone.endswith("(now false; a curve alone becomes {curve = ..., upright = true})")
+    assert table.endswith("upright = true  (now false)")
+
+
+def test_a_sail_has_no_walls_to_make_firmer():
+    """No patch of it has a pressure: it was the greatest tension of none."""
+    sail = Plan([[0, 0], [4, 0], [4, 4], [0, 4]], tension=1.0, pressure=0.0, edge_length=1.0)
+    assert firmer_walls(sail, sail.surface(), "sail.toml", lambda plan: True) == []
+
+
+CORNERED = """[plan]
+edge_length = 0.8
+outline = [[0, 0], [20, 0], [10, 17]]
+dividers = [{curve = [[10, 6], [0, 0]]}, {curve = [[10, 6], [20, 0]]}, {curve = [[10, 6], [10, 17]]}]
+[plan.patches]
+south = {apex = 3, at = [10, 1]}
+west = {apex = 3, at = [5, 7]}
+east = {apex = 2.5, at = [15, 7]}
+"""
+
+
+@pytest.mark.nightly
+def test_balanced_walls_that_come_down_in_corners_are_advised_to_stay_upright(tmp_path):
+    first = outcome_of(tmp_path, CORNERED)
+    heading, *lines = first.advice
+    assert heading.endswith("which was tried, comes to rest and meets the targets:")
+    assert len(lines) == 3
+    assert all(": upright = true  (now false" in line for line in lines)
+    assert outcome_of(tmp_path, typed(CORNERED, lines)).good
 
 
 def test_no_tension_is_advised_for_a_tent_whose_ring_is_too_small(tmp_path):
@@ -221,8 +258,8 @@ WINGS = "[plan.patches]\nlow = {rise = 2.2, at = [10, 3]}\nhigh = {rise = 2.5, a
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        (SLANTING, "upright = true  (now false)"),
-        *at_night((FLUSH, 'wall = 5.2  (now "balanced")')),
+        (SLANTING, "upright = true  (now false; a curve alone becomes {curve = ..., upright = true})"),
+        *at_night((FLUSH, 'wall = 5.2  (now "balanced"; a curve alone becomes {curve = ..., wall = 5.2})')),
     ],
 )
 def test_a_roof_that_finer_meshes_lose_gets_a_wall_with_which_they_hold_it(tmp_path, text, line, capsys):

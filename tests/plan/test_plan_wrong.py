@@ -1,5 +1,6 @@
 """Every way in which a plan can be wrong."""
 
+import json
 import sys
 import time
 from dataclasses import replace
@@ -135,6 +136,16 @@ def test_wrong_values_are_refused_at_once(changes, fields):
 def test_supports_are_named(changes, message):
     with pytest.raises(OptionError, match=message):
         plan_from({"outline": BOX, "tension": 5.0, **changes})
+
+
+def test_a_sail_that_nothing_holds_is_offered_its_corners():
+    raised = [[0, 0, 3], [10, 0, 0], [10, 8, 3]]
+    given = {"outline": raised, "edge": "cable", "cable": 10.0, "tension": 1.0, "pressure": 0.0}
+    with pytest.raises(PlanError) as caught:
+        plan_from(given).surface()
+    offered = str(caught.value).partition("such as supports = ")[2].removesuffix(" under [plan]")
+    assert json.loads(offered) == raised
+    plan_from(given | {"supports": json.loads(offered)}).surface()
 
 
 @pytest.mark.parametrize(
