@@ -100,19 +100,19 @@ def flag(name: str, value: object) -> bool:
     return value
 
 
-def listed(
+def sequence(
     name: str, value: Any, expected: str = "a list", error: type[PcmcError] = OptionError
 ) -> list[Any]:
     """The entries of a list or of anything like it; a text is none.
 
-    >>> listed("seams", (1, 2))
+    >>> sequence("seams", (1, 2))
     [1, 2]
     """
     try:
-        entries = None if isinstance(value, str | bytes) else list(value)
+        found = None if isinstance(value, str | bytes) else list(value)
     except TypeError:
-        entries = None
-    return refuse(name, value, expected, error=error) if entries is None else entries
+        found = None
+    return refuse(name, value, expected, error=error) if found is None else found
 
 
 def triple(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tuple[float, float, float]:

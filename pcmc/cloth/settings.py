@@ -68,7 +68,7 @@ class CuttingOptions:
     def __post_init__(self) -> None:
         if self.width is not None and self.strips is not None:
             raise OptionError("strips: the width gives their number; leave out one of both", what="strips")
-        if self.width is None and self.strips is None and not validate.listed("seams", self.seams):
+        if self.width is None and self.strips is None and not validate.sequence("seams", self.seams):
             text = "a cutting pattern needs the width of the cloth, a number of strips, or seams; give"
             raise OptionError(f"{text} --width or the key width of [pattern]", what="width")
         if self.compensation is not None and self.stiffness is not None:
@@ -83,7 +83,7 @@ class CuttingOptions:
             validate.integer("strips", count, least=1)
         for name, limits in NUMBERS.items():
             for value in self._values(name):
-                if name in PAIRS and len(validate.listed(name, value, PAIR)) != 2:
+                if name in PAIRS and len(validate.sequence(name, value, PAIR)) != 2:
                     validate.refuse(name, value, PAIR)
                 for number in value if name in PAIRS else [value]:
                     validate.number(name, number, **limits)
@@ -113,7 +113,7 @@ class CuttingOptions:
     def lines(self) -> list[Floats]:
         """The drawn seams as arrays (k,2) or (k,3)."""
         lines = []
-        for number, line in enumerate(validate.listed("seams", self.seams), 1):
+        for number, line in enumerate(validate.sequence("seams", self.seams), 1):
             try:
                 points = np.asarray(line, dtype=float)
             except (TypeError, ValueError):

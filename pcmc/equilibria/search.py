@@ -139,7 +139,7 @@ def find_equilibria(
         validate.refuse("callback", callback, "a function of a sentence")
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
     every = (
-        [along] if isinstance(along, str | Direction | BoundaryMotion) else validate.listed("along", along)
+        [along] if isinstance(along, str | Direction | BoundaryMotion) else validate.sequence("along", along)
     )
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
     search = _Search(given, lines, chosen, callback)

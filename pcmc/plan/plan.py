@@ -124,7 +124,7 @@ class Plan:
 
     def __post_init__(self) -> None:
         for key in parts.MOST:
-            parts.check_count(key, len(validate.listed(key, getattr(self, key))), OptionError)
+            parts.check_count(key, len(validate.sequence(key, getattr(self, key))), OptionError)
         parsed: dict[str, Any] = {"outline": parts.curve_of(self.outline, "outline", closed=True)}
         makers = {"dividers": parts.divider_of, "holes": parts.hole_of, "supports": parts.support_from}
         for key, maker in (makers | {"cables": parts.cable_of, "mirrors": parts.mirror_of}).items():

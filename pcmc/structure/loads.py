@@ -76,7 +76,7 @@ class Snow:
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
         vars(self).update(load=load, patches=tuple(self.patches), **_checked_zone("Snow", self))
-        if len(validate.listed("Snow.slides", self.slides)):
+        if len(validate.sequence("Snow.slides", self.slides)):
             vars(self)["slides"] = _checked_slopes("Snow.slides", self.slides)
         _check_name(self.name)
 

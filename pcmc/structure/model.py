@@ -119,7 +119,7 @@ class StructuralModel:
             validate.refuse("gas", self.gas, "a Gas or None")
         if self.gas is not None:
             self.gas.check(surface, self.units)
-        members = tuple(validate.listed("members", self.members, "a sequence of Members"))
+        members = tuple(validate.sequence("members", self.members, "a sequence of Members"))
         if not all(isinstance(member, Member) for member in members):
             validate.refuse("members", self.members, "a sequence of Members")
         vars(self)["members"] = members

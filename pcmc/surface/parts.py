@@ -216,8 +216,8 @@ class Room:
         expected = "a mapping from names of patches to 1 or -1"
         given = self.patches.items() if isinstance(self.patches, Mapping) else self.patches
         pairs = [
-            validate.listed("patches", pair, expected, SurfaceError)
-            for pair in validate.listed("patches", given, expected, SurfaceError)
+            validate.sequence("patches", pair, expected, SurfaceError)
+            for pair in validate.sequence("patches", given, expected, SurfaceError)
         ]
         if not pairs or not all(len(pair) == 2 and pair[1] in (1, -1) for pair in pairs):
             validate.refuse("patches", self.patches, expected, self.name, error=SurfaceError)
