@@ -117,7 +117,7 @@ def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
         ),
         ({"dividers": [WALL] * 1001}, {"what": "dividers", "found": 1001}),
         ({"points": {"a\nb": [1, 1]}}, {"what": "points"}),
-        ({"dividers": [{"curve": WALL, "name": "a\nb"}]}, {"what": "name"}),
+        ({"dividers": [{"curve": WALL, "name": "a\nb"}]}, {"what": "divider 1.name"}),
     ],
 )
 def test_wrong_values_are_refused_at_once(changes, fields):
