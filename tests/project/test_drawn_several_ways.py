@@ -239,7 +239,7 @@ SYMMETRIC: Text = HALL | {
             "north": {"tension": 2.2, "pressure": 0.35, "snow": 0.05, "at": [2, 7]},
         },
     },
-    "structure": HALL["structure"]
+    "structure": {key: value for key, value in HALL["structure"].items() if key != "cable_area"}
     | {"wind": {"south": 0.1}, "zones": [{"case": "drift", "snow": 0.05, "patches": ["north"]}]},
 }
 
