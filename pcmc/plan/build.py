@@ -24,7 +24,7 @@ from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
 from ..surface.pieces import Piece, point_text, to_space
 from ..surface.values import BELOW
-from .draft import Draft, Roof, drafted, rooms_of, upright_planes, walls_of
+from .draft import Draft, Roof, drafted, rooms_between, upright_planes, walls_of
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
 from .lines import EXACT, SNAP, Kind, PlanLine
 from .parts import PatchSpec
@@ -86,7 +86,7 @@ def build_surface(plan: Plan) -> Surface:
         plan.plane,
         on_planes=(*mirror_planes(plan, vertices), *upright_planes(draft, walls, sides)),
         cables=tuple(cables),
-        rooms=tuple(rooms_of(plan, wall_patches, sides)),
+        rooms=tuple(rooms_between(plan, wall_patches, sides)),
         curves=(*held_lines(draft, vertices, walls.feet), *walls.uprights),
     )
     try:

@@ -298,7 +298,7 @@ def upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[Sides]) -> lis
     return planes
 
 
-def rooms_of(plan: Plan, walls: Sequence[Patch], sides: Sequence[Sides]) -> list[Room]:
+def rooms_between(plan: Plan, walls: Sequence[Patch], sides: Sequence[Sides]) -> list[Room]:
     """The rooms of prescribed volume: below their patches, between the walls to other rooms."""
     rooms = []
     for number, (name, room) in enumerate(plan.rooms.items()):

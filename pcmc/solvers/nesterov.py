@@ -62,7 +62,7 @@ class NesterovOptions:
         for switch, names in (("momentum", ["gamma"]), ("line_search", ["tau", "floor_power"])):
             for name in () if getattr(self, switch) else names:
                 if getattr(self, name) != getattr(NesterovOptions, name):
-                    text = f"{name}: counts only with {switch}; leave one of both out"
+                    text = f"{name}: counts only with {switch} = true; leave it out"
                     raise OptionError(text, what=name, found=getattr(self, name))
         validate.choice("armijo", self.armijo, ("printed", "sufficient"))
         if self.tolerance is not None:
