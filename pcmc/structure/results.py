@@ -164,8 +164,8 @@ def _taut(model: StructuralModel, k: int, tables: list[Tables]) -> float:
     the increments, from the end of the step before on; 1 if none does."""
     places, faces = np.full((model.surface.n, 3), np.nan), model.surface.faces[model.faces]
     least = [] if k else [(0.0, float(model.prestress.min()))]
-    before = {kind: blocks[-1:] for kind, blocks in tables[k - 1].items()} if k else {}
-    both = [before.get(kind, []) + tables[k][kind] for kind in ("displacements", "stresses")]
+    last = {kind: blocks[-1:] for kind, blocks in tables[k - 1].items()} if k else {}
+    both = [last.get(kind, []) + tables[k][kind] for kind in ("displacements", "stresses")]
     for moved, block in zip(*both, strict=True):
         places[moved.ids - 1] = model.surface.vertices[moved.ids - 1] + moved.values
         stresses = block.means(model.faces + 1)[:, TENSOR]
