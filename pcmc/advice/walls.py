@@ -20,7 +20,8 @@ def firmer_walls(plan: Plan, surface: Surface, where: str, persists: Callable[[P
     """What to type so that finer meshes hold the roof, too: a heading, and a line a change.
 
     Empty if nothing helps of what is tried. ``surface`` is the roof at rest, ``where`` such as
-    "type in roof.toml", and ``persists`` says whether the roof of another plan comes to rest, as on finer meshes.
+    "type in roof.toml", and ``persists`` says whether the roof of another plan comes to rest, as on finer
+    meshes.
     """
     for other in _firmer(plan, surface):
         if persists(coarse(other, surface)):
