@@ -82,6 +82,21 @@ class Project:
         """Whether it is a project file: a drawing or a mesh alone says nothing about solving it."""
         return self.specified and self.path.suffix.lower() == TOML
 
+    @property
+    def where_to_type(self) -> str:
+        """How a line begins that says what to type; of a drawing alone, which command writes its project."""
+        name = self.path.with_suffix(TOML).name
+        return (
+            f"type in {name}"
+            if self.has_file
+            else f"write a project ({self.plan_command}) and type in {name}"
+        )
+
+    @property
+    def plan_command(self) -> str:
+        """The command that writes the project of a drawing."""
+        return f"pcmc plan {self.path.name} -o {self.path.with_suffix(TOML).name}"
+
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
         base = Path(folder)
