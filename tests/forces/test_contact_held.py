@@ -25,7 +25,7 @@ from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
-from pcmc.solvers.newton import newton
+from pcmc.solvers.newton import NewtonOptions, newton
 
 
 def held(surface):
@@ -363,3 +363,17 @@ def test_a_bottom_with_more_vertices_than_the_junction_is_no_place_to_rest():
     found = newton(split).certificate
     assert found.verdict is Verdict.WALL_DOWN
     assert "comes down on the held bottom of its wall" in found.detail
+
+
+def test_newton_closes_where_a_junction_is_low_over_its_bottom():
+    """Three walls meet; while rows followed the junction to the end, a step left a 15th of the forces."""
+    outline = [[10, 0], [5, 8.66], [-5, 8.66], [-10, 0], [-5, -8.66], [5, -8.66]]
+    walls = {(10.0, 0.0): 6.7, (-5.0, 8.66): 4.4, (-5.0, -8.66): 5.0}
+    dividers = [Divider([[0, 0], end], wall=tension) for end, tension in walls.items()]
+    patches = {"a": {"tension": 3.19, "at": [3, 4]}, "b": {"tension": 3.79, "at": [-6, 0]}}
+    patches["c"] = {"tension": 4.22, "at": [3, -4]}
+    start = Plan(outline, dividers, edge_length=1.6, patches=patches).surface()
+    found = newton(start, NewtonOptions(levels=1))
+    assert found.converged
+    residual = found.history[found.history["step"] == "newton"]["residual"].to_numpy()
+    assert residual[-1] < 1e-3 * residual[-2]
