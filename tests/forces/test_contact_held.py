@@ -91,9 +91,9 @@ def test_the_first_vertex_may_be_a_foot():
         np.testing.assert_allclose(there, here[order], rtol=1e-12, atol=1e-14)
 
 
-def test_a_foot_is_in_the_row_of_its_own_top_where_the_junction_leans_along_its_wall():
+def test_a_vertex_is_in_the_row_of_its_own_top_where_the_junction_leans_along_its_wall():
     """It was in that of the top nearest in plan, such as the corner, and a refined wall had no area there."""
-    full, _, resting, _ = pressed()
+    full, full_walls, resting, _ = pressed()
     lean = np.where(resting | full.fixed, 0.0, 1.0)[:, None] * [0.0, -1.0, 0.0]
     leaning = full.moved(full.vertices + lean * full.plane.height(full.vertices)[:, None])
     walls = find_walls(leaning)
@@ -102,8 +102,11 @@ def test_a_foot_is_in_the_row_of_its_own_top_where_the_junction_leans_along_its_
     above[walls.foot[tops]] = tops
     feet = np.flatnonzero(above[rows.vertices] >= 0)
     assert len(feet) == len(tops)
-    at = rows.top_ends[feet, rows.fraction[feet].astype(int)]
-    assert at.tolist() == above[rows.vertices[feet]].tolist()
+    at = rows.top_ends[np.arange(len(rows.vertices)), rows.fraction.astype(int)]
+    assert at[feet].tolist() == above[rows.vertices[feet]].tolist()
+    upright = full_walls.rows
+    assert upright.vertices.tolist() == rows.vertices.tolist()
+    assert at.tolist() == upright.top_ends[np.arange(len(at)), upright.fraction.astype(int)].tolist()
 
 
 def test_walls_that_cannot_pair_their_vertices_cannot_pinch():
