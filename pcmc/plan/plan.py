@@ -48,7 +48,8 @@ class Plan:
         on the outline or a hole fixes that part of it, which carries no cable; one inside a patch is fixed
         where it is drawn. On a free edge or a cable the height z of a support is that of the edge there;
         between supports the edge starts straight.
-    plane : Π.
+    plane : Π. Points [x, y] are on it, from its point, along the x axis laid on it and across; points
+        [x, y, z] are in space.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports. In a project without tensions it is the
         height wanted over the outline, for which the tension is found.
