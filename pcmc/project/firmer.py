@@ -51,10 +51,7 @@ def firmer(outcome: Outcome, changed: Changed | None = None, progress: OnStep = 
         tried += [flatter(project.plan, project.rises)] if held else []
         for plan, rises, lines in chain(*tried):
             if persists(plan, rises):
-                if (
-                    rises != project.rises and not take_rises(project.data)[1]
-                ):  # --rise, which takes its place
+                if rises and rises is not project.rises and not take_rises(project.data)[1]:  # by an option
                     return [f"try --{rises[0].kind.replace('_', '-')} {rises[0].value:g}, which persists"]
-                file = project.path.with_suffix(".toml").name
-                return [f"type in {file}, which was tried and persists:", *lines]
+                return [f"{project.where_to_type}, which was tried and persists:", *lines]
     return []

@@ -113,11 +113,7 @@ edge_length = 0.57
 """
 
 
-WISHES = {
-    "rise = 2.5": "12",
-    "span_ratio = 3": "345",
-    "tension = 3.91": "4567",
-}  # first digits advised
+WISHES = {"rise = 2.5": "12", "span_ratio = 3": "345", "tension = 3.91": "4567"}  # first digits advised
 
 
 @pytest.mark.parametrize("wish", night_but(WISHES, "rise = 2.5"))
