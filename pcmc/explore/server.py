@@ -78,7 +78,9 @@ class Explorer:
 
     def _fallback(self) -> ProjectFallback:
         project = self.roof.project
-        return ProjectFallback() if project is None else ProjectFallback(project.path, project.data)
+        if project is None:
+            return ProjectFallback()
+        return ProjectFallback(project.path, project.data, corners=project.corners)
 
     def open(self) -> tuple[str, Session]:
         """The name of a new session, and the session."""
@@ -204,7 +206,8 @@ class Explorer:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         # the page lists what formats carry; a rule for this module alone, as threads share the rules
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
-        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known={})
+        known = {(False, "certificate"): state.certificate}
+        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known=known)
         members = members_drawn(outcome) if FORMATS[suffix].members else ()
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"

@@ -27,6 +27,7 @@ from ..meshing.remeshing import remesh
 from ..project.values import changeable_values
 from ..solvers import solve, solve_once
 from ..surface import Surface
+from ..surface.distance import vertices_at
 from ..surface.geometry import segment_lengths
 from .acts import act
 from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
@@ -332,19 +333,19 @@ class Session:
 
     def check_mesh(self, gone: Stop = lambda: False) -> MeshCheck | None:
         """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
-        return self._look(lambda shown, check: check_mesh(shown, callback=check), gone)
+        return self._look(check_mesh, gone)
 
     def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
         """How far the surface shown is from the edge; None as for ``check_mesh``."""
-        return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
+        return self._look(partial(margin, what=what), gone)
 
     def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
 
-        def search(shown: Surface, check: Check) -> Equilibria:
+        def search(shown: Surface, callback: Check, **_: Any) -> Equilibria:
             def tell(step: str) -> None:
                 self.progress = step
-                check(step)
+                callback(step)
 
             return find_equilibria(shown, what, callback=tell)
 
@@ -359,8 +360,9 @@ class Session:
         with self.checks:
             return verify(self.surface)
 
-    def _look(self, at: Callable[[Surface, Check], Found], gone: Stop) -> Found | None:
+    def _look(self, at: Callable[..., Found], gone: Stop) -> Found | None:
         shown = self.surface
+        corners = vertices_at(shown, self.fallback.corners)
 
         def check(_: object) -> None:
             if self.surface is not shown or gone():
@@ -368,7 +370,7 @@ class Session:
 
         with self.checks:
             try:
-                return at(shown, check)
+                return at(shown, corners=corners, callback=check)
             except KeyboardInterrupt:
                 return None
             finally:

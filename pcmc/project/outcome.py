@@ -17,6 +17,7 @@ from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
 from ..solvers.result import Progress, Result
 from ..surface import Surface, mirrored, unfolded
+from ..surface.distance import vertices_at
 from .settings import Output, of_material
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
-SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 EXTENSIVE = ("area", "volume", "length")  # targets of a part that are not those of the whole
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 Finding = TypeVar("Finding")
@@ -376,13 +376,8 @@ class Outcome:
     @property
     def corners(self) -> Ints:
         """(k,) the vertices of what is shown at the corners of the project's plan."""
-        from scipy.spatial import cKDTree
-
-        plan = None if self.project is None else self.project.plan
-        if plan is None or not len(plan.corners):
-            return np.empty(0, dtype=np.int64)
-        away, nearest = cKDTree(self.surface.vertices).query(plan.corners)
-        corners: Ints = np.asarray(nearest)[np.asarray(away) <= SAME * self.surface.size]
+        places = np.empty((0, 3)) if self.project is None else self.project.corners
+        corners = vertices_at(self.surface, places)
         if not self.unfold:
             return corners
         return np.flatnonzero(np.isin(unfolded(self.surface).vertex, corners))
