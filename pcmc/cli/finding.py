@@ -67,7 +67,6 @@ def equilibria_(
     with working() as progress:
         roof = what.roof(load_project(file, units), progress, whole)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check, "span": ends}
-        options["corners"] = roof.corners if mesh_check else ()
         found = find_equilibria(roof.shown.surface, along or "pressure", callback=progress, **options)
         jobs: list[Any] = []
         for path in files:

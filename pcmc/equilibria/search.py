@@ -8,10 +8,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..accuracy import check_mesh
-from ..accuracy.mesh_check import vertex_numbers
 from ..base import validate
 from ..base.errors import OptionError, SurfaceError
 from ..base.interrupts import stop_requested
@@ -22,7 +20,6 @@ from ..solvers.continuation import BoundaryMotion, Branch, Direction
 from ..solvers.result import Progress, Result, Status
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
-from ..surface.distance import vertices_at
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter
 from .deflation import deflated_newton
@@ -54,7 +51,6 @@ class SearchOptions:
     most : equilibria; the search ends there.
     seed : of the random starts.
     mesh_check : whether ``check_mesh`` is done on each equilibrium.
-    corners : for it, the vertices (k,) of the surface at which held curves have corners for sure.
 
     Examples
     --------
@@ -70,7 +66,6 @@ class SearchOptions:
     most: int = 24
     seed: int = 0
     mesh_check: bool = False
-    corners: npt.ArrayLike = ()
 
     def __post_init__(self) -> None:
         if self.span is not None:
@@ -167,7 +162,6 @@ class _Search:
         callback: Callable[[str], None] | None,
     ) -> None:
         self.surface, self.lines, self.options, self.callback = surface, lines, options, callback
-        self.corners = surface.vertices[vertex_numbers(options.corners, surface.n)]
         self.found: list[FoundEquilibrium] = []
         self.shapes: list[Shape] = []
         self.on_branch: set[int] = set()  # those that a branch has led to
@@ -192,10 +186,10 @@ class _Search:
                 self.deflate(done)
                 done += 1
             self.connect()
-        for k, one in enumerate(self.found if self.options.mesh_check else ()):
-            self.tell(f"mesh check of equilibrium {k + 1}")
-            corners = vertices_at(one.surface, self.corners)  # some have other triangles
-            self.found[k] = replace(one, mesh_check=check_mesh(one.surface, corners=corners))
+        if self.options.mesh_check:
+            for k, one in enumerate(self.found):
+                self.tell(f"mesh check of equilibrium {k + 1}")
+                self.found[k] = replace(one, mesh_check=check_mesh(one.surface))
 
     def tell(self, step: str) -> None:
         if self.callback is not None:

@@ -120,7 +120,6 @@ class ProjectFallback:
     path: Path = Path()
     data: Mapping[str, Any] = field(default_factory=dict)  # of the project; without it only following
     given: frozenset[tuple[str, float]] = frozenset()  # (wall, tension) of the project: others were moved
-    corners: Floats = field(default_factory=lambda: np.empty((0, 3)))  # of its plan, which mesh checks keep
 
     def with_walls(self, surface: Surface) -> ProjectFallback:
         """The same, with the walls of another surface of the project."""

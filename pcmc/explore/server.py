@@ -78,9 +78,7 @@ class Explorer:
 
     def _fallback(self) -> ProjectFallback:
         project = self.roof.project
-        if project is None:
-            return ProjectFallback()
-        return ProjectFallback(project.path, project.data, corners=project.corners)
+        return ProjectFallback() if project is None else ProjectFallback(project.path, project.data)
 
     def open(self) -> tuple[str, Session]:
         """The name of a new session, and the session."""

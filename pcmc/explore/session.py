@@ -27,10 +27,10 @@ from ..meshing.remeshing import remesh
 from ..project.values import changeable_values
 from ..solvers import solve, solve_once
 from ..surface import Surface
-from ..surface.distance import vertices_at
 from ..surface.geometry import segment_lengths
 from .acts import act
 from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
+from .roof import Aims
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
@@ -42,7 +42,6 @@ MOST_VARIANTS = 20
 
 Found = TypeVar("Found")
 Check = Callable[[object], None]  # raises StopIteration once the page shows another surface
-Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,7 +341,7 @@ class Session:
     def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
 
-        def search(shown: Surface, callback: Check, **_: Any) -> Equilibria:
+        def search(shown: Surface, callback: Check) -> Equilibria:
             def tell(step: str) -> None:
                 self.progress = step
                 callback(step)
@@ -362,7 +361,6 @@ class Session:
 
     def _look(self, at: Callable[..., Found], gone: Stop) -> Found | None:
         shown = self.surface
-        corners = vertices_at(shown, self.fallback.corners)
 
         def check(_: object) -> None:
             if self.surface is not shown or gone():
@@ -370,7 +368,7 @@ class Session:
 
         with self.checks:
             try:
-                return at(shown, corners=corners, callback=check)
+                return at(shown, callback=check)
             except KeyboardInterrupt:
                 return None
             finally:

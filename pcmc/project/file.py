@@ -14,7 +14,6 @@ import numpy as np
 
 from ..advice.rises import RISES, Rise, mast_note, take_rises, taken, with_rises
 from ..base import validate
-from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.libraries import require
@@ -72,11 +71,6 @@ class Project:
         """All files that it is read from, which nothing writes over."""
         drawing = [] if self.drawing is None else [self.drawing.path]
         return [self.path, *drawing, *([] if self.mesh is None else [self.path.parent / self.mesh.file])]
-
-    @property
-    def corners(self) -> Floats:
-        """(c,3) the corners of its plan, which mesh checks keep; none without a plan."""
-        return np.empty((0, 3)) if self.plan is None else self.plan.corners
 
     @property
     def specified(self) -> bool:

@@ -21,7 +21,6 @@ from ..solvers import solve, solve_once
 from ..solvers.result import Progress, Result, Status
 from ..structure.calculix import expect_program
 from ..surface import Surface
-from ..surface.distance import vertices_at
 from . import cache
 from .checking import in_file
 from .file import Project, load
@@ -356,9 +355,8 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
 
     _newton_alone(project, "reach an accuracy")
     report("solving to the accuracy")
-    corners = vertices_at(surface, project.corners)
     wanted = vars(project.wanted) | dict(project.options)
-    accurate = solve_to_accuracy(surface, corners=corners, callback=callback, **wanted)
+    accurate = solve_to_accuracy(surface, callback=callback, **wanted)
     stopped = accurate.status is AccuracyStatus.STOPPED
     return _certified(accurate.result, report, stopped, accurate=accurate)
 

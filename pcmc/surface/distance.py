@@ -9,16 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
-from ..base.tolerances import ON
 from .geometry import area_vectors, point, to_triangle, vertex_sums
-
-
-def vertices_at(surface: Any, places: Floats) -> Ints:
-    """(k,) the vertices of a surface that are at places (c,3), each once; none for a place without one."""
-    if not len(places):
-        return np.empty(0, dtype=np.int64)
-    away, nearest = cKDTree(surface.vertices).query(places)
-    return np.unique(np.asarray(nearest)[np.asarray(away) <= ON * surface.size])
 
 
 def distances(points: Floats, X: Floats, F: Ints) -> Floats:

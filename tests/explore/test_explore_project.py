@@ -47,30 +47,6 @@ def client(explorer):
     return Client(explorer)
 
 
-ROUND = """
-[plan]
-edge_length = 0.6
-outline = {polyline = [%s], closed = true}
-tension = 2.0
-"""
-
-
-def test_the_page_checks_the_mesh_with_the_corners_of_the_plan_as_commands_do(tmp_path):
-    """A polygon whose corners turn by 30°, as a smooth curve might."""
-    corners = ", ".join(f"[{2 * np.cos(a):.6f}, {2 * np.sin(a):.6f}]" for a in np.pi / 6 * np.arange(12))
-    (tmp_path / "round.toml").write_text(ROUND % corners, encoding="utf-8")
-    roof = read_roof(tmp_path / "round.toml", use_cache=False)
-    wanted = roof.outcome.check_mesh().table["limit"]
-    with closing(explore.start(roof)) as running:
-        found = running.open()[1].check_mesh().table["limit"]
-    assert found.to_numpy() == pytest.approx(wanted.to_numpy(), rel=1e-6)
-    smooth = pcmc.check_mesh(roof.surface).table["limit"]
-    assert smooth.to_numpy() != pytest.approx(wanted.to_numpy(), rel=1e-2)
-    given = {"starts": 0, "mesh_check": True, "corners": roof.outcome.corners}
-    (one,) = [one for one in pcmc.find_equilibria(roof.surface, (), **given).found if one.index == 0]
-    assert one.mesh_check.table["limit"].to_numpy() == pytest.approx(wanted.to_numpy(), rel=1e-6)
-
-
 def apex(surface, name):
     return measure(surface, Target("apex", name)).value
 
