@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -57,7 +56,7 @@ class Task:
     """What a project asks for."""
 
     plan: Plan | None  # None for a mesh
-    file: str
+    where: str  # to type: "type in roof.toml"
     drawing: str  # of its plan; empty without one
     rises: Sequence[Rise]  # heights instead of tensions, which are the last targets
     targets: Sequence[Target]
@@ -159,7 +158,7 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
         tried = "which was tried, comes to rest and meets the targets"
     elif mended.rests and targets:
         tried = "which was tried without the targets and comes to rest"
-    where = f"type in {Path(task.file).with_suffix('.toml').name}"
+    where = task.where
     if task.drawing and mended.rings:
         where = " and ".join([f"draw in {task.drawing}", *([where] if lines else [])])
     ending = [f"with them, the targets are {reached}"] if reached else []

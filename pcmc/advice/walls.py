@@ -16,15 +16,16 @@ from .advice import changes, coarse, straight_walls, with_dividers
 STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
 
 
-def firmer_walls(plan: Plan, surface: Surface, file: str, persists: Callable[[Plan], bool]) -> list[str]:
+def firmer_walls(plan: Plan, surface: Surface, where: str, persists: Callable[[Plan], bool]) -> list[str]:
     """What to type so that finer meshes hold the roof, too: a heading, and a line a change.
 
-    Empty if nothing helps of what is tried. ``surface`` is the roof at rest, ``file`` the name of its
-    project, and ``persists`` says whether the roof of another plan comes to rest, as on finer meshes.
+    Empty if nothing helps of what is tried. ``surface`` is the roof at rest, ``where`` such as
+    "type in roof.toml", and ``persists`` says whether the roof of another plan comes to rest, as on finer
+    meshes.
     """
     for other in _firmer(plan, surface):
         if persists(coarse(other, surface)):
-            return [f"type in {file}, which was tried and persists:", *changes(plan, other)]
+            return [f"{where}, which was tried and persists:", *changes(plan, other)]
     return []
 
 

@@ -32,6 +32,7 @@ def write(
     colour: str = "",
     units: Units | str | None = None,
     members: Sequence[Any] = (),
+    cable_areas: Mapping[str, float] | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -50,6 +51,7 @@ def write(
         To .glb and .gltf, which are in metres, the surface is converted (scalars are not). Without a unit the
         numbers stay, and .3dm, .ifc and .usda files are in metres.
     members : of its structural model, ``structure.drawn_members(model)``, for .ifc and .3dm.
+    cable_areas : of the sections of its cables there, length², by name.
 
     Warns
     -----
@@ -89,6 +91,8 @@ def write(
     lost += form.lost(surface, units)
     if members and not form.members:
         lost.append("members")
+    if cable_areas and not form.members:
+        lost.append("sections of cables")
     surface = surface.cell if "images" in form.loses else surface
     if units and form.unit:
         surface = scaled_surface(surface, length_factor(units.length, form.unit))
@@ -110,7 +114,7 @@ def write(
             text = f"certificate: expected a Certificate, found {found}"
             raise FileError(text, what="certificate", found=found)
         findings = {name: getattr(certificate, name) for name in findings.FILED}
-    content = Content(metadata, carried, colour, findings, walls, units, bare, members)
+    content = Content(metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {})
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
             text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"

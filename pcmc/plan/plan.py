@@ -139,9 +139,12 @@ class Plan:
         for key in ("rise", "cushion"):
             if getattr(self, key) is not None:
                 validate.positive(key, getattr(self, key))
-        if bool(self.patches) == (self.tension is not None):
-            problem = "a plan needs one tension= (in a project, tension or rise) or patches, each with its"
-            raise OptionError(f"{problem} own", what="tension")
+        if self.patches and self.tension is not None:
+            problem = f"the plan has tension = {validate.shown(self.tension)} and patches with their own"
+            raise OptionError(f"{problem}; leave out one of them", what="tension", found=self.tension)
+        if not self.patches and self.tension is None:
+            problem = "a plan needs a tension, such as tension = 4.0 (in a project rise = 2.0 finds one), or"
+            raise OptionError(f"{problem} patches, each with its own", what="tension")
         for key, usual in (("pressure", 1.0), ("weight", 0.0)) if self.patches else ():
             if getattr(self, key) != usual:
                 problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"

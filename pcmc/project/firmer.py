@@ -36,7 +36,6 @@ def firmer(outcome: Outcome, changed: Changed | None = None, progress: OnStep = 
         found = trial.check_mesh() if trial.good else None
         return found is not None and found.persists
 
-    file = project.path.with_suffix(".toml").name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        return firmer_walls(project.plan, outcome.surface, file, persists)
+        return firmer_walls(project.plan, outcome.surface, project.where_to_type, persists)

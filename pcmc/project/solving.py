@@ -208,7 +208,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     report("looking for advice")
     drawing = "" if project.drawing is None else project.drawing.path.name
     names = ("rises", "targets", "vary", "method", "options", "units")
-    task = Task(project.plan, project.path.name, drawing, *(getattr(project, name) for name in names))
+    task = Task(project.plan, project.where_to_type, drawing, *(getattr(project, name) for name in names))
 
     def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
         plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,11 +23,11 @@ from ..cloth.sheets import pattern_files
 from ..drawings.net_drawings import net_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
-from ..structure import Analysis, PlacedMember, StructuralModel, write_structure
+from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
 from .file import Project
-from .members import members_drawn, warn_of_members
+from .members import members_filed, warn_of_members
 from .outcome import OnStep, Outcome, ignore
 from .settings import check_picture, cost_paths, schedule_paths
 
@@ -88,7 +88,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     members of the project.
     """
     paths = [*map(Path, files)]
-    members = members_drawn(outcome) if any(map(_holds_members, paths)) else ()
+    members = members_filed(outcome) if any(map(_holds_members, paths)) else {}
     for held in (True, False):
         if some := [path.name for path in paths if _holds_members(path) == held]:
             warn_of_members(outcome, ", ".join(some), held)
@@ -103,8 +103,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         about |= {"scalars": carried, "certificate": None}
     writes = {path: partial(io.write, surface=outcome.shown.surface, **about) for path in paths}
     return [
-        (path, partial(write, members=members) if _holds_members(path) else write)
-        for path, write in writes.items()
+        (path, partial(write, **members) if _holds_members(path) else write) for path, write in writes.items()
     ]
 
 
@@ -118,10 +117,10 @@ def certified_files(
     files: Iterable[PathLike],
     units: Units,
     colour: str = "",
-    members: Sequence[PlacedMember] = (),
+    members: Mapping[str, Any] | None = None,
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, size of the reactions at supports (force), and members."""
+    relative curvature error, size of the reactions at supports (force), and ``members_filed``."""
     scalars: dict[str, Floats] = {
         "mean curvature": mean_curvature(surface),
         "error": curvature_error(surface),
@@ -134,7 +133,7 @@ def certified_files(
         about: dict[str, Any] = {"units": units, "colour": colour}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
-        about["members"] = members if form.members else ()
+        about |= (members or {}) if form.members else {}
         jobs.append((file, partial(io.write, surface=surface, **about)))
     return jobs
 

@@ -103,7 +103,7 @@ def test_a_line_for_a_divider_that_may_be_a_curve_alone_says_what_that_becomes()
 def test_a_sail_has_no_walls_to_make_firmer():
     """No patch of it has a pressure: it was the greatest tension of none."""
     sail = Plan([[0, 0], [4, 0], [4, 4], [0, 4]], tension=1.0, pressure=0.0, edge_length=1.0)
-    assert firmer_walls(sail, sail.surface(), "sail.toml", lambda plan: True) == []
+    assert firmer_walls(sail, sail.surface(), "type in sail.toml", lambda plan: True) == []
 
 
 CORNERED = """[plan]
