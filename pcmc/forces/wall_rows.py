@@ -61,6 +61,11 @@ class WallRows:
             places[held] = top[held] + shift
         return places
 
+    def heights(self, surface: Surface, X: Floats) -> Floats:
+        """(w,) the height of the top edge over the bottom at each row, length."""
+        drop = np.linalg.norm(self.drops(X), axis=1)
+        return np.where(self.feet[:, 0] >= 0, drop, np.abs(surface.plane.height(self.top_places(X))))
+
     def drops(self, X: Floats) -> Floats:
         """(w,3) P - Q, from the held bottom up to the top edge; without meaning where the bottom slides."""
         return self.top_places(X) - self._between(X[self.feet[:, 0]], X[self.feet[:, 1]])

@@ -89,22 +89,11 @@ def test_loads_balance_their_totals():
 
 def test_snow_does_not_fall_on_what_is_below(tmp_path):
     """A bulge wider than its base carries snow on the plan of its upper side alone."""
-    X = [
-        [1, 1, 0],
-        [-1, 1, 0],
-        [-1, -1, 0],
-        [1, -1, 0],
-        [2, 2, 1],
-        [-2, 2, 1],
-        [-2, -2, 1],
-        [2, -2, 1],
-        [0, 0, 2],
-    ]
-    side = [[a, (a + 1) % 4, 4 + (a + 1) % 4] for a in range(4)] + [
-        [a, 4 + (a + 1) % 4, 4 + a] for a in range(4)
-    ]
-    top = [[4 + a, 4 + (a + 1) % 4, 8] for a in range(4)]
-    bulge = Surface(X, side + top, [0] * 12, [Patch("bulge", 1.0)], fixed=range(4))
+    base = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+    X = [*base, *(2 * base + [0, 0, 1]), [0, 0, 2]]
+    turns = [(a, (a + 1) % 4) for a in range(4)]
+    F = [f for a, b in turns for f in ([a, b, 4 + b], [a, 4 + b, 4 + a], [4 + a, 4 + b, 8])]
+    bulge = Surface(X, F, [0] * 12, [Patch("bulge", 1.0)], fixed=range(4))
     model = model_of(bulge, loads=[Snow(2.0)], anyway=True)
     assert model.steps[1].forces.sum(axis=0) == pytest.approx([0, 0, -2.0 * 16.0])
 
