@@ -235,9 +235,10 @@ class Tracer:
 
     def let_held_walls_pinch(self) -> bool:
         """From here on let walls come down on held bottoms; False if none can, or they already do."""
-        if self.held or self.here.state.mesh.part.walls.held.any():
+        here = self.here.state
+        if self.held or here.mesh.surface.periodic or here.mesh.part.walls.held.any():
             return False
-        self.held, here = True, self.here.state
+        self.held = True
         mesh = self.mesh(here.whole)
         if mesh.part.walls.held.any():
             start = BranchState(mesh, mesh.surface.vertices, here.parameter)
