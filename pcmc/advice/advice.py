@@ -250,8 +250,7 @@ def _step(plan: Plan, result: Result) -> Plan:
     plan = with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
         balanced = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
-        own = straight_walls(plan)
-        plan = balanced if changes(plan, balanced) else with_dividers(plan, own, upright=True)
+        plan = balanced if changes(plan, balanced) else with_upright(plan) or plan
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
         surface = plan.surface()
         strained = strained_junction(surface)
@@ -283,12 +282,13 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
     return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
 
 
-def straight_walls(plan: Plan) -> set[str]:
-    """The names of the dividers whose walls could be upright."""
+def with_upright(plan: Plan) -> Plan | None:
+    """The plan with all walls upright that can be, those under straight lines; None if they are already."""
     from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
 
-    near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None]
-    return {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
+    near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None and not d.upright]
+    leaning = {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
+    return with_dividers(plan, leaning, upright=True) if leaning else None
 
 
 def with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:

@@ -27,7 +27,8 @@ SUFFIXES, TABLES = (*DRAWINGS, CSV), ("", "seams")  # tables of strips and of se
 LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "mirror": "PCMC-SEAM", "rim": "PCMC-RIM"}
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
-MITRE = 3.0  # of an allowance: farther from its corner cloth is cut across
+MITRE = 3.0  # of an allowance: so far from a corner cloth is cut across, if the lines outside meet farther
+SLIT = 1e-9  # of a strip's size: a narrower slit is one of rounding
 MOST_NOTCHES = 1000  # on a seam; more mean a mistake in the unit
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
@@ -164,7 +165,7 @@ def strip_lines(
 
 def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
     """The polygon of a strip with the cloth added outside each edge of its outline; in corners up to where
-    the lines outside meet, or across where that is farther than ``MITRE`` of the larger allowance."""
+    the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther."""
     shapely = load_library("shapely", "cloth")
     parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
     for loop in strip.outlines:
@@ -179,10 +180,15 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
             before, v = along[k - 1], X[k]
             reach = (wide[k] - wide[k - 1] * float(before @ along[k])) / turns[k]
             tip = out[k - 1] + reach * before
-            good = reach >= 0.0 >= tip @ along[k] and np.linalg.norm(tip) <= MITRE * max(wide[k - 1], wide[k])
-            tips = [v + tip] if good else []
-            parts.append(shapely.Polygon([v, v + out[k - 1], *tips, v + out[k]]))
-    return shapely.union_all(parts)
+            tips = [tip] if reach >= 0.0 >= tip @ along[k] else []
+            far, most = float(np.linalg.norm(tip)), MITRE * max(wide[k - 1], wide[k])
+            if tips and far > most:
+                short = [(n, n @ tip / far) for n in (out[k - 1], out[k])]
+                tips = [n + (most - begin) / (far - begin) * (tip - n) for n, begin in short]
+            parts.append(shapely.Polygon(v + np.array([0.0 * v, out[k - 1], *tips, out[k]])))
+    # along a straight side rounding leaves slits between the parts, which close where they grow by as little
+    little = SLIT * float(np.ptp(strip.cut, axis=0).max())
+    return shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
 
 
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:

@@ -110,6 +110,32 @@ def test_the_plan_is_to_scale(caps):
     assert away.min() > 2.0  # mm, also where a wall stands below its ridge
 
 
+@pytest.fixture(scope="module")
+def court():
+    """A square roof around a square court, both around one centre."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    plan = Plan(4.0 * corners, holes=[1.5 * corners], edge_length=1.2, tension=4.0)
+    return pcmc.solve(plan.surface()).surface
+
+
+def test_the_plan_names_closed_curves_where_they_are(court):
+    """The middle of the rim is that of the court, too."""
+    plan = paper_plan(court, pcmc.certify(court), UNITS)
+    rims = np.concatenate([line.points for line in plan.lines if line.layer == "PCMC-RIM"])
+    middle, factor = 0.5 * (rims.min(axis=0) + rims.max(axis=0)), 1e3 / float(plan.scale.partition(":")[2])
+    away = {text.text: np.linalg.norm(text.at - middle) / factor for text in plan.texts}
+    assert 1.0 < away["B2"] < 2.6 < 3.4 < away["B1"]
+
+
+def test_held_curves_around_one_centre_have_names_of_their_own(court):
+    """Else a row of the mesh check has the value of one and the bar of both."""
+    check = pcmc.check_mesh(court)
+    names = check.table.loc[check.table["quantity"] == "reaction", "of"].tolist()
+    assert names == ["", "patch 1 near (0, 0), B1", "patch 1 near (0, 0), B2"]
+    held = pcmc.certify(court).supports["force_z"].tolist()
+    assert [check.row("reaction", name).value for name in names[1:]] == pytest.approx(held)
+
+
 def test_every_verdict_has_its_sentence():
     assert set(words.VERDICTS) == set(Verdict)
 
@@ -302,5 +328,6 @@ def test_what_rounding_leaves_of_forces_and_of_a_flat_curvature_is_0():
         tables.key_figures(sail, pcmc.certificate.quantities.figures(sail, certificate), UNITS).rows
     )
     assert figures["all reactions, upwards"] == "0 kN"
+    assert certificate.patches["mean_H"].tolist() == [0.0]
     patches = tables.table_of_patches(sail, certificate, UNITS)
     assert patches.rows[0][patches.head.index("mean curvature, 1/m")] == "0"
