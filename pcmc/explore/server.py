@@ -204,7 +204,8 @@ class Explorer:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         # the page lists what formats carry; a rule for this module alone, as threads share the rules
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
-        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known={})
+        known = {(False, "certificate"): state.certificate}
+        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known=known)
         members = members_filed(outcome) if FORMATS[suffix].members else {}
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
