@@ -164,7 +164,8 @@ def strip_lines(
 
 def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
     """The polygon of a strip with the cloth added outside each edge of its outline; in corners up to where
-    the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther."""
+    the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther. Along the
+    weft it reaches no farther than the allowance from the widest place."""
     shapely = load_library("shapely", "cloth")
     parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
     for loop in strip.outlines:
@@ -187,7 +188,10 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
             parts.append(shapely.Polygon(v + np.array([0.0 * v, out[k - 1], *tips, out[k]])))
     # along a straight side rounding leaves slits between the parts, which close where they grow by as little
     little = SLIT * float(np.ptp(strip.cut, axis=0).max())
-    return shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
+    cloth = shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
+    # corners that point across the warp reach no farther than seams do: else the strip would be too wide
+    (left, _, right, _), most = cloth.bounds, max(added.values())
+    return cloth.intersection(shapely.box(left, -most, right, strip.width + most))
 
 
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:
