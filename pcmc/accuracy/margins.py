@@ -53,7 +53,7 @@ class MarginEnd(Enum):
     FOLD = "fold: beyond it this equilibrium is gone"
     BIFURCATION = "bifurcation: beyond it the equilibrium is a saddle"
     CONTACT = "contact: a ridge comes to rest or lifts off, and a saddle is left"
-    WALL_DOWN = "wall down: a ridge comes down on the held bottom of its wall"
+    WALL_DOWN = "wall down: a ridge comes down on the held bottom of its wall, where it cannot rest"
     COMPRESSION = "compression: the weight of a sheet or cable is more than its tension holds"
     NONE = "no end found: it was followed no further"
     MESH = "the mesh gave out: it could not be followed further"
@@ -112,7 +112,7 @@ def find_end(
         down = solve_once(beyond).certificate.verdict is Verdict.WALL_DOWN
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
-            worst = there.faces[worst_face(there, ~there.roof)[0]]  # of walls, triangles may vanish
+            worst = there.faces[worst_face(there, standing_part(there).walls.pinchable)[0]]
             detail += f" near {point_text(there.vertices[worst].mean(axis=0), there.size)}"
     last = branch.last.vertices
     before = branch.surfaces.get(len(branch.points) - 2, branch.last).vertices

@@ -113,16 +113,22 @@ def given_volume(surface: Surface) -> float | None:
 def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[EdgeCurve, str, Floats, float]]:
     """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
 
-    Of several curves of one name, each is named with its place.
+    Of several curves of one name, each is named with its place; those around one centre with the number of
+    their support, too.
     """
     curves = held_curves(surface)
     table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
+    numbers = certificate.supports["support"].iloc[: len(curves)]
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
     forces = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
     largest = table["per_length_max"].tolist()
-    for curve, name, at, force, most in zip(curves, names, middles, forces, largest, strict=True):
-        own = name if names.count(name) == 1 else f"{name} near {point_text(at, surface.size)}"
+    places = [
+        name if names.count(name) == 1 else f"{name} near {point_text(at, surface.size)}"
+        for name, at in zip(names, middles, strict=True)
+    ]
+    for curve, place, number, force, most in zip(curves, places, numbers, forces, largest, strict=True):
+        own = place if places.count(place) == 1 else f"{place}, {number}"
         yield curve, own, force, most
 
 

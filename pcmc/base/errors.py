@@ -113,6 +113,7 @@ def unknown(what: str, found: object, known: Iterable[str]) -> str:
     "unknown method 'newtn'; did you mean 'newton'? Known: newton, lbfgs"
     """
     names = list(known)
-    near = get_close_matches(str(found), names, n=1)
+    near = [name for name in names if name.casefold() == str(found).casefold()]
+    near = near or get_close_matches(str(found), names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     return f"unknown {what} {found!r}; {hint}Known: {', '.join(names) or '(none)'}"

@@ -7,7 +7,7 @@ message; ``error`` is the exception to raise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
@@ -103,13 +103,13 @@ def flag(name: str, value: object) -> bool:
 def sequence(
     name: str, value: Any, expected: str = "a list", error: type[PcmcError] = OptionError
 ) -> list[Any]:
-    """The entries of a list or of anything like it; a text is none.
+    """The entries of a list or of anything like it; not of a text, nor of what can be read but once.
 
     >>> sequence("seams", (1, 2))
     [1, 2]
     """
     try:
-        found = None if isinstance(value, str | bytes) else list(value)
+        found = None if isinstance(value, str | bytes | Iterator) else list(value)
     except TypeError:
         found = None
     return refuse(name, value, expected, error=error) if found is None else found

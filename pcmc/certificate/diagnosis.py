@@ -270,6 +270,18 @@ def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
     return sorted(ends, key=lambda end: -round(end.share, ALIKE))  # of equal ones the first of the mesh
 
 
+def slipping_rings(surface: Surface, mode: Floats) -> list[str]:
+    """The walls below closed junctions that slip in a mode (n,3): nothing holds their sliding bottoms."""
+    motion, names = np.linalg.norm(mode, axis=1), list[str]()
+    for curve in surface.topology.junctions:
+        if curve.closed and motion[curve.vertices].max() >= SLIPS * motion.max() > 0.0:
+            for wall in (i for i in curve.sheets if surface.walls[i]):
+                F = surface.faces[surface.patch_of_face == wall]
+                if surface.on_ground[F].any() and not surface.pinned[F].any():
+                    names.append(surface.patches[wall].name)
+    return names
+
+
 def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     """The ways down from a saddle: where its lowest mode (n,3) moves most, and which ends slip in it."""
     text = f"index {index}: {'1 way' if index == 1 else f'{index} ways'} down"
@@ -282,6 +294,8 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     part = f"patch {surface.patches[surface.patch_of_face[face]].name!r}"
     part = f"the junction {names_of(surface, curves[0].sheets)}" if curves else part
     text += f"; the mode moves {part} most, near {point_text(surface.vertices[most], surface.size)}"
+    if rings := " and of ".join(map(repr, slipping_rings(surface, mode))):
+        text += f"; the ring of {rings} slips: hold its bottom ({KEY.format('held')})"
     ends = slipping_ends(surface, mode)
     if not ends:
         return text

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
+from ..base.tolerances import ON
 from ..base.units import Units
 from ..forces.cables import directions, pull_along
 from ..forces.curvature import METHODS, curvature_error, mean_curvature, target_curvature
@@ -79,6 +80,7 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
         inside[standing.faces[faces]] = True
         inside &= np.isfinite(curvature)
         varies = patch.weight and inside.any()
+        mean = float(curvature[inside].mean()) if inside.any() else np.nan
         row: dict[str, Any] = {
             "patch": patch.name,
             "tension": patch.tension,
@@ -86,7 +88,7 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
             **({"snow": patch.snow, "net": patch.net_pressure} if surface.snows.any() else {}),
             "target": float(target[inside].mean()) if varies else patch.target_curvature,
             "area": float(areas[index]),
-            "mean_H": float(curvature[inside].mean()) if inside.any() else np.nan,
+            "mean_H": 0.0 if abs(mean) * surface.size < ON else mean,
         }
         for method, error in errors.items():
             known = error[inside & np.isfinite(error)]

@@ -193,7 +193,7 @@ def certify_(
         print(end="", flush=True)
         with working() as progress:
             progress("checking the mesh")
-            check = check_mesh(surface, meshes, corners=roof.corners)
+            check = check_mesh(surface, meshes)
         print(f"\n{check.text(roof.units)}")
     return OK if roof.good else NOT_CERTIFIED
 

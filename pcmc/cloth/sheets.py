@@ -27,7 +27,8 @@ SUFFIXES, TABLES = (*DRAWINGS, CSV), ("", "seams")  # tables of strips and of se
 LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "mirror": "PCMC-SEAM", "rim": "PCMC-RIM"}
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
-MITRE = 3.0  # of an allowance: farther from its corner cloth is cut across
+MITRE = 3.0  # of an allowance: so far from a corner cloth is cut across, if the lines outside meet farther
+SLIT = 1e-9  # of a strip's size: a narrower slit is one of rounding
 MOST_NOTCHES = 1000  # on a seam; more mean a mistake in the unit
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
@@ -53,7 +54,7 @@ def pattern_drawings(
     length = expect_length(as_units(units).length, "a cutting pattern")
     millimetres, decimals = length_factor(length, "mm"), length_decimals(length, pattern.surface.size)
     size = sheet, millimetres, None, decimals
-    sheets = [seam_sheet(pattern, *size)]
+    sheets = [seam_sheet(pattern, sheet, length)]
     for first in range(0, len(pattern.strips), PER_SHEET):
         group, views = pattern.strips[first : first + PER_SHEET], list[DrawnView]()
         for strip in group:  # as it is cut, with its net length and width
@@ -100,9 +101,7 @@ def _middles(pattern: CuttingPattern) -> list[tuple[Strip, Floats]]:
     return [(s, s.areas @ s.roof[s.faces].mean(axis=1) / s.area) for s in pattern.strips]
 
 
-def seam_sheet(
-    pattern: CuttingPattern, sheet: str, millimetres: float, scale: int | None = None, decimals: int = 3
-) -> Sheet:
+def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
     """The seams from above, with the numbers of strips, and the places of corners along both axes."""
     axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
     lines = [curve._replace(points=curve.points @ axes.T) for curve in _curves(pattern)]
@@ -110,7 +109,8 @@ def seam_sheet(
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
-    return placed([view], "Seams on the roof", sheet, millimetres, scale, decimals)
+    decimals = length_decimals(length, pattern.surface.size)
+    return placed([view], "Seams on the roof", sheet, length_factor(length, "mm"), None, decimals)
 
 
 def _inside(strip: Strip) -> Floats:
@@ -164,7 +164,8 @@ def strip_lines(
 
 def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
     """The polygon of a strip with the cloth added outside each edge of its outline; in corners up to where
-    the lines outside meet, or across where that is farther than ``MITRE`` of the larger allowance."""
+    the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther. Along the
+    weft it reaches no farther than the allowance from the widest place."""
     shapely = load_library("shapely", "cloth")
     parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
     for loop in strip.outlines:
@@ -179,10 +180,18 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
             before, v = along[k - 1], X[k]
             reach = (wide[k] - wide[k - 1] * float(before @ along[k])) / turns[k]
             tip = out[k - 1] + reach * before
-            good = reach >= 0.0 >= tip @ along[k] and np.linalg.norm(tip) <= MITRE * max(wide[k - 1], wide[k])
-            tips = [v + tip] if good else []
-            parts.append(shapely.Polygon([v, v + out[k - 1], *tips, v + out[k]]))
-    return shapely.union_all(parts)
+            tips = [tip] if reach >= 0.0 >= tip @ along[k] else []
+            far, most = float(np.linalg.norm(tip)), MITRE * max(wide[k - 1], wide[k])
+            if tips and far > most:
+                short = [(n, n @ tip / far) for n in (out[k - 1], out[k])]
+                tips = [n + (most - begin) / (far - begin) * (tip - n) for n, begin in short]
+            parts.append(shapely.Polygon(v + np.array([0.0 * v, out[k - 1], *tips, out[k]])))
+    # along a straight side rounding leaves slits between the parts, which close where they grow by as little
+    little = SLIT * float(np.ptp(strip.cut, axis=0).max())
+    cloth = shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
+    # corners that point across the warp reach no farther than seams do: else the strip would be too wide
+    (left, _, right, _), most = cloth.bounds, max(added.values())
+    return cloth.intersection(shapely.box(left, -most, right, strip.width + most))
 
 
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:

@@ -79,10 +79,11 @@ def model_curves(surface: Surface, without: Collection[str] = ()) -> list[SheetL
 
 
 def outline_places(curves: Lines, axis: Sequence[float]) -> Floats:
-    """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
-    places = []
+    """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach; of
+    roofs without rims, as cushions are, those of ridges."""
+    places, layers = [], {curve.layer for curve in curves}
     for curve in curves:
-        if curve.layer in ("PCMC-RIM", "PCMC-WALL"):
+        if curve.layer in ("PCMC-WALL", "PCMC-RIM" if "PCMC-RIM" in layers else "PCMC-RIDGE"):
             P = curve.points
             before, after = P - np.roll(P, 1, axis=0), np.roll(P, -1, axis=0) - P
             sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
@@ -174,7 +175,7 @@ def placed(
     name: str,
     millimetres: float,
     scale: int | None,
-    decimals: int = 3,
+    decimals: int,
 ) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 

@@ -28,6 +28,7 @@ from ..surface import Surface
 
 EVERY = 0.5  # seconds between two looks at the files
 Signature = tuple[tuple[str, tuple[int, ...]], ...]
+Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]  # targets, and what may vary for them
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class ShownRoof:
         return None if self.outcome.project is None else self.outcome.project.path
 
     @property
-    def aims(self) -> tuple[tuple[Target, ...], tuple[Parameter, ...]]:
+    def aims(self) -> Aims:
         """The targets of its project, and what may vary for them."""
         project = self.project
         return ((), ()) if project is None else (tuple(project.targets), tuple(project.vary))
@@ -171,7 +172,6 @@ class Watch:
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
 OUTPUTS = {"files", "picture", "drawings", "panels", "structure", "report"}  # keys of [output] with names
-Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
 def save(

@@ -17,7 +17,7 @@ from typing import Any
 from ..base.errors import FileWarning, SurfaceError, unknown
 from ..io import FORMATS
 from ..project import load
-from ..project.members import has_members, members_drawn
+from ..project.members import has_members, members_drawn, members_filed
 from ..project.writing import certified_files
 from ..surface import Surface
 from ..surface.images import expect_no_images
@@ -204,8 +204,9 @@ class Explorer:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         # the page lists what formats carry; a rule for this module alone, as threads share the rules
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
-        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known={})
-        members = members_drawn(outcome) if FORMATS[suffix].members else ()
+        known = {(False, "certificate"): state.certificate}
+        outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known=known)
+        members = members_filed(outcome) if FORMATS[suffix].members else {}
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
             for file, write in certified_files(*outcome.shown, [path], outcome.units, "", members):

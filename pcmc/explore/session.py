@@ -30,6 +30,7 @@ from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from .acts import act
 from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
+from .roof import Aims
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
@@ -41,7 +42,6 @@ MOST_VARIANTS = 20
 
 Found = TypeVar("Found")
 Check = Callable[[object], None]  # raises StopIteration once the page shows another surface
-Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,19 +332,19 @@ class Session:
 
     def check_mesh(self, gone: Stop = lambda: False) -> MeshCheck | None:
         """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
-        return self._look(lambda shown, check: check_mesh(shown, callback=check), gone)
+        return self._look(check_mesh, gone)
 
     def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
         """How far the surface shown is from the edge; None as for ``check_mesh``."""
-        return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
+        return self._look(partial(margin, what=what), gone)
 
     def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
 
-        def search(shown: Surface, check: Check) -> Equilibria:
+        def search(shown: Surface, callback: Check) -> Equilibria:
             def tell(step: str) -> None:
                 self.progress = step
-                check(step)
+                callback(step)
 
             return find_equilibria(shown, what, callback=tell)
 
@@ -359,7 +359,7 @@ class Session:
         with self.checks:
             return verify(self.surface)
 
-    def _look(self, at: Callable[[Surface, Check], Found], gone: Stop) -> Found | None:
+    def _look(self, at: Callable[..., Found], gone: Stop) -> Found | None:
         shown = self.surface
 
         def check(_: object) -> None:
@@ -368,7 +368,7 @@ class Session:
 
         with self.checks:
             try:
-                return at(shown, check)
+                return at(shown, callback=check)
             except KeyboardInterrupt:
                 return None
             finally:

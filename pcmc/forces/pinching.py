@@ -35,6 +35,9 @@ from .motion_space import MotionSpace, VertexClasses, vertex_classes
 from .triangles import effective_tensions
 from .wall_rows import WallRows, Walls, find_walls
 
+STILL = (
+    1e-3  # of a wall's height: where its top edge moves by less, its rows stay, or Newton would not converge
+)
 WEISZFELD = 30  # steps to the direction of the largest pull where walls meet
 
 
@@ -193,6 +196,12 @@ class StandingPart:
         passes = np.einsum("ij,ij->i", gap, gap_before) <= 0.0
         return np.where(held, standing & (passes | ((near < near_before) & (near <= low))), down)
 
+    def hardly_moves(self, before: Floats, X: Floats) -> bool:
+        """Whether no top edge moves by more than ``STILL`` of the height of its wall."""
+        rows = self.walls.rows
+        moved = rows.top_places(X) - rows.top_places(before)
+        return bool((np.linalg.norm(moved, axis=1) <= STILL * rows.heights(self.surface, X)).all())
+
     def landed(self, X: Floats, down: Bools, space: MotionSpace | None = None) -> Floats:
         """X (n,3) with the vertices ``down`` on Π or on their bottom, and the rows of walls below.
 
@@ -227,7 +236,12 @@ def standing_part(surface: Surface) -> StandingPart:
     >>> standing_part(square).surface is square
     True
     """
-    walls = find_walls(surface)
+    return part_by_positions(surface)
+
+
+def part_by_positions(surface: Surface, held: bool = False) -> StandingPart:
+    """The same by the positions alone; with ``held``, walls with held bottoms can pinch (``find_walls``)."""
+    walls = find_walls(surface, held)
     return StandingPart.of(surface, walls, resting_vertices(surface, walls))
 
 

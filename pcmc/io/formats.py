@@ -30,7 +30,7 @@ class Format:
     bare: bool = False  # whether it holds nothing but triangles and names
     loses: tuple[str, ...] = ()  # the ``PARTS`` that it does not hold
     reads: bool = True  # whether pcmc reads it, too
-    members: bool = False  # whether it holds the members of a structural model
+    members: bool = False  # whether it holds the members and cables' sections of a structural model
     unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
 
     @property
@@ -60,6 +60,8 @@ class Content:
     units: Units
     bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
     members: Sequence[Any]  # as ``structure.drawn_members`` has them
+    cable_areas: Mapping[str, float]  # of the cables' sections, by name
+    mark: str  # of a roof that is not in order, such as "NOT CERTIFIED: …", or ""
 
 
 PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"

@@ -59,7 +59,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         model.add_properties("Pcmc_Certificate", roof, _findings(content.certificate))
     texts = {"Description": content.metadata} | ({} if content.walls is None else {"Walls": content.walls})
     model.add_properties("Pcmc_Surface", roof, {name: ("IfcText", text) for name, text in texts.items()})
-    areas = patch_areas(surface) * length_factor(content.units.length, "m") ** 2
+    areas = patch_areas(surface) * model.square_metres
     parts = [
         model.add_part(k, color, used, faces, float(areas[k]), roof.ObjectPlacement)
         for k, color, used, faces in patch_meshes(surface)
@@ -80,8 +80,10 @@ class _Model:
         import ifcopenshell
 
         self.surface, self.units = surface, units
-        self.name = ", ".join(filter(None, ("Roof", content.certificate.get("mark"))))
+        self.square_metres = length_factor(units.length, "m") ** 2  # in the roof's unit of area
+        self.name = ", ".join(filter(None, ("Roof", content.mark)))
         self.replaced = {member.wall for member in content.members}
+        self.cable_areas = content.cable_areas
         self.file: Any = ifcopenshell.file(schema="IFC4")
         self.add = self.file.create_entity
         digest = hashlib.sha256(content.metadata.encode())
@@ -175,6 +177,8 @@ class _Model:
         lines = [self.polyline(self.surface.vertices[c.vertices], c.closed) for c in chains]
         pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
         about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
+        if cable.name in self.cable_areas:
+            about["CrossSectionArea"] = self.cable_areas[cable.name] * self.square_metres
         shape = self.axis, "Curve3D", lines
         tendon = self.element("IfcTendon", f"cable {cable.name}", cable.name, place, shape, **about)
         force = ("IfcForceMeasure" if self.units.force else "IfcReal", pull)
@@ -202,7 +206,7 @@ class _Model:
         kind = {"column": "IfcColumn", "stay": "IfcTendon", "cable": "IfcTendon"}.get(line.kind, "IfcBeam")
         kind = "IfcMember" if line.wall and kind == "IfcBeam" else kind
         use = "NOTDEFINED" if kind == "IfcTendon" else kind.removeprefix("Ifc").upper()
-        area = profile.area * length_factor(self.units.length, "m") ** 2
+        area = profile.area * self.square_metres
         about = {"PredefinedType": use}
         if kind == "IfcTendon":
             about["CrossSectionArea"] = area

@@ -35,8 +35,10 @@ from .polygons import cut_polygons
 KEY, CABLE, NAME, MEMBER = "pcmc", "pcmc cable", "pcmc name", "pcmc member"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
+MARK = "PCMC-MARK"  # the layer of the text that marks a roof which is not in order
 PRECISION = 1e-6  # of the size of the surface: the tolerance that Rhino works with, a power of ten
 CURVES = {
+    MARK: (200, 0, 0, 255),
     "PCMC-RIDGE": (200, 0, 0, 255),
     "PCMC-RIM": (0, 0, 0, 255),
     "PCMC-WALL": (0, 128, 0, 255),
@@ -76,20 +78,25 @@ def write(path: Path, surface: Surface, content: Content) -> None:
             for point in held.tolist():
                 cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], content.metadata))
-    _add_curves(rhino, model, surface, replaced)
+    _add_curves(rhino, model, surface, replaced, content)
     for member in content.members:
         attributes = _layer(rhino, model, f"member {member.name}", ORANGE)
         model.Layers[attributes.LayerIndex].SetUserString(MEMBER, member.kind)
         for key, text in member.texts(content.units).items():
             attributes.SetUserString(key, text)
         _add_line(rhino, model, member.points, member.closed, attributes)
+    if content.mark:
+        low = rhino.Point3d(*surface.vertices.min(axis=0).tolist())
+        model.Objects.AddTextDot(content.mark, low, _layer(rhino, model, MARK, CURVES[MARK]))
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
 
 
-def _add_curves(rhino: Any, model: Any, surface: Surface, replaced: Collection[str]) -> None:
-    """Ridges, rims, wall lines and cables as polylines, each kind and each cable on its layer; none of walls
-    that are ``replaced``."""
+def _add_curves(
+    rhino: Any, model: Any, surface: Surface, replaced: Collection[str], content: Content
+) -> None:
+    """Ridges, rims, wall lines and cables with their sections as polylines, each kind and each cable on its
+    layer; none of walls that are ``replaced``."""
     layers: dict[str, Any] = {}
     curves = [(f"PCMC-{kind}", curve, "") for kind, curve in curves_by_kind(surface, replaced)]
     free = np.zeros(surface.n, dtype=bool)
@@ -100,6 +107,9 @@ def _add_curves(rhino: Any, model: Any, surface: Surface, replaced: Collection[s
     for name, curve, cable_text in curves:
         if name not in layers:
             layers[name] = _layer(rhino, model, name, CURVES.get(name, COLORS["cable"]), "", cable_text)
+            area = content.cable_areas.get(name.removeprefix("cable ")) if cable_text else None
+            if area is not None:
+                layers[name].SetUserString("area", f"{area:.4g}{content.units.behind('area')}")
         _add_line(rhino, model, surface.vertices[curve.vertices], curve.closed, layers[name])
 
 

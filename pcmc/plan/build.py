@@ -103,14 +103,17 @@ def build_surface(plan: Plan) -> Surface:
 def _check_cushion(plan: Plan) -> None:
     """Refuse what two sheets on one rim cannot have."""
     edges = {"the outline": plan.edge} | {hole.name: hole.edge for hole in plan.holes}
-    bad = [f"{name} is {edge!r}, expected 'fixed'" for name, edge in edges.items() if edge != "fixed"]
-    bad += [f"{d.name} has a wall; give it wall = false" for d in plan.dividers if d.wall is not None]
-    bad += [f"{d.name} has a cable; leave it out" for d in plan.dividers if d.cable is not None]
-    bad += [f"leave out {key}" for key in ("cables", "rooms", "supports") if getattr(plan, key)]
-    bad += [f"patch {p.name!r} needs a pressure above 0, not a volume" for p in plan.patches if p.volume]
-    bad += [f"patch {p.name!r} needs a pressure above 0" for p in plan.patches if p.pressure <= 0.0]
-    if bad or (not plan.patches and plan.pressure <= 0.0):
-        text = f"cushion: its sheets meet at a fixed rim, {bad[0] if bad else 'and need a pressure above 0'}"
+    bad = [f'{name} has edge = "{edge}"; make it "fixed"' for name, edge in edges.items() if edge != "fixed"]
+    bad += [f"divider {d.name!r} has a wall; type wall = false" for d in plan.dividers if d.wall is not None]
+    bad += [f"divider {d.name!r} has a cable; leave it out" for d in plan.dividers if d.cable is not None]
+    bad += [
+        f"the plan has {key}; leave them out" for key in ("cables", "rooms", "supports") if getattr(plan, key)
+    ]
+    bad += [f"patch {p.name!r} has a volume; give it a pressure instead" for p in plan.patches if p.volume]
+    pressures = {f"patch {p.name!r}": p.pressure for p in plan.patches} or {"the plan": plan.pressure}
+    bad += [f"{of} has the pressure {p:g}; give one above 0" for of, p in pressures.items() if p <= 0.0]
+    if bad:
+        text = f"a cushion is two sheets on one fixed rim, with air between them, but {bad[0]}"
         raise PlanError(text, what="cushion", found=plan.cushion)
 
 

@@ -192,6 +192,11 @@ class PatchSpec:
 
 def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
     """A Curve from plain data; ``what`` names it in errors."""
+    if isinstance(spec, list) and len(spec) in (2, 3) and all(isinstance(x, int | float) for x in spec):
+        message = (
+            f"{what}: {spec} is a point; a curve has two or more, [[x, y], [x, y]], and a list of curves"
+        )
+        raise OptionError(f"{message} is [[[x, y], [x, y]], ...]", what=what, found=spec)
     try:
         return curve(spec, closed=closed)
     except OptionError as error:
@@ -243,7 +248,6 @@ def edge_cable(part: Any, what: str) -> dict[str, Any]:
     edge, cable = part.edge, part.cable
     if edge == "cable" and cable is None:
         message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
-        message += ", and patches with pressure = 0.0"
         raise OptionError(message, what="cable", where=what)
     if edge != "cable" and cable is not None:
         message = f'{what}: cable = {validate.shown(cable)} needs edge = "cable", found "{edge}"'

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..base.libraries import require
 from ..base.validate import checked_name
@@ -18,7 +17,6 @@ from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
 from ..surface.parts import listed
-from ..surface.pieces import to_local, to_space
 from . import parts
 from .parts import check_keys
 
@@ -48,7 +46,8 @@ class Plan:
         on the outline or a hole fixes that part of it, which carries no cable; one inside a patch is fixed
         where it is drawn. On a free edge or a cable the height z of a support is that of the edge there;
         between supports the edge starts straight.
-    plane : Π.
+    plane : Π. Points [x, y] are on it, from its point, along the x axis laid on it and across; points
+        [x, y, z] are in space.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports. In a project without tensions it is the
         height wanted over the outline, for which the tension is found.
@@ -141,13 +140,21 @@ class Plan:
         for key in ("rise", "cushion"):
             if getattr(self, key) is not None:
                 validate.positive(key, getattr(self, key))
-        if bool(self.patches) == (self.tension is not None):
-            problem = "a plan needs one tension= (in a project, tension or rise) or patches, each with its"
-            raise OptionError(f"{problem} own", what="tension")
+        if self.patches and self.tension is not None:
+            problem = f"the plan has tension = {validate.shown(self.tension)} and patches with their own"
+            raise OptionError(f"{problem}; leave out one of them", what="tension", found=self.tension)
+        if not self.patches and self.tension is None:
+            problem = "a plan needs a tension, such as tension = 4.0 (in a project rise = 2.0 finds one), or"
+            raise OptionError(f"{problem} patches, each with its own", what="tension")
         for key, usual in (("pressure", 1.0), ("weight", 0.0)) if self.patches else ():
             if getattr(self, key) != usual:
                 problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"
                 raise OptionError(f"{problem} give it to each of the patches", what=key)
+        if self.snow and self.patches and all(patch.snow is not None for patch in self.patches):
+            problem = f"snow = {self.snow:g} of the plan counts for nothing, as each patch has its own;"
+            raise OptionError(
+                f"{problem} leave it out, or leave it out of a patch", what="snow", found=self.snow
+            )
         names = [d.name for d in self.dividers if d.wall is not None] + [p.name for p in self.patches]
         names += [d.name for d in self.dividers if d.wall is None and d.cable is not None]
         names += dict.fromkeys(c.name for c in self.cables if c.name)
@@ -186,20 +193,6 @@ class Plan:
         edge += f"; mirror images beyond {len(self.mirrors)} edges" if self.mirrors else ""
         lines = [f"Plan of {width:.4g} × {depth:.4g}, edge length {self.edge_length:g}", f"  outline: {edge}"]
         return "\n".join([*lines, *(f"  {name}: {listed(items)}" for name, items in texts.items() if items)])
-
-    @property
-    def corners(self) -> Floats:
-        """(c,3) the points where the curves of the plan turn by more than 10°, also down on Π.
-
-        >>> Plan([[0, 0], [4, 0], [0, 3]], edge_length=0.5, tension=2.0).corners.tolist()
-        [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]]
-        """
-        curves = [self.outline, *(d.curve for d in self.dividers), *(h.curve for h in self.holes)]
-        curves += [support for support in self.supports if isinstance(support, Curve)]
-        local = [to_local(curve.at(curve.corners), self.plane) for curve in curves]
-        raised = np.concatenate([points for points in local if len(points)] or [np.empty((0, 3))])
-        below = raised[raised[:, 2] != 0.0] * [1.0, 1.0, 0.0]
-        return to_space(np.concatenate([raised, below]), self.plane)
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""

@@ -67,13 +67,18 @@ def _check_range(text: str, value: Any, place: Place) -> None:
 
 def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
     if not isinstance(table, Mapping):
-        raise _wrong_kind(text, place, table, "a table")
+        above, below = ".".join(place[:-2]), ".".join(place[:-1])
+        misplaced = place[-1] in [
+            key.name for one in main_sections() if one.name == above for key in one.keys
+        ]
+        hint = f"; as a key of [{above}] it stands above [{below}]" if misplaced else ""
+        raise _wrong_kind(text, place, table, "a table", hint)
     known = {key.name: key for key in section.keys}
     title = f"[{'.'.join(place)}]" if place else "the project"
     for name, value in table.items():
         key, at = known.get(name), (*place, name)
         if key is not None and not fits(value, KINDS[key.kind]):
-            raise _wrong_kind(text, at, value, key.kind)
+            raise _wrong_kind(text, at, value, key.kind, section.example(name))
         if key is not None and key.choices and value not in key.choices:
             message = f"{'.'.join(at)}: {unknown('value', value, key.choices)}"
             raise _error(text, at, message, found=value, expected=key.choices)
@@ -81,16 +86,19 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
         if name not in known:
             curves = CURVES if section.name in OR_CURVE and not known.keys() & table.keys() else ()
             message = unknown(f"key of {title}", name, [*known, *curves])
+            for home in () if "." in section.name else main_sections():
+                if home.name in ("plan", "output") and name in [key.name for key in home.keys]:
+                    message = f"unknown key of {title} {name!r}; it is a key of [{home.name}]"
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
         if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):
-            message = f"{title} needs the key {name!r}"
+            message = f"{title} needs the key {name!r}{section.example(name)}"
             raise _error(text, (*place, name), message, at=place, expected=key.kind)
 
 
-def _wrong_kind(text: str, place: Place, value: Any, kind: str) -> FileError:
+def _wrong_kind(text: str, place: Place, value: Any, kind: str, hint: str = "") -> FileError:
     name = ".".join(place)
-    hint = f"; write [[{name}]]" if kind.startswith("a list") and isinstance(value, Mapping) else ""
+    hint = f"; write [[{name}]]" if kind.startswith("a list") and isinstance(value, Mapping) else hint
     message = f"{name} must be {kind}, found {value!r:.60}{hint}"
     return _error(text, place, message, found=value, expected=kind)
 

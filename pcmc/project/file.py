@@ -82,6 +82,21 @@ class Project:
         """Whether it is a project file: a drawing or a mesh alone says nothing about solving it."""
         return self.specified and self.path.suffix.lower() == TOML
 
+    @property
+    def where_to_type(self) -> str:
+        """How a line begins that says what to type; of a drawing alone, which command writes its project."""
+        name = self.path.with_suffix(TOML).name
+        return (
+            f"type in {name}"
+            if self.has_file
+            else f"write a project ({self.plan_command}) and type in {name}"
+        )
+
+    @property
+    def plan_command(self) -> str:
+        """The command that writes the project of a drawing."""
+        return f"pcmc plan {self.path.name} -o {self.path.with_suffix(TOML).name}"
+
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
         base = Path(folder)
@@ -174,13 +189,35 @@ def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
         problem = f"not TOML: {error}"
         if place := re.search(r"at line (\d+), column (\d+)", problem):
             where, column = int(place[1]), int(place[2])
-            if not text.split("\n")[where - 1][column - 1 :][:1].isascii():
-                problem += "; put names with letters beyond a-z in quotes"
+            problem += _toml_hint(problem, text.split("\n")[where - 1], column)
     else:
         with in_file(path, FileError):
             check_project_keys(text, data)
         return text, data
     raise FileError(f"{path}: {problem}", what=str(path), where=where)
+
+
+def _toml_hint(problem: str, line: str, column: int) -> str:
+    """What to type in a line in which TOML reads no further than a column, which counts from 1.
+
+    >>> _toml_hint("not TOML: Invalid value", "units = m", 9)
+    '; put a text in quotes'
+    """
+    rest = line[column - 1 :]
+    rules = (
+        (r"", r"[^\x00-\x7f]", "put names with letters beyond a-z in quotes"),
+        (r"Expected", r"(?i)[a-z]", "numbers have no unit behind them"),
+        (r"Expected", r":", "type = between a key and its value"),
+        (r"Invalid value", r"(?i)true|false", "write true or false in small letters"),
+        (r"Invalid value", r"(?i)[a-z]", "put a text in quotes"),
+        (r"Invalid value", r"\.\d", "write 0.5, not .5"),
+        (r"Cannot overwrite", r"", "the key is there twice"),
+        (r"Unclosed inline table", r"", "a table in braces ends on its line"),
+    )
+    if "Expected" in problem and re.search(r"=\s*[-+]?\d+,\d", line):
+        return "; numbers have a decimal point, no comma"
+    hints = (hint for of, at, hint in rules if of in problem and re.match(at, rest))
+    return next((f"; {hint}" for hint in hints), "")
 
 
 def project_of(

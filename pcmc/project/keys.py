@@ -27,6 +27,32 @@ MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME
 PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
 VARIED = "what may change; a name is a patch whose tension may, a list of names several with one tension"
 REQUIRED = MISSING  # the default of a key that must be given
+EXAMPLES = {  # what to type for keys that must be given, and for some that a beginner takes for others
+    "plan": "[plan] with outline = [[0, 0], [12, 0], [12, 8], [0, 8]] and tension = 4.0",
+    "plan.outline": "outline = [[0, 0], [12, 0], [12, 8], [0, 8]]",
+    "plan.dividers": "dividers = [[[6, 0], [6, 8]]]",
+    "plan.holes": "holes = [{circle = {centre = [6, 4], radius = 1}}]",
+    "plan.supports": "supports = [[0, 0], [12, 8, 3]]",
+    "plan.mirrors": "mirrors = [[[12, 0], [12, 8]]]",
+    "plan.rise": "rise = 2.0",
+    "plan.cushion": "cushion = 1.0, for two sheets of one tension",
+    "plan.patches.NAME.tension": "tension = 4.0",
+    "plan.dividers.curve": "curve = [[6, 0], [6, 8]]",
+    "plan.dividers.wall": "wall = 1.5",
+    "plan.holes.curve": "curve = {circle = {centre = [6, 4], radius = 1}}",
+    "plan.cables.curve": "curve = [[0, 0], [12, 0]]",
+    "plan.cables.tension": "tension = 10.0",
+    "plan.rooms.NAME.patches": 'patches = ["west", "east"]',
+    "plan.rooms.NAME.volume": "volume = 150.0",
+    "mesh.file": 'file = "mesh.obj"',
+    "remesh.edge_length": "edge_length = 0.5",
+    "structure.zones.case": 'case = "drift"',
+    "targets.meet": 'meet = [{quantity = "apex", value = 3.0}]',
+    "targets.vary": 'vary = ["west"]',
+    "targets.meet.quantity": 'quantity = "apex"',
+    "targets.vary.patch": 'patch = "west"',
+    "output.files": 'files = ["roof.3dm"]',
+}
 OR_CURVE = ("plan.dividers", "plan.holes")  # a curve may replace these sections
 
 Schema = dict[str, Any]  # in the terms of JSON Schema
@@ -129,6 +155,11 @@ class Section:
     help: str
     keys: tuple[Key, ...] = field(repr=False)
     condition: str = ""  # when these are its keys; empty for always
+
+    def example(self, key: str) -> str:
+        """The end of a message about a key: what to type for it; empty where ``EXAMPLES`` have none."""
+        example = EXAMPLES.get(f"{self.name}.{key}".lstrip("."), "")
+        return example and f", such as {example}"
 
     def is_curve(self, table: Mapping[str, Any]) -> bool:
         """Whether the table of a divider or hole is a curve itself."""

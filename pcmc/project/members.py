@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import LostWarning, OptionError
 from ..structure.drawn import drawn_members
@@ -18,12 +18,17 @@ if TYPE_CHECKING:
 
 
 def model_with_members(
-    outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
+    outcome: Outcome,
+    surface: Surface | None = None,
+    certificate: Certificate | None = None,
+    cables: bool = False,
 ) -> StructuralModel | None:
-    """The structural model of what is shown, or of another surface of the project; None without members, or
-    where one cannot be there, as in a mirror plane."""
+    """The structural model of what is shown, or of another surface of the project; None without members (nor,
+    if they count, ``cables``), or where one cannot be there, as in a mirror plane."""
     project = outcome.project
-    if project is None or project.structure is None or not has_members(outcome):
+    if project is None or project.structure is None:
+        return None
+    if not (has_members(outcome) or (cables and outcome.surface.cables)):
         return None
     try:
         if surface is None:
@@ -37,9 +42,17 @@ def model_with_members(
 def members_drawn(
     outcome: Outcome, surface: Surface | None = None, certificate: Certificate | None = None
 ) -> tuple[PlacedMember, ...]:
-    """The members of that model, as files and drawings have them."""
+    """The members of that model, as drawings and the page have them."""
     model = model_with_members(outcome, surface, certificate)
     return () if model is None else drawn_members(model)
+
+
+def members_filed(outcome: Outcome) -> dict[str, Any]:
+    """The members and the cables' sections of the structural model, as ``io.write`` takes them."""
+    model = model_with_members(outcome, cables=True)
+    if model is None:
+        return {}
+    return {"members": drawn_members(model) if model.members else (), "cable_areas": model.cable_areas}
 
 
 def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:

@@ -8,15 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
-import numpy as np
-
-from ..base.arrays import Ints
 from ..base.errors import OptionError, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
 from ..solvers.result import Progress, Result
-from ..surface import Surface, mirrored, unfolded
+from ..surface import Surface, mirrored
 from .settings import Output, of_material
 
 if TYPE_CHECKING:
@@ -35,7 +32,6 @@ if TYPE_CHECKING:
     from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
-SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 EXTENSIVE = ("area", "volume", "length")  # targets of a part that are not those of the whole
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 Finding = TypeVar("Finding")
@@ -175,10 +171,13 @@ class Outcome:
 
     @property
     def mark(self) -> str:
-        """What drawings are marked with where the certificate has no mark."""
+        """What files, pictures and documents are marked with; empty where all is in order, and where
+        nothing is known, as of a surface that another program wrote."""
         from ..drawings.sheet import MISSED
 
-        return "" if self.design is None or self.design.met else MISSED
+        if self.result is None:
+            return str(self.data.certificate.get("mark", "")) if self.data else ""
+        return self.shown.certificate.mark or ("" if self.design is None or self.design.met else MISSED)
 
     @property
     def certified(self) -> bool:
@@ -352,7 +351,7 @@ class Outcome:
             given = self.result if self.result is not None and not self.unfold else self.shown.surface
             try:
                 callback = _reporter("mesh check", progress)
-                return check_mesh(given, corners=self.corners, callback=callback)
+                return check_mesh(given, callback=callback)
             except PcmcError as error:  # the roof is good without it
                 self._known[self.unfold, "mesh failure"] = str(error)
                 return None
@@ -366,26 +365,12 @@ class Outcome:
         surface, certificate = self.shown
         callback = _reporter(f"margin of {what}", progress)
         find = partial(margin, surface, what, callback=callback, certificate=certificate)
-        return self._once(("margin", what), lambda: find(corners=self.corners))
+        return self._once(("margin", what), find)
 
     @property
     def margins(self) -> list[Margin]:
         """The margins that were found, in the order in which they were asked for."""
         return [m for (unfold, key), m in self._known.items() if unfold == self.unfold and key[0] == "margin"]
-
-    @property
-    def corners(self) -> Ints:
-        """(k,) the vertices of what is shown at the corners of the project's plan."""
-        from scipy.spatial import cKDTree
-
-        plan = None if self.project is None else self.project.plan
-        if plan is None or not len(plan.corners):
-            return np.empty(0, dtype=np.int64)
-        away, nearest = cKDTree(self.surface.vertices).query(plan.corners)
-        corners: Ints = np.asarray(nearest)[np.asarray(away) <= SAME * self.surface.size]
-        if not self.unfold:
-            return corners
-        return np.flatnonzero(np.isin(unfolded(self.surface).vertex, corners))
 
 
 def _reporter(what: str, progress: OnStep | None) -> Callable[[Progress], None]:

@@ -125,9 +125,7 @@ def proposal_text(project: Project) -> str:
     values = {"tension": {area.tension for area in project.plan.patches}, "walls of": walls}
     values["edges of"] = {project.plan.edge_length}
     parts = [f"{what} {' or '.join(f'{v:g}' for v in sorted(own))}" for what, own in values.items() if own]
-    name = project.path.with_suffix(".toml").name
-    change = f"to change them: pcmc plan {project.path.name} -o {name}"
-    return f"proposed: {', '.join(parts)}; {change}"
+    return f"proposed: {', '.join(parts)}; to change them: {project.plan_command}"
 
 
 def _curve(curve: Any, closed: bool = False) -> str:

@@ -201,15 +201,14 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         notes += metres_note(project.output.files, start.units.length)
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas, volumes and lengths are those of the part between the mirror planes")
-    about: dict[str, Any] = {"units": start.units, "unfold": start.unfold, "data": start.data}
-    outcome = replace(solved, notes=notes, **about)
+    outcome = replace(solved, notes=notes, units=start.units, data=start.data)
     if outcome.good:
         return outcome
     notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")
     drawing = "" if project.drawing is None else project.drawing.path.name
     names = ("rises", "targets", "vary", "method", "options", "units")
-    task = Task(project.plan, project.path.name, drawing, *(getattr(project, name) for name in names))
+    task = Task(project.plan, project.where_to_type, drawing, *(getattr(project, name) for name in names))
 
     def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
         plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())
@@ -248,6 +247,7 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
     Only a good roof is remeshed. The accuracy comes last; targets are met once more on its mesh.
     """
     notes = list[str]()
+    about: dict[str, Any] = {"project": project, "unfold": project.output.whole}
     with in_file(project.path):
         for stage in project.remeshing:
             if stage.when == "before":
@@ -257,7 +257,7 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
         after = [stage for stage in project.remeshing if stage.when == "after"]
         if project.wanted.accuracy and not after and not project.targets:
             outcome = _solve_to_accuracy(project, surface, progress)
-            return replace(outcome, notes=[*filter(None, notes), *outcome.notes], project=project)
+            return replace(outcome, notes=[*filter(None, notes), *outcome.notes], **about)
         flat = replace(project, options={**project.options, "order": None}) if after else project
         outcome = _solve_or_meet(flat if "order" in project.options else project, surface, progress)
         notes += outcome.notes
@@ -275,7 +275,7 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
                 notes += outcome.notes
             else:
                 outcome = replace(accurate, design=outcome.design)
-    return replace(outcome, notes=[note for note in notes if note], project=project)
+    return replace(outcome, notes=[note for note in notes if note], **about)
 
 
 def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -355,9 +355,8 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
 
     _newton_alone(project, "reach an accuracy")
     report("solving to the accuracy")
-    corners = Outcome(None, start=surface, project=project).corners
     wanted = vars(project.wanted) | dict(project.options)
-    accurate = solve_to_accuracy(surface, corners=corners, callback=callback, **wanted)
+    accurate = solve_to_accuracy(surface, callback=callback, **wanted)
     stopped = accurate.status is AccuracyStatus.STOPPED
     return _certified(accurate.result, report, stopped, accurate=accurate)
 

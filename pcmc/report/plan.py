@@ -7,15 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.arrays import Floats, Ints
 from ..base.units import Units, length_factor
 from ..certificate import Certificate
+from ..certificate.supports import support_vertices
 from ..drawings import views
-from ..drawings.sheet import SheetLine, Text, box, place_labels
+from ..drawings.sheet import SheetLine, Text, box, length_decimals, place_labels
 from ..surface import Surface
+from ..surface.geometry import segment_lengths
 
 FORMAT = "A4"
 LEAST_EDGE = 1.2  # mm on paper: shorter edges of panels are not drawn
 AROUND = 1.0  # mm kept free around what is drawn
+OFF = 0.6  # of the longest edge: a point farther than this from all vertices of a curve is not on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +38,8 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     OptionError if it does not fit a page at the smallest usual scale.
     """
     view = views.plan_view(surface, views.model_curves(surface), ())
-    sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None)
+    decimals = length_decimals(units.length, surface.size)
+    sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None, decimals)
     panels = [line for line in sheet.lines if line.layer == "PCMC-PANEL"]
     edges = [float(np.linalg.norm(line.points[1] - line.points[0])) for line in panels]
     drop = bool(edges) and float(np.mean(edges)) < LEAST_EDGE
@@ -42,14 +47,27 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     marks, texts = sheet.drawn()
     lines += marks[len(sheet.lines) :]
     ((factor, shift),) = sheet.places
-    supports = zip(certificate.supports["support"], certificate.supports[["x", "y"]].to_numpy(), strict=True)
-    labels = [(name, at, "PCMC-SUPPORT") for name, at in supports]
+    supports, own = certificate.supports[["x", "y"]].to_numpy(), support_vertices(certificate.acting).items()
+    labels = [(name, at, on, "PCMC-SUPPORT") for (name, on), at in zip(own, supports, strict=True)]
     if len(certificate.junctions):
         middles = certificate.junctions[["middle_x", "middle_y"]].to_numpy()
-        labels = [(f"J{k}", at, "PCMC-RIDGE") for k, at in enumerate(middles, start=1)] + labels
-    names = [Text(factor * at + shift, name, layer=layer, align="C") for name, at, layer in labels]
+        curves = zip(certificate.acting.standing.topology.junctions, middles, strict=True)
+        ridges = [(f"J{k}", at, curve.vertices, "PCMC-RIDGE") for k, (curve, at) in enumerate(curves, 1)]
+        labels = ridges + labels
+    names = [
+        Text(factor * _beside(surface, at, on) + shift, name, layer=layer, align="C")
+        for name, at, on, layer in labels
+    ]
     texts += place_labels(names, texts)
     return on_paper(sheet.scale, lines, texts)
+
+
+def _beside(surface: Surface, middle: Floats, on: Ints) -> Floats:
+    """The middle (2,) of a curve; of a closed one, whose middle is off it, the nearest of its vertices."""
+    away = np.linalg.norm(surface.vertices[on, :2] - middle, axis=1)
+    longest = segment_lengths(surface.vertices, surface.topology.sides).max()
+    nearest = on[np.round(away / surface.size, 6).argmin()]  # of equal distances the first
+    return surface.vertices[nearest, :2] if away.min() > OFF * longest else middle
 
 
 def on_paper(scale: str, lines: Sequence[SheetLine], texts: Sequence[Text]) -> PaperPlan:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..base.tolerances import ON
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.quantities import Figure, dimension_of
@@ -87,8 +86,6 @@ def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     heads = {"net": "net_pressure", "mean_H": "mean_curvature"}
     table = certificate.patches.rename(columns=heads)
-    flat = table["mean_curvature"].abs() * surface.size < ON
-    table["mean_curvature"] = table["mean_curvature"].mask(flat, 0.0)
     pressures = " ".join(key for key in ("pressure", "snow", "net_pressure") if key in table)
     kinds = {"tension": units.tension, pressures: units.pressure, "area": units.area}
     columns = columns_in(table, kinds | {"mean_curvature": f"1/{units.length}"})

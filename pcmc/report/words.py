@@ -88,7 +88,8 @@ def verdict_sentences(
     if certificate.cuts_itself:
         sentences.append(f"It cannot be built as it is: {certificate.cuts_itself}.")
     if len(certificate.pinched):
-        sentences.append(f"The ridge rests on the plane at {len(certificate.pinched)} vertices.")
+        count = len(certificate.pinched)
+        sentences.append(f"The ridge rests on the plane at {count} {'vertex' if count == 1 else 'vertices'}.")
     return sentences
 
 

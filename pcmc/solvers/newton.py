@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.errors import CurvedContactError, SurfaceError
 from ..base.tolerances import POOR
-from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends
+from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends, slipping_rings
 from ..forces.functional import energy
 from ..forces.rooms import check_rooms, prescribed_volumes, room_pressures, room_volumes
 from ..forces.wall_rows import find_walls
@@ -118,7 +118,8 @@ def _attempts(first: NewtonRun) -> NewtonRun:
             return near
         first.patience = more
         first.run()
-    if first.status not in LOST:
+    ring = slipping_rings(start, np.ones_like(start.vertices))  # which shrinks slowly, to nothing
+    if first.status not in LOST and not (ring and first.status is Status.ITERATION_LIMIT):
         return first
     minimum = options.target == "minimum"
     second = _to_any(first, start, first.held, 0 if minimum else DESCENTS)
@@ -143,7 +144,7 @@ def _to_any(first: NewtonRun, surface: Surface, held: bool, smooth_steps: int = 
 def _rests(end: NewtonRun, must_slip: bool) -> bool:
     """Whether an attempt to find any stationary point ends what was asked for: a minimum, or the saddle.
 
-    The saddle does, with status SADDLE, if an end of a junction slips in its lowest mode or need not.
+    The saddle does, with status SADDLE, if an end or a ring slips in its lowest mode or need not.
     """
     if end.status is not Status.CONVERGED or end.state.quality < POOR:
         return False
@@ -154,7 +155,7 @@ def _rests(end: NewtonRun, must_slip: bool) -> bool:
         return False
     if index == 0:
         return True
-    if slipping_ends(surface, mode) or not must_slip:
+    if slipping_ends(surface, mode) or slipping_rings(surface, mode) or not must_slip:
         end.status, end.note = Status.SADDLE, describe_saddle(surface, index, mode)
         return True
     end.note = f"a saddle of index {index} is near: target='stationary' returns it"

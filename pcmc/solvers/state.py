@@ -13,8 +13,8 @@ from ..forces.loose_parts import rounding_left
 from ..forces.pinching import (
     StandingPart,
     lift,
+    part_by_positions,
     pull_directions,
-    resting_vertices,
     standing_part,
     top_spacing,
 )
@@ -54,10 +54,7 @@ class SolverState:
         self.min_quality = 0.0 if surface.order > 1 or surface.periodic else min_quality
         self.size, self.backend = surface.size, backend
         self.pressures = np.zeros(len(surface.rooms))  # (r,) δ, their changes since the start
-        part = standing_part(surface)
-        if held:
-            walls = find_walls(surface, held)
-            part = StandingPart.of(surface, walls, resting_vertices(surface, walls))
+        part = part_by_positions(surface, held) if held else standing_part(surface)
         self.held = bool(part.walls.held.any())  # whether walls with held bottoms can pinch, too
         self.spacing = top_spacing(surface, part.walls)
         self.evaluations = self.version = 0
@@ -154,6 +151,8 @@ class SolverState:
         if not part.standing.any():
             return X, part.standing
         down = part.coming_down(X, self.at.X, LOW * self._damping * self.spacing)
+        if not down.any() and part.hardly_moves(self.at.X, X):
+            return X, down
         return part.landed(X, down, self.at.space), down
 
     def spoils_triangles(self, X: Floats) -> bool:

@@ -202,6 +202,12 @@ class StructuralModel:
         cuts = [sum(bool(mask[c.edges].all()) for mask in mirrors) for c, *_ in found]
         return tuple((area * 0.5**k, of) for k, (_, area, of) in zip(cuts, found, strict=True))
 
+    @property
+    def cable_areas(self) -> dict[str, float]:
+        """Those areas by the names of the cables."""
+        sections = zip(self.standing.cables, self.cable_sections, strict=True)
+        return {cable.name: area for cable, (area, _) in sections}
+
     def cable_edges(self) -> Iterator[tuple[Cable, float, Material, Ints, Floats]]:
         """Each cable, the area of its section, its material, and the numbers (k,) and directions (k,3) of its
         elements, which come after the faces' numbers."""

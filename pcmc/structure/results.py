@@ -17,6 +17,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
+from ..forces.cables import directions
 from ..surface.geometry import area_vectors, unit_vectors
 from .loads import Step, nothing
 from .model import StructuralModel, expect_model
@@ -51,11 +52,12 @@ class StepResults:
 
     @cached_array
     def principal_stresses(self) -> Floats:
-        """(m,2) the two principal membrane stresses in each face's plane, ascending, force/area."""
+        """(m,2) the two principal membrane stresses in each face's plane under the loads, ascending,
+        force/area."""
         shown = np.flatnonzero(np.isfinite(self.stresses).all(axis=(1, 2)))
         surface = self.model.surface
-        values = np.full((surface.m, 2), np.nan)
-        values[shown] = _in_planes(surface.vertices[surface.faces[shown]], self.stresses[shown])
+        values, X = np.full((surface.m, 2), np.nan), surface.vertices + self.displacements
+        values[shown] = _in_planes(X[surface.faces[shown]], self.stresses[shown])
         return values
 
     @cached_array
@@ -148,24 +150,26 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
     stresses = np.full((model.surface.m, 3, 3), np.nan)
     stresses[model.faces] = stress.means(model.faces + 1)[:, TENSOR]
-    tensions = {}
-    for cable, area, _, numbers, along in model.cable_edges() if "cables" in blocks else ():
-        mine = blocks["cables"].means(numbers)[:, TENSOR]
+    tensions, moved = {}, surface.vertices + displacements
+    for cable, area, _, numbers, _ in model.cable_edges() if "cables" in blocks else ():
+        mine, along = blocks["cables"].means(numbers)[:, TENSOR], directions(moved, cable.edges)[0]
         tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
     done = 1.0 if share >= 1.0 - WHOLE else share
-    start = tables[k - 1]["stresses"][-1:] if k else []
-    taut = min(_taut(model, k, start + tables[k]["stresses"]), done)
+    taut = min(_taut(model, k, tables), done)
     return StepResults(step.name, model, displacements, reactions, stresses, tensions, step, done, taut)
 
 
-def _taut(model: StructuralModel, k: int, increments: list[ResultBlock]) -> float:
+def _taut(model: StructuralModel, k: int, tables: list[Tables]) -> float:
     """The time in step k at which the first face gets slack, by lines through the least principal stress at
     the increments, from the end of the step before on; 1 if none does."""
-    P = model.surface.vertices[model.surface.faces[model.faces]]
+    places, faces = np.full((model.surface.n, 3), np.nan), model.surface.faces[model.faces]
     least = [] if k else [(0.0, float(model.prestress.min()))]
-    for block in increments:
+    last = {kind: blocks[-1:] for kind, blocks in tables[k - 1].items()} if k else {}
+    both = [last.get(kind, []) + tables[k][kind] for kind in ("displacements", "stresses")]
+    for moved, block in zip(*both, strict=True):
+        places[moved.ids - 1] = model.surface.vertices[moved.ids - 1] + moved.values
         stresses = block.means(model.faces + 1)[:, TENSOR]
-        least.append((block.time - k, float(_in_planes(P, stresses).min())))
+        least.append((block.time - k, float(_in_planes(places[faces], stresses).min())))
     for (time, before), (end, after) in pairwise(least):
         if after <= 0.0:
             return time + (end - time) * before / (before - after) if before > 0.0 else time

@@ -94,6 +94,7 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
 def pair_array(pairs: Any, n: int) -> Ints:
     """(k,2) int64 pairs of an image and its vertex, within 0..n-1."""
     E = _integers(pairs, "images")
+    E = E if E.size else E.reshape(0, 2)
     if E.ndim != 2 or E.shape[1] != 2:
         refuse_shape("images", E, "(k, 2), pairs of an image and its vertex")
     _within("images", E, n, "vertex")
@@ -239,7 +240,8 @@ def _integers(values: Any, what: str) -> Ints:
 
 def _within(what: str, rows: Ints, count: int, kind: str) -> None:
     """Refuse the first row (k,) or (k,d) with a number outside 0..count - 1."""
-    bad, span = ((rows < 0) | (rows >= count)).reshape(len(rows), -1).any(axis=1), f"0..{count - 1}"
+    span, outside = f"0..{count - 1}", (rows < 0) | (rows >= count)
+    bad = outside.any(axis=tuple(range(1, rows.ndim)))
     refuse_rows(what, rows, bad, f"names a {kind} outside the range {span}", expected=span)
 
 

@@ -190,9 +190,9 @@ def checked_images(
 
     Both must be held alike, and with weights translations must lead along Π.
     """
-    if isinstance(given, tuple | list | np.ndarray) and not len(given):
-        return NONE
     pairs = checks.pair_array(given, len(X))
+    if not len(pairs):
+        return NONE
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     image, vertex = pairs.T
     near = ON * bounding_size(X)

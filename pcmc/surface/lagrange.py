@@ -52,7 +52,7 @@ def known_order(order: Any, error: type[PcmcError] = SurfaceError) -> int:
         ...
     pcmc.base.errors.SurfaceError: order: expected 1, 2, 4 or 8, found 3
     """
-    if isinstance(order, bool) or np.ndim(order) or order not in ORDERS:
+    if isinstance(order, bool) or not np.isscalar(order) or order not in ORDERS:
         validate.refuse("order", order, "1, 2, 4 or 8", error=error)
     return next(known for known in ORDERS if known == order)
 

@@ -97,7 +97,6 @@ def solve_varied(
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
     outcome = projects.solve_project(replace(design, search=search), start)
-    outcome = replace(outcome, project=design, unfold=design.output.whole)
     names = ("project", "project_digest", "method", "mesh_check", "search", *values)
     answer = case_row(outcome.solved, names, outcome)
     if mesh_check or design.mesh_check:

@@ -9,6 +9,7 @@ from generators import (
 )
 from pcmc import certify, check_mesh, cli, read
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.meshing.held_curves import held_edges
 from pcmc.project import run
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep import solve_case
@@ -97,6 +98,7 @@ def test_shallow_corners_of_a_plan_stay_corners(hall):
     row = check.row("reaction")  # the load on the plan's area
     assert check.row("reaction").value == pytest.approx(-3.0, rel=0.02)
     assert abs(row.limit + 3.0) <= row.limit_error < 0.01
+    assert not len(held_edges(check.surfaces[0]))  # a plan draws all that is held, and nothing is guessed
     bare = check.surfaces[0].rebuilt(curves=())  # without the lines of the plan, curves go through them
     rounded = check_mesh(bare).row("reaction")
     assert 0.01 < abs(rounded.limit + 3.0) <= rounded.limit_error

@@ -13,6 +13,7 @@ from pcmc.plan import CableLine, Divider, Hole, PatchSpec, Plan
 
 ROUGH, NAN, HUGE = [[1, 2], [3]], float("nan"), 10**400
 TABLE = np.full((3, 3), NAN)
+ONCE = iter(())  # the next to read it finds nothing
 OUTLINE = [[0, 0], [4, 0], [4, 3], [0, 3]]
 plan = partial(Plan, OUTLINE, tension=2.0)
 FILM = pcmc.Surface(
@@ -37,6 +38,7 @@ CASES = [
     *((lambda key, v: plan(**{key: v}), (key, v)) for key in ("dividers", "holes") for v in (NAN, None, 1j)),
     *((lambda key, v: plan(**{key: v}), (key, True)) for key in ("supports", "cables", "mirrors")),
     *((lambda v: Plan(OUTLINE, patches=v), (v,)) for v in (NAN, ROUGH, b"x")),
+    *((lambda key, v: plan(**{key: v}), (key, ONCE)) for key in ("dividers", "holes", "cables", "supports")),
     *((lambda v: plan(rooms=v), (v,)) for v in (NAN, ROUGH, TABLE)),
     *((lambda v: plan([Divider([[2, 0], [2, 3]], name=v)]), (v,)) for v in (TABLE, ROUGH)),
     (lambda v: plan([Divider([[2, 0], [2, 3]], wall=v)]), (TABLE,)),
@@ -55,9 +57,10 @@ CASES = [
         for key in ("faces", "patch_of_face", "fixed", "on_plane", "images")
         for v in (NAN, 1e30)
     ),
-    (lambda v: film(images=v), (ROUGH,)),
-    (lambda v: film(order=v), (TABLE,)),
-    *((lambda v: pcmc.cutting_pattern(FILM, seams=v, anyway=True), (v,)) for v in (NAN, None, True)),
+    *((lambda v: film(images=v), (v,)) for v in (ROUGH, np.array(5))),
+    *((lambda v: film(order=v), (v,)) for v in (TABLE, ROUGH)),
+    *((lambda v: pcmc.cutting_pattern(FILM, seams=v, anyway=True), (v,)) for v in (NAN, None, True, ONCE)),
+    (lambda v: pcmc.cutting_pattern(FILM, width=1.0, seams=v, anyway=True), (ONCE,)),
     (lambda v: pcmc.cutting_pattern(FILM, strips=1, compensation=v, anyway=True), (ROUGH,)),
     (lambda v: pcmc.cutting_pattern(FILM, strips=1, poisson=v, anyway=True), (TABLE,)),
     *((lambda v: pcmc.panels(FILM, 0.1, anyway=True, certificate=v), (v,)) for v in (NAN, "", {})),

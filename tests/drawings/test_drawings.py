@@ -35,6 +35,15 @@ def test_no_text_of_a_sheet_covers_another(drawings):
         assert (both & both.T).sum() == len(boxes), sheet.title
 
 
+def test_a_cushion_has_the_dimensions_of_its_rim():
+    """Its two sheets leave no open edge: the rim is the line where they meet."""
+    plan = Plan([[0, 0], [5, 0], [6, 3], [1, 4]], edge_length=1.0, tension=1.5, pressure=0.4, cushion=1.2)
+    sheets = drawing_set(pcmc.solve(plan.surface()).surface, "m", sheet="A3").sheets
+    found = {sheet.title: sorted({d.text for d in sheet.dimensions}) for sheet in sheets}
+    assert found["Plan"] == ["1.000", "3.000", "4.000", "6.000"]
+    assert found["Elevations"] == ["4.000", "6.000"]
+
+
 @pytest.mark.parametrize(
     ("unit", "factor"), [("m", 1.0), ("mm", 1e3), ("mm", 0.5), ("m", 5e-4), ("m", 300.0)]
 )

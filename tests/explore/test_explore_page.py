@@ -17,6 +17,7 @@ from pcmc import explore
 from pcmc.explore.session import Session
 
 CAP = spherical_cap(edge_length=0.25)
+RIGHT, CONTROL, ENTER = "\ue014", "\ue009", "\ue007"  # keys
 pytestmark = needs_browser
 
 
@@ -25,22 +26,25 @@ def newest(explorer):
     return explorer.sessions[next(reversed(explorer.sessions))]
 
 
+def chosen(page):
+    """The ticked boxes of what may change, by their labels."""
+    boxes = page.driver.find_elements("css selector", "#targets .vary input")
+    return {box.get_attribute("aria-label"): box for box in boxes if box.is_selected()}
+
+
 def test_the_page_loads_draws_and_complains_of_nothing(page):
     assert page.verdict == "stable"
     assert "At rest" in page.text("#verdict")
     assert page.text("#title") == "the hall"
     picture = page.picture()
-    ground = picture[0, 0]
-    assert 0.2 < (np.abs(picture - ground).max(axis=2) > 0.1).mean() < 0.9
+    assert 0.2 < (np.abs(picture - picture[0, 0]).max(axis=2) > 0.1).mean() < 0.9
     assert page.complaints() == []
 
 
 def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
-    from selenium.webdriver.common.keys import Keys
-
     before, words = page.picture(), page.text("#findings")
     assert page.find("#undo").get_attribute("disabled")
-    page.slider("Tension α of left wall").send_keys(*[Keys.ARROW_RIGHT] * 60)
+    page.slider("Tension α of left wall").send_keys(RIGHT * 60)
     page.idle()
     after = page.picture()
     assert changed(before, after) > 0.01
@@ -50,7 +54,7 @@ def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
     for _ in range(60):
         if page.find("#undo").get_attribute("disabled"):
             break
-        page.find("body").send_keys(Keys.CONTROL + "z")
+        page.find("body").send_keys(CONTROL + "z")
         page.idle()
     assert changed(before, page.picture()) == 0.0
     assert page.text("#findings") == words
@@ -97,8 +101,13 @@ def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(
         page.enter("Tension α of cap", -1)
         assert "expected a finite number" in until(lambda: page.text("#note"), "the note")
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
-        console = page.complaints()
-        assert all("400 (Bad Request)" in line for line in console)
+        assert all("400 (Bad Request)" in line for line in page.complaints())
+        running.close()  # and when the program has ended, the page says so
+        page.enter("Tension α of cap", 0.7)
+        assert "has stopped" in until(
+            lambda: "stopped" in page.text("#note") and page.text("#note"), "the note"
+        )
+        page.complaints()
 
 
 def test_a_roof_that_cuts_itself_is_named(driver):
@@ -108,7 +117,7 @@ def test_a_roof_that_cuts_itself_is_named(driver):
         assert page.verdict == "stable"
         assert warning in page.text("#verdict")
         assert page.find("#verdict .detail").is_displayed()
-        page.slider("Tension α of west").send_keys("\ue014")  # the arrow to the right
+        page.slider("Tension α of west").send_keys(RIGHT)
         page.idle()
         assert warning in page.text("#verdict")
         assert page.complaints() == []
@@ -194,9 +203,7 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         assert "kN/m" in page.text("#parts")
         assert "west 1.2 " in page.text("#parts")
         page.driver.execute_script("document.querySelector('#targets details').open = true")
-        boxes = page.driver.find_elements("css selector", "#targets .vary input")
-        chosen = [box.get_attribute("aria-label") for box in boxes if box.is_selected()]
-        assert chosen == ["west may change", "east may change", "pressure of east may change"]
+        assert [*chosen(page)] == ["west may change", "east may change", "pressure of east may change"]
         # a target is met from the page; one that cannot be met keeps the surface
         page.find("#variants button[type=submit]").click()
         page.idle()
@@ -254,25 +261,20 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
 
 def test_tied_tensions_are_one_choice_and_stay_equal(driver, tmp_path):
     path = tmp_path / "hall.toml"
-    tied = PROJECT.replace('["west", "east", {', '[["west", "east"], {')
-    path.write_text(tied)
+    path.write_text(PROJECT.replace('["west", "east", {', '[["west", "east"], {'))
     with followed(path) as running:
         page = Explored(driver, running.url)
         driver.execute_script("document.querySelector('#targets details').open = true")
-
-        def chosen():
-            boxes = driver.find_elements("css selector", "#targets .vary input")
-            return [b.get_attribute("aria-label") for b in boxes if b.is_selected()]
 
         def box(name):
             return page.find(f"#targets .vary input[aria-label='{name} may change']")
 
         pressure = "pressure of east may change"
-        assert chosen() == ["tension of west and east may change", pressure]
+        assert [*chosen(page)] == ["tension of west and east may change", pressure]
         box("west").click()
-        assert chosen() == ["west may change", pressure]  # the tie is let go
+        assert [*chosen(page)] == ["west may change", pressure]  # the tie is let go
         box("tension of west and east").click()
-        assert chosen() == ["tension of west and east may change", pressure]
+        assert [*chosen(page)] == ["tension of west and east may change", pressure]
         wanted = page.find("#targets input[aria-label='Value wanted']")
         wanted.clear()
         wanted.send_keys("1.4")
@@ -290,9 +292,8 @@ def test_wrong_targets_are_named_on_the_page(page):
     assert "number" in message.text
     page.find("#targets input[aria-label='Value wanted']").send_keys("3")
     page.driver.execute_script("document.querySelector('#targets details').open = true")
-    for box in page.driver.find_elements("css selector", "#targets .vary input"):
-        if box.is_selected():
-            box.click()
+    for box in chosen(page).values():
+        box.click()
     page.find("#targets .meet").click()
     assert "at least one tension" in message.text
     page.find("#targets .target-row button").click()
@@ -319,11 +320,10 @@ def test_sliders_agree_with_their_numbers(page, explorer):
     page.enter("Pressure p of left", -0.5)
     place = float(page.slider("Pressure p of left").get_attribute("value"))
     assert 0.0 < place < 300.0
-    page.slider("Pressure p of left").send_keys("\ue014" * 20)  # to the right
+    page.slider("Pressure p of left").send_keys(RIGHT * 20)
     page.idle()
     shown = float(page.number("Pressure p of left").get_attribute("value"))
-    asked = explorer.sessions[next(reversed(explorer.sessions))].state().wanted.patches[0].pressure
-    assert shown == asked  # to the last digit
+    assert shown == newest(explorer).state().wanted.patches[0].pressure  # to the last digit
     page.complaints()
 
 
@@ -336,8 +336,7 @@ def test_slow_work_is_said(page, monkeypatch):
         return real(self, values, turn=turn)
 
     monkeypatch.setattr(Session, "settle", slow)
-    number = page.number("Tension α of left wall")
-    number.send_keys("\ue009a\ue000", "11", "\ue004")
+    page.number("Tension α of left wall").send_keys(CONTROL + "a\ue000", "11", "\ue004")
     sign = page.find("#verdict .sign")
     green = sign.value_of_css_property("color")
     until(lambda: "Working" in page.text("#verdict .work"), "the words", seconds=1.9)
@@ -367,18 +366,7 @@ def test_two_pages_are_two_sessions(driver, explorer):
     assert one.text("#findings") == changed_words  # the same tab finds its session again
 
 
-def test_when_the_program_has_ended_the_page_says_so(driver):
-    running = explore.start(CAP)
-    page = Explored(driver, running.url)
-    running.close()
-    page.enter("Tension α of cap", 0.7)
-    assert "has stopped" in until(lambda: page.text("#note"), "the note")
-    page.complaints()
-
-
 def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
-    from selenium.webdriver.common.keys import Keys
-
     with closing(explore.start(spherical_cap(0.3))) as running:
         page = Explored(driver, running.url)
         page.find("#equilibria").click()
@@ -390,13 +378,14 @@ def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
         page.idle()
         assert page.verdict == "saddle"
         assert changed(before, page.picture()) > 0.05
-        dashed = page.driver.find_elements("css selector", ".diagram polyline.saddle")
-        lines = page.driver.find_elements("css selector", ".diagram polyline")
+        dashed, lines = (
+            driver.find_elements("css selector", f".diagram polyline{of}") for of in (".saddle", "")
+        )
         assert 0 < len(dashed) < len(lines)
         points = page.driver.find_elements("css selector", ".diagram circle.way")
         pressures = {float(point.get_attribute("aria-label").split()[1].strip(",")) for point in points}
         assert min(pressures) < 0.6
-        points[0].send_keys(Keys.ENTER)  # on the branch, at another pressure, and by the keyboard
+        points[0].send_keys(ENTER)  # on the branch, at another pressure, and by the keyboard
         page.idle()
         there = float(points[0].get_attribute("aria-label").split()[1].strip(","))
         shown = page.number("Pressure p of cap").get_attribute("value")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 
 import pcmc
 from pcmc import Verdict, solve
@@ -70,3 +70,34 @@ def test_a_closed_wall_comes_down_at_the_pull_of_both_sides():
         resting = standing_part(found.surface).resting
         assert resting.sum() == (find_walls(found.surface).top_free.sum() if factor > 1.0 else 0)
     assert resting.any()
+
+
+def test_a_ring_whose_bottom_slides_is_a_saddle_that_says_so():
+    """A cap inside, a catenoid below and a nodoid outside balance at the radius 2.967, unheld."""
+
+    def forces_left(values):
+        neck, height, c = values
+        top = neck * np.cosh(height / neck)
+        inner, outer = np.arcsin(top / 6.0), np.arcsin(top / 6.0 + c / top)
+
+        def slope(r):
+            return np.tan(np.arcsin(r / 6.0 + c / r))
+
+        return (
+            3.0 * (np.cos(outer) - np.cos(inner)) - np.tanh(height / neck),
+            3.0 * (np.sin(inner) - np.sin(outer)) - 1.0 / np.cosh(height / neck),
+            height - quad(slope, top, 5.0)[0],
+        )
+
+    neck, height, _ = fsolve(forces_left, (2.7, 1.0, -0.8))
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    patches = {"in": {"tension": 3.0, "at": [0, 0]}, "out": {"tension": 3.0, "at": [4.5, 0]}}
+    wall = Divider((2.5 * circle).tolist(), wall=1.0, bottom="sliding")
+    found = solve(Plan((5.0 * circle[:-1]).tolist(), [wall], edge_length=0.6, patches=patches).surface())
+    assert found.certificate.verdict is Verdict.SADDLE
+    assert found.certificate.index == 3  # it shrinks or grows, or moves to any side
+    assert "the ring of 'wall 1' slips: hold its bottom" in found.certificate.detail
+    top = found.surface.vertices[found.surface.topology.on_junction]
+    assert np.linalg.norm(top[:, :2], axis=1) == pytest.approx(neck * np.cosh(height / neck), rel=0.015)
+    assert top[:, 2] == pytest.approx(height, rel=0.02)

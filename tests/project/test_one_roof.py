@@ -120,6 +120,9 @@ def test_the_whole_of_a_half_is_shown_listed_and_kept(folder):
     whole = project.designed("half.toml")
     assert whole.cached
     assert whole.shown.surface.m == 2 * half.surface.m
+    loaded = project.load("half.toml")
+    tried = project.solve_project(loaded, project.surface_of(loaded))  # as advice does
+    assert tried.shown.surface.m == whole.shown.surface.m
     value = {(f.quantity, f.of): f.value for f in half.figures}
     double = {(f.quantity, f.of): f.value for f in whole.figures}
     for name in ("area", "volume", "load"):

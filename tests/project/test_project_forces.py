@@ -133,6 +133,24 @@ def test_rhino_and_drawings_have_members_and_other_files_say_that_they_leave_the
     assert words == ["wall 1", *(f"{key}: {text}" for key, text in texts.items() if key != "member")]
 
 
+def test_the_sections_of_cables_are_in_files_that_hold_them(folder):
+    """In m² in the building model, with their unit in Rhino, also where a member gives the section of one."""
+    import ifcopenshell
+    import rhino3dm
+
+    cloth = "[structure]\nyoung = 5e5\nthickness = 1e-3\ncable_area = 1e-4\n"
+    rope = "[structure.members]\nrope = {on = ['cable 2'], kind = 'cable', young = 1.6e8, area = 3e-4}\n"
+    text = SAIL_TOML.replace('"sail.pcmc", "sail.fe", ', '"sail.ifc", ')
+    (folder / "sail.toml").write_text(text + cloth + rope)
+    run("sail.toml")
+    tendons = {part.Name: part for part in ifcopenshell.open("sail.ifc").by_type("IfcTendon")}
+    areas = {name: part.CrossSectionArea for name, part in tendons.items()}
+    assert areas == {f"cable {k}": 3e-4 if k == 2 else 1e-4 for k in range(1, 5)}
+    curves = [item.Attributes for item in rhino3dm.File3dm.Read("sail.3dm").Objects]
+    texts = {dict(one.GetUserStrings()).get("area") for one in curves}
+    assert texts == {None, "0.0001 m²", "0.0003 m²"}
+
+
 def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_for(folder):
     (folder / "lost.toml").write_text(
         SAIL_TOML.replace('"sail.3dm"', '"sail.stl", "sail.obj"'), encoding="utf-8"

@@ -12,7 +12,7 @@ from refusals import refused
 from small_project import changed
 
 from pcmc import cli
-from pcmc.base.errors import FileError
+from pcmc.base.errors import FileError, PcmcError
 from pcmc.project import load, reference, sections
 
 
@@ -71,7 +71,48 @@ def test_kinds_of_curves_are_listed_where_they_can_be_keys(small, own, listed):
 def test_a_missing_key_is_named_with_the_line_of_its_table(small, old, new, line, key):
     with refused(FileError, what=key, where=line) as caught:
         load(changed(small, old, new))
-    assert f"needs the key {key.rpartition('.')[2]!r}" in str(caught.value)
+    name = key.rpartition(".")[2]
+    assert f"needs the key {name!r}, such as {name} = " in str(caught.value)
+
+
+PLAN = "[plan]\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "such as [plan] with outline = [[0, 0], [12, 0], [12, 8], [0, 8]] and tension = 4.0"),
+        ("outline = [[0, 0], [6, 0], [6, 4]]", "unknown key of the project 'outline'; it is a key of [plan]"),
+        (PLAN + "tension = 4.0\nfiles = ['a.obj']", "unknown key of [plan] 'files'; it is a key of [output]"),
+        (PLAN + "[plan.patches]\nwest = {tension = 3}\nrise = 2", "of [plan] it stands above [plan.patches]"),
+        (PLAN + "tension = 4,5", "numbers have a decimal point, no comma"),
+        (PLAN + "[plan.patches]\nroof = {tension = 4,5}", "numbers have a decimal point, no comma"),
+        (PLAN + "tension = 4 kN", "numbers have no unit behind them"),
+        (PLAN + "tension: 4", "type = between a key and its value"),
+        (PLAN + "edge = cable", "put a text in quotes"),
+        (PLAN + "[solve]\nmesh_check = True", "write true or false in small letters"),
+        (PLAN + "tension = 4\ntension = 5", "the key is there twice"),
+        ("force = 'kn'\n" + PLAN, "did you mean 'kN'?"),
+        (PLAN + "tension = 4.0\ncushion = true", "found True, such as cushion = 1.0"),
+        (PLAN + "tension = 4.0\ndividers = [[3, 0], [3, 4]]", "[3, 0] is a point; a curve has two or more"),
+        (PLAN, "a plan needs a tension, such as tension = 4.0"),
+        (
+            PLAN + "tension = 4.0\npatches = {roof = {tension = 3.0}}",
+            "the plan has tension = 4.0 and patches with their own; leave out one of them",
+        ),
+        (
+            PLAN + "tension = 4.0\npressure = 0.0\nedge = 'cable'",
+            'the outline: edge = "cable" needs the tension of the cable, such as cable = 10.0',
+        ),
+    ],
+)
+def test_a_first_project_is_told_what_to_type(tmp_path, text, says):
+    path = tmp_path / "roof.toml"
+    path.write_text(text + "\n")
+    with pytest.raises(PcmcError) as caught:
+        load(path)
+    assert "\n" not in str(caught.value)
+    assert says in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ import pcmc
 from pcmc import Patch, Surface, Verdict, cli
 from pcmc.base.errors import FileError, MissingExtra, OptionError, SurfaceError
 from pcmc.base.units import Units
+from pcmc.cloth.sheets import seam_sheet
 from pcmc.plan import Divider, Plan
 from pcmc.report import RoofReport, roof_report, tables, words
 from pcmc.report.plan import paper_plan
@@ -108,6 +109,43 @@ def test_the_plan_is_to_scale(caps):
     places = np.array([text.at for text in plan.texts if text.text in names])
     away = np.linalg.norm(places[:, None] - places[None], axis=2) + 100.0 * np.eye(len(places))
     assert away.min() > 2.0  # mm, also where a wall stands below its ridge
+
+
+@pytest.mark.parametrize(("unit", "factor", "text"), [("m", 1.0, "12.000"), ("mm", 1e3, "12000")])
+def test_dimensions_have_the_decimals_of_the_unit(unit, factor, text):
+    """A plan in mm with "12000.000" pretends to a thousandth of a millimetre."""
+    corners = factor * np.array([[0, 0], [12, 0], [12, 8], [0, 8]])
+    roof = pcmc.solve(Plan(corners, edge_length=2.0 * factor, tension=6.0, pressure=1.0 / factor).surface())
+    plan = paper_plan(roof.surface, roof.certificate, Units(unit, "kN"))
+    assert text in {text.text for text in plan.texts}
+    pattern = pcmc.cutting_pattern(roof.surface, strips=2, compensation=(0, 0))
+    assert text in {found.text for found in seam_sheet(pattern, "A4", unit).drawn()[1]}
+
+
+@pytest.fixture(scope="module")
+def court():
+    """A square roof around a square court, both around one centre."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    plan = Plan(4.0 * corners, holes=[1.5 * corners], edge_length=1.2, tension=4.0)
+    return pcmc.solve(plan.surface()).surface
+
+
+def test_the_plan_names_closed_curves_where_they_are(court):
+    """The middle of the rim is that of the court, too."""
+    plan = paper_plan(court, pcmc.certify(court), UNITS)
+    rims = np.concatenate([line.points for line in plan.lines if line.layer == "PCMC-RIM"])
+    middle, factor = 0.5 * (rims.min(axis=0) + rims.max(axis=0)), 1e3 / float(plan.scale.partition(":")[2])
+    away = {text.text: np.linalg.norm(text.at - middle) / factor for text in plan.texts}
+    assert 1.0 < away["B2"] < 2.6 < 3.4 < away["B1"]
+
+
+def test_held_curves_around_one_centre_have_names_of_their_own(court):
+    """Else a row of the mesh check has the value of one and the bar of both."""
+    check = pcmc.check_mesh(court)
+    names = check.table.loc[check.table["quantity"] == "reaction", "of"].tolist()
+    assert names == ["", "patch 1 near (0, 0), B1", "patch 1 near (0, 0), B2"]
+    held = pcmc.certify(court).supports["force_z"].tolist()
+    assert [check.row("reaction", name).value for name in names[1:]] == pytest.approx(held)
 
 
 def test_every_verdict_has_its_sentence():
@@ -302,5 +340,6 @@ def test_what_rounding_leaves_of_forces_and_of_a_flat_curvature_is_0():
         tables.key_figures(sail, pcmc.certificate.quantities.figures(sail, certificate), UNITS).rows
     )
     assert figures["all reactions, upwards"] == "0 kN"
+    assert certificate.patches["mean_H"].tolist() == [0.0]
     patches = tables.table_of_patches(sail, certificate, UNITS)
     assert patches.rows[0][patches.head.index("mean curvature, 1/m")] == "0"

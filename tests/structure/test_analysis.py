@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 from nightly import at_night
 from scipy.integrate import solve_bvp
+from scipy.optimize import brentq
 from starts import spherical_cap
 from structures import model_of, pyramid, square
 from under_load import ALPHA, THICK, cap, parts, stiffness, strip
 
 import pcmc
-from pcmc import Material, Plane, SelfWeight, Snow, Wind
+from generators.grid import grid_faces
+from pcmc import Material, Patch, Plane, SelfWeight, Snow, Surface, Wind
 from pcmc.plan import Plan
 from pcmc.structure import analyse, analysis, calculix
+from pcmc.surface.geometry import area_vectors
 from pcmc.surface.pieces import to_space
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
@@ -219,3 +222,42 @@ def test_materials_by_patch_have_their_own_weight_and_stiffness(tmp_path):
     assert "ELSET=PATCH_2, MATERIAL=PATCH_2" in text
     assert "PATCH_1,GRAV" in text
     assert "PATCH_2,GRAV" not in text
+
+
+@needs_ccx
+def test_the_tension_of_a_cable_is_along_it_as_it_hangs():
+    """Two edges with N = λ (τ + E a (λ² - 1)/2), and snow q at the vertex between them: 2 N sin θ = q."""
+    cable, stiff = Material(1e4, poisson=0.0), 1e4 * 1e-3
+    surface, loads = square(2, 1e-6, cable=1.0), [Snow(2.0)]
+    model = model_of(
+        surface, material=Material(1e-3), cable_area=1e-3, cable_material=cable, loads=loads, anyway=True
+    )
+    found = analyse(model, remedy=False)["snow"].results
+
+    def pull(w):
+        stretch = np.hypot(1.0, 2.0 * w)
+        return stretch * (1.0 + stiff * (stretch**2 - 1.0) / 2.0)
+
+    load = 2.0 * 6.0 / 8.0 / 3.0
+    sag = brentq(lambda w: 2.0 * pull(w) * w / np.hypot(0.5, w) - load, 0.0, 1.0)
+    assert -found.deflections[4] == pytest.approx(sag, rel=1e-4)
+    assert found.cable_tensions["tie"] == pytest.approx([pull(sag)] * 2, rel=1e-4)
+
+
+@needs_ccx
+def test_forces_of_a_sheet_are_in_it_as_it_hangs():
+    """A flat band between mirrors under snow: its force has the same part H along the plan everywhere, and
+    the band carries half of the snow at each end, H tan θ."""
+    x, y = (values.ravel() for values in np.meshgrid(np.linspace(0, 2, 33), [0, 0.1, 0.2], indexing="ij"))
+    sides = {Plane((0, at, 0), (0, at - 0.1, 0), mirror=True): y == at for at in (0.0, 0.2)}
+    faces, film = grid_faces(32, 2), [Patch("film", 2.0, 0.0)]
+    band = Surface(np.column_stack([x, y, 0.0 * x]), faces, [0] * 128, film, x % 2 == 0.0, on_planes=sides)
+    cloth = Material(5e4, poisson=0.0)
+    model = model_of(band, material=cloth, loads=[Snow(1.0, patches=["film"])], anyway=True)
+    found = analyse(model, remedy=False)["snow"].results
+    normal = area_vectors((band.vertices + found.displacements)[faces])
+    along = found.principal_forces[:, 1] * np.abs(normal[:, 2]) / np.linalg.norm(normal, axis=1)
+    (run, _, drop), _ = np.diff((band.vertices + found.displacements)[[0, 3, 6]], axis=0)
+    assert along == pytest.approx(np.full(128, along.mean()), rel=2e-3)
+    carried = 1.0 - 1.0 / 32  # half of the snow, less that on the vertices of the end
+    assert along.mean() * -drop / run == pytest.approx(carried, rel=5e-3)

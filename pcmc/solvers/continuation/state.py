@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import Bools, Floats
 from ...forces.motion_space import MotionSpace
-from ...forces.pinching import standing_part
+from ...forces.pinching import part_by_positions, standing_part
 from ...forces.rooms import with_room_pressures
 from ...forces.volume_below import volume_below_gradient, volumes_below
 from ...meshing.quality import worst_quality
@@ -28,12 +28,15 @@ QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a go
 class BranchMesh:
     """What the points of a branch share as long as neither the mesh nor what rests on Π changes.
 
-    ``surface`` is the standing part's; ``line`` has its values and boundary as functions of λ.
+    ``surface`` is the standing part's; ``line`` has its values and boundary as functions of λ. With ``held``,
+    walls with held bottoms can pinch.
     """
 
-    def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
+    def __init__(
+        self, surface: Surface, line: ParameterLine, backend: str | None = None, held: bool = False
+    ) -> None:
         self.line, self.size, self._backend = line, surface.size, backend
-        self.part = part = standing_part(surface)
+        self.part = part = part_by_positions(surface, held) if held else standing_part(surface)
         self.surface = part.surface
         self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())

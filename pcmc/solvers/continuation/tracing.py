@@ -70,12 +70,12 @@ class Tracer:
         self.rows: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
         self.surfaces: dict[int, Surface] = {}
-        self.arclength = 0.0
+        self.arclength, self.held = 0.0, False  # walls with held bottoms pinch once the branch is lost
         self.here = first or self.first_point(self.mesh(surface))
 
     def mesh(self, surface: Surface) -> BranchMesh:
         """A mesh of the branch."""
-        return BranchMesh(surface, self.line, self.options.backend)
+        return BranchMesh(surface, self.line, self.options.backend, self.held)
 
     def first_point(self, mesh: BranchMesh) -> BranchPoint:
         """The surface given, corrected to the tolerance."""
@@ -122,7 +122,9 @@ class Tracer:
                     step = self.step(length)
                 except NotOnBranch as reason:
                     length, difficulty = 0.5 * length, str(reason)
-                    if length < self.options.smallest:
+                    if length < self.options.smallest and self.let_held_walls_pinch():
+                        length = min(CONTACT_STEP, self.options.largest)
+                    elif length < self.options.smallest:
                         collapsed = isinstance(reason, MeshCollapsed)
                         return Ending.DEGENERATE if collapsed else Ending.LOST, difficulty
             self.events += step.events
@@ -230,6 +232,17 @@ class Tracer:
                 return
             start = BranchState(mesh, mesh.surface.vertices, here.parameter)
             self.continue_from(start, tangent.on(here, start))
+
+    def let_held_walls_pinch(self) -> bool:
+        """From here on let walls come down on held bottoms; False if none can, or they already do."""
+        if self.held or self.here.state.mesh.part.walls.held.any():
+            return False
+        self.held, here = True, self.here.state
+        mesh = self.mesh(here.whole)
+        if mesh.part.walls.held.any():
+            start = BranchState(mesh, mesh.surface.vertices, here.parameter)
+            self.continue_from(start, self.here.tangent.on(here, start))
+        return self.here.state.mesh is mesh
 
     def continue_from(self, start: BranchState, tangent: Tangent) -> None:
         """Go on from the point of the branch near a state, on the plane across a tangent.

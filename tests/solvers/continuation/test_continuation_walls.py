@@ -10,6 +10,7 @@ from pcmc import Direction, certify, follow, solve
 from pcmc.forces.pinching import pull_and_capacity, standing_part
 from pcmc.plan import Divider, Plan
 from pcmc.solvers.continuation import Ending
+from tests.forces.test_contact_upright import hall
 
 
 def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
@@ -163,3 +164,18 @@ def test_a_wall_that_follows_its_rooms_stays_a_wall():
     assert abs(changed.pressures[2]) == 0.25
     assert changed.walls.tolist() == start.walls.tolist() == [False, False, True]
     assert not changed.uncancelled.any()
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_branch_goes_on_where_a_junction_comes_down_on_a_held_bottom(upright):
+    """First contact is near 1.216 times the tension of an upright wall, near 1.411 times that of another."""
+    start = solve(hall(4.0, 3.0, upright)).surface
+    end = 3.9 if upright else 4.5
+    branch = follow(start, "wall 1", end)
+    assert branch.ending is Ending.REACHED
+    assert branch.events.kind.tolist() == ["contact"]
+    resting = [int(standing_part(surface).resting.sum()) for surface in branch.surfaces.values()]
+    assert resting[0] == 0 < resting[-1] == 2
+    direct = solve(start.retensioned({"wall 1": end}))
+    assert standing_part(direct.surface).resting.sum() == 2
+    assert branch.points.energy.iloc[-1] == pytest.approx(direct.energy, rel=2e-4)  # triangles lie otherwise
