@@ -135,7 +135,7 @@ def shape_operators(X: Floats, F: Ints) -> Floats:
 
 
 def _fitted(d: Floats, N: Floats) -> Floats:
-    """(k,3,3) shape operators of vertices with normals N (k,3), from the ways d (k,c,3) to their neighbours."""
+    """(k,3,3) shape operators at vertices with normals N (k,3), from the ways d (k,c,3) to neighbours."""
     k = np.abs(N).argmin(axis=1)
     e = unit_vectors(np.eye(3)[k] - np.take_along_axis(N, k[:, None], axis=1) * N)
     frame = np.stack([e, np.cross(N, e), N], axis=1)
