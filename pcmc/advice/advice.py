@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..design import Design, Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
+NO_LOADS = ("distance", "tensions")  # a fold on these ways says nothing of the loads
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
@@ -269,7 +270,7 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
 
     pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
-    tried = [a for a in result.certificate.tried if a.folds and a.way != "distance"]  # of a tension's loads
+    tried = [a for a in result.certificate.tried if a.folds and a.way not in NO_LOADS]
     folds = [1.0 / attempt.value for attempt in tried if attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 

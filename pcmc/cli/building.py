@@ -329,7 +329,7 @@ def structure(
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        jobs = [model_job(output, model)]
+        jobs = [model_job(roof, output, model)]
         analysis = analyse(model, progress=progress) if run else None
         jobs += analysis_jobs(output, analysis) if analysis is not None else []
         written = write_all(jobs, progress)
