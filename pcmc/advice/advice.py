@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..design import Design, Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
+NO_LOADS = ("distance", "tensions")  # a fold on these ways says nothing of the loads
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
@@ -250,8 +251,7 @@ def _step(plan: Plan, result: Result) -> Plan:
     plan = with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
         balanced = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
-        own = straight_walls(plan)
-        plan = balanced if changes(plan, balanced) else with_dividers(plan, own, upright=True)
+        plan = balanced if changes(plan, balanced) else with_upright(plan) or plan
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
         surface = plan.surface()
         strained = strained_junction(surface)
@@ -270,7 +270,7 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
 
     pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
-    tried = [a for a in result.certificate.tried if a.folds and a.way != "distance"]  # of a tension's loads
+    tried = [a for a in result.certificate.tried if a.folds and a.way not in NO_LOADS]
     folds = [1.0 / attempt.value for attempt in tried if attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
@@ -283,12 +283,13 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
     return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
 
 
-def straight_walls(plan: Plan) -> set[str]:
-    """The names of the dividers whose walls could be upright."""
+def with_upright(plan: Plan) -> Plan | None:
+    """The plan with all walls upright that can be, those under straight lines; None if they are already."""
     from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
 
-    near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None]
-    return {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
+    near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None and not d.upright]
+    leaning = {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
+    return with_dividers(plan, leaning, upright=True) if leaning else None
 
 
 def with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:

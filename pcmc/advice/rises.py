@@ -103,7 +103,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)
     heights = outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
-    level, loads = float(heights.mean()), net_pressures(plan)
+    level, lowest, loads = float(heights.mean()), float(heights.min()), net_pressures(plan)
     targets, vary = [], []
     for rise in rises:
         if rise.kind != "apex" and np.ptp(heights) > ON * plan.outline.length:
@@ -112,6 +112,12 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             raise OptionError(text, what=rise.kind, where=rise.patch)
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
+        if height - lowest <= LEVEL * plan.outline.length:
+            where = f"of {rise.patch!r} " if rise.patch else ""
+            text = (
+                f"{rise.kind} {where}is {height:g} over the plane, and the outline is at {lowest:g} and more;"
+            )
+            raise OptionError(f"{text} give a greater one", what=rise.kind, where=rise.patch, found=height)
         names: str | list[str] = rise.patch or [
             name for name in patch_names(plan) if loads.get(name, plan.pressure - plan.snow)
         ]
@@ -119,7 +125,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
             text += f" pressure = ..., or tension = ... instead of {rise.kind}"
             raise OptionError(text, what=rise.kind)
-        plan = _retensioned(plan, rise.patch, least, height - level)
+        plan = _retensioned(plan, rise.patch, least, height - lowest)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
     return plan, targets, vary

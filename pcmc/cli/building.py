@@ -25,7 +25,7 @@ from ..project.writing import analysis_jobs, check_outputs, cost_jobs, model_job
 from ..structure import analyse
 from ..structure.calculix import expect_program
 from ..structure.columns import column_text, columns_at_rest
-from ..structure.member_forces import cable_offers, sentences
+from ..structure.member_forces import cable_notes, cable_offers, sentences
 from . import arguments, reports
 from .arguments import (
     MANY_FILES,
@@ -329,7 +329,7 @@ def structure(
         roof = build.roof(project, progress)
         progress("certifying")
         model = roof.model(wanted, build.allow_uncertified)
-        jobs = [model_job(output, model)]
+        jobs = [model_job(roof, output, model)]
         analysis = analyse(model, progress=progress) if run else None
         jobs += analysis_jobs(output, analysis) if analysis is not None else []
         written = write_all(jobs, progress)
@@ -338,7 +338,8 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
-        print(*sentences(model, model.units), *cable_offers(model), sep="\n", end="\n" * bool(model.beams))
+        lines = [*cable_notes(model), *sentences(model, model.units), *cable_offers(model)]
+        print(*lines, sep="\n", end="\n" * bool(lines))
         if model.bars:
             print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")

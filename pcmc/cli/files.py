@@ -21,7 +21,7 @@ from ..io.repairing import HOLES, repair
 from ..project import Outcome, cache
 from ..project.planning import drawing_reference
 from ..project.settings import check_names
-from ..project.writing import check_outputs, draw_picture, surface_files, write_all
+from ..project.writing import check_outputs, picture_job, surface_files, write_all
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import (
@@ -111,8 +111,7 @@ def plot(
     roof = _good(file, what, whole)
     if roof is None:
         return NOT_CERTIFIED
-    painting = partial(draw_picture, roof.shown.surface, views=[seen], colour=colour, units=roof.units)
-    return reports.ended(True, write_all([(picture, painting)]))
+    return reports.ended(True, write_all([picture_job(roof, picture, [seen], colour)]))
 
 
 def explore(

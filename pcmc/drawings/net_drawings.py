@@ -80,4 +80,4 @@ def net_files(
     """Each file of a net with the function that writes it; FileError for an unknown suffix."""
     tables = dict(zip(TABLES, (net.panels, net.nodes, net.beams), strict=True))
     draw = partial(net_drawings, net, units, sheet=sheet, name=name, mark=mark)
-    return document_files(paths, draw, tables, {OBJ: net.write_obj}, "a net of panels")
+    return document_files(paths, draw, tables, {OBJ: partial(net.write_obj, mark=mark)}, "a net of panels")

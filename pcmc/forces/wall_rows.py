@@ -19,6 +19,7 @@ from ..surface.images import expect_no_images
 from ..surface.supports import Admissible, members
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
+SAMPLES = 65  # points of each line from a foot to its top, the nearest of which says which line is nearest
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
 
 
@@ -81,7 +82,8 @@ def wall_rows(
 ) -> WallRows:
     """The rows of one wall: its vertices below the nearest of its ``top_edges`` (k,2), seen along n.
 
-    ``foot`` (n,) gives the held bottom vertex below each top vertex, if the bottom is held.
+    ``foot`` (n,) gives the held bottom vertex below each top vertex, if the bottom is held. Then a vertex is
+    below the top vertex whose line from its foot is nearest, also where the junction leans along the wall.
 
     Where the top edge lies on the bottom its height shows nothing. There ρ is that of the vertex's row: steps
     along ``wall_edges`` from the foot, over those from foot to top.
@@ -89,21 +91,19 @@ def wall_rows(
     vertices = distinct(wall_edges, surface.n)
     vertices = vertices[~roof_vertex[vertices]]
     X, height = surface.vertices, surface.plane.height(surface.vertices)
-    flat = X - height[:, None] * np.array(surface.plane.normal)
-    ends, fraction = _nearest(flat, vertices, top_edges)
     zero, none = np.zeros(len(vertices)), np.zeros((len(vertices), 3))
     if foot is None:
+        flat = X - height[:, None] * np.array(surface.plane.normal)
+        ends, fraction = _nearest(flat, vertices, top_edges)
         feet, bottom = np.full_like(ends, -1), surface.on_ground
         top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
         share, whole = height[vertices], top
     else:
-        fraction = np.round(fraction)  # below one top vertex, so that it pinches with this one
-        # a junction may lean along its wall, so the top edge nearest to a foot may be another one's
-        tops, edge = np.flatnonzero(foot >= 0), np.empty(surface.n, dtype=np.int64)
+        edge, tops = np.empty(surface.n, dtype=np.int64), np.flatnonzero(foot >= 0)
         edge[top_edges.ravel()] = np.repeat(np.arange(len(top_edges)), 2)
-        _, known, at = np.intersect1d(vertices, foot[tops], return_indices=True)
-        ends[known] = top_edges[edge[tops[at]]]
-        fraction[known] = ends[known, 1] == tops[at]
+        above = tops[_nearest_line(X, vertices, foot[tops], tops)]
+        ends = top_edges[edge[above]]
+        fraction = (ends[:, 1] == above).astype(float)
         feet, bottom = foot[ends], surface.pinned
         rows = WallRows(vertices, ends, fraction, zero, none, feet)
         drop = rows.drops(X)
@@ -146,6 +146,13 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     fraction = fraction[row, best]
     fraction = np.where(fraction < SNAP, 0.0, np.where(fraction > 1.0 - SNAP, 1.0, fraction))
     return top_edges[near[row, best]], fraction
+
+
+def _nearest_line(X: Floats, vertices: Ints, start: Ints, end: Ints) -> Ints:
+    """(w,) which of the lines from ``start`` to ``end`` (k,) is nearest to each wall vertex."""
+    at = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]
+    near = cKDTree(((1.0 - at) * X[start] + at * X[end]).reshape(-1, 3)).query(X[vertices])[1]
+    return np.asarray(near) % len(start)
 
 
 def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom: Bools) -> Floats:

@@ -35,7 +35,7 @@ __all__ = ["read", "write"]
 SPECIAL = "\\*"  # in names: the program joins lines at a backslash, and "/*" begins a comment
 
 HEADER = """\
-// Piecewise constant-mean-curvature surface, written by pcmc.
+// Piecewise constant-mean-curvature surface, written by pcmc.{mark}
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
 // Pressures are net: those of the air less the snow, an attribute of faces.
 // origin {origin}
@@ -62,6 +62,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     named += [("room", k, room.name) for k, room in enumerate(surface.rooms, 1)]
     named += [("cable", k, cable.name) for k, cable in enumerate(surface.cables, 1)]
     header = HEADER.format(
+        mark=content.mark and f"\n// {content.mark}",
         origin=" ".join(map(repr, origin.tolist())),
         names="\n".join(f"// {kind} {k} {escaped(name, SPECIAL)}".rstrip() for kind, k, name in named),
     )

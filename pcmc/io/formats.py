@@ -61,6 +61,7 @@ class Content:
     bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
     members: Sequence[Any]  # as ``structure.drawn_members`` has them
     cable_areas: Mapping[str, float]  # of the cables' sections, by name
+    mark: str  # of a roof that is not in order, such as "NOT CERTIFIED: …", or ""
 
 
 PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"

@@ -58,6 +58,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
             mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
     scene.metadata["pcmc"] = content.metadata
+    if content.mark:
+        scene.metadata["pcmc mark"] = content.mark
     if content.walls is not None:
         scene.metadata[WALLS] = content.walls
     library = trimesh.exchange.gltf

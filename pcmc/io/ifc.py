@@ -81,7 +81,7 @@ class _Model:
 
         self.surface, self.units = surface, units
         self.square_metres = length_factor(units.length, "m") ** 2  # in the roof's unit of area
-        self.name = ", ".join(filter(None, ("Roof", content.certificate.get("mark"))))
+        self.name = ", ".join(filter(None, ("Roof", content.mark)))
         self.replaced = {member.wall for member in content.members}
         self.cable_areas = content.cable_areas
         self.file: Any = ifcopenshell.file(schema="IFC4")

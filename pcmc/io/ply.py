@@ -44,8 +44,9 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         "".join(f"property {NAMES[column.dtype.str[1:]]} {key}\n" for key, column in columns.items())
         for columns in (vertex, face)
     ]
+    comment = f"comment {content.mark}\n" if content.mark else ""
     header = (
-        f"ply\nformat binary_little_endian 1.0\n{MARK}{content.metadata}\n"
+        f"ply\nformat binary_little_endian 1.0\n{MARK}{content.metadata}\n{comment}"
         f"element vertex {surface.n}\n{announced[0]}element face {surface.m}\n"
         f"property list uchar int vertex_indices\n{announced[1]}end_header\n"
     )

@@ -35,8 +35,10 @@ from .polygons import cut_polygons
 KEY, CABLE, NAME, MEMBER = "pcmc", "pcmc cable", "pcmc name", "pcmc member"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
+MARK = "PCMC-MARK"  # the layer of the text that marks a roof which is not in order
 PRECISION = 1e-6  # of the size of the surface: the tolerance that Rhino works with, a power of ten
 CURVES = {
+    MARK: (200, 0, 0, 255),
     "PCMC-RIDGE": (200, 0, 0, 255),
     "PCMC-RIM": (0, 0, 0, 255),
     "PCMC-WALL": (0, 128, 0, 255),
@@ -83,6 +85,9 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         for key, text in member.texts(content.units).items():
             attributes.SetUserString(key, text)
         _add_line(rhino, model, member.points, member.closed, attributes)
+    if content.mark:
+        low = rhino.Point3d(*surface.vertices.min(axis=0).tolist())
+        model.Objects.AddTextDot(content.mark, low, _layer(rhino, model, MARK, CURVES[MARK]))
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
 

@@ -38,6 +38,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     roof: Any = UsdGeom.Xform.Define(stage, ROOF)
     stage.SetDefaultPrim(roof.GetPrim())
     roof.GetPrim().SetCustomDataByKey("pcmc", content.metadata)
+    if content.mark:
+        roof.GetPrim().SetCustomDataByKey("mark", content.mark)
     if content.walls is not None:
         roof.GetPrim().SetCustomDataByKey("walls", content.walls)
     middle = file_origin(surface.vertices, surface.size)

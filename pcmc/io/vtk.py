@@ -31,6 +31,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     for name, values in content.scalars.items():
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
     mesh.field_data["pcmc"] = [content.metadata]
+    if content.mark:
+        mesh.field_data["mark"] = [content.mark]
     library, flat = load_library("vtkmodules.vtkIOXML"), path.suffix.lower() == ".vtp"
     writer = library.vtkXMLPolyDataWriter() if flat else library.vtkXMLUnstructuredGridWriter()
     writer.SetInputData(mesh if flat else mesh.cast_to_unstructured_grid())

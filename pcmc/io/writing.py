@@ -33,6 +33,7 @@ def write(
     units: Units | str | None = None,
     members: Sequence[Any] = (),
     cable_areas: Mapping[str, float] | None = None,
+    mark: str = "",
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -52,6 +53,7 @@ def write(
         numbers stay, and .3dm, .ifc and .usda files are in metres.
     members : of its structural model, ``structure.drawn_members(model)``, for .ifc and .3dm.
     cable_areas : of the sections of its cables there, length², by name.
+    mark : in the file where the certificate has none, such as "TARGETS NOT MET"; .stl has no place for one.
 
     Warns
     -----
@@ -74,8 +76,10 @@ def write(
     form, solved = format_of(path, FORMATS), surface
     surface = getattr(solved, "surface", solved)
     expect_surface(surface)
-    if form.certificate and certificate is None:
-        certificate = getattr(solved, "certificate", None)
+    known: Any = getattr(solved, "certificate", None) if certificate is None else certificate
+    mark = (known.get("mark") if isinstance(known, Mapping) else getattr(known, "mark", "")) or mark
+    if form.certificate:
+        certificate = known
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
@@ -114,7 +118,11 @@ def write(
             text = f"certificate: expected a Certificate, found {found}"
             raise FileError(text, what="certificate", found=found)
         findings = {name: getattr(certificate, name) for name in findings.FILED}
-    content = Content(metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {})
+    if findings:
+        findings = {**findings, "mark": mark}
+    content = Content(
+        metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {}, mark
+    )
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
             text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"

@@ -113,9 +113,12 @@ class PanelNet:
         X = np.concatenate([self.points, middle])
         return Surface(X, faces, owner, patches, fixed=np.ones(len(X), dtype=bool), plane=self.surface.plane)
 
-    def write_obj(self, path: str | PathLike[str]) -> None:
-        """Write the panels as polygons of a Wavefront .obj, a group per patch."""
-        lines = ["# panels of pcmc", *("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())]
+    def write_obj(self, path: str | PathLike[str], mark: str = "") -> None:
+        """Write the panels as polygons of a Wavefront .obj, a group per patch; with the mark of the
+        certificate, or else ``mark``, as a comment."""
+        mark = self.certificate.mark or mark
+        lines = ["# panels of pcmc", *[f"# {mark}"] * bool(mark)]
+        lines += ("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())
         patch = self.panels["patch"].tolist()
         for k, loop in enumerate(self.polygons):
             lines += [f"g {escaped(patch[k], SPECIAL)}"] if k == 0 or patch[k] != patch[k - 1] else []

@@ -46,7 +46,8 @@ class Plan:
         on the outline or a hole fixes that part of it, which carries no cable; one inside a patch is fixed
         where it is drawn. On a free edge or a cable the height z of a support is that of the edge there;
         between supports the edge starts straight.
-    plane : Π.
+    plane : Π. Points [x, y] are on it, from its point, along the x axis laid on it and across; points
+        [x, y, z] are in space.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports. In a project without tensions it is the
         height wanted over the outline, for which the tension is found.
@@ -149,6 +150,11 @@ class Plan:
             if getattr(self, key) != usual:
                 problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"
                 raise OptionError(f"{problem} give it to each of the patches", what=key)
+        if self.snow and self.patches and all(patch.snow is not None for patch in self.patches):
+            problem = f"snow = {self.snow:g} of the plan counts for nothing, as each patch has its own;"
+            raise OptionError(
+                f"{problem} leave it out, or leave it out of a patch", what="snow", found=self.snow
+            )
         names = [d.name for d in self.dividers if d.wall is not None] + [p.name for p in self.patches]
         names += [d.name for d in self.dividers if d.wall is None and d.cable is not None]
         names += dict.fromkeys(c.name for c in self.cables if c.name)

@@ -45,7 +45,8 @@ DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
 CELL_WIDTH = 700  # pixels of a picture in a notebook
 ABOVE = 7.0  # pixels above a title and below a picture
 FLAT_PERCENT = 1.0  # the least end of the scale of planarity: a glass pane bears a few tenths
-ARROW, AT_POINTS = "#B2182B", "#2166AC"
+RED = ARROW = "#B2182B"
+AT_POINTS = "#2166AC"
 
 
 def draw(
@@ -75,6 +76,7 @@ def draw(
     form : the format of the numbers.
     legend : explain the colours of patches, supports, and places without a value.
     patches : names of those to draw, such as the walls; by default all.
+    mark : a text in the corner, of a roof that is not in order.
     width : of the picture in pixels.
     renderer : "pyvista", "matplotlib", or "auto": pyvista for many triangles where the system has OpenGL.
 
@@ -160,6 +162,7 @@ def compose(
     renderer: str = "auto",
     around: Sequence[Floats] = (),
     foot: str = "",
+    mark: str = "",
     overlay: Callable[[Any], None] | None = None,
 ) -> Image:
     """The picture of all drawings; the options are those of ``draw`` and ``panel``.
@@ -190,6 +193,9 @@ def compose(
         images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
     if legend:
         add_picture_legend(figure, list(zip(drawings, dotted, images, strict=True)))
+    if mark:
+        look = {"va": "top", "color": RED, "weight": "bold", "fontsize": TEXT}
+        figure.text(0.01, 1.0 - 4.0 / figure.bbox.height, mark, **look)
     if foot:
         figure.supxlabel(foot, fontsize=2.0 * SMALL)
     first = zip(axes[::columns], frames[::columns], strict=True)

@@ -171,10 +171,13 @@ class Outcome:
 
     @property
     def mark(self) -> str:
-        """What drawings are marked with where the certificate has no mark."""
+        """What files, pictures and documents are marked with; empty where all is in order, and where
+        nothing is known, as of a surface that another program wrote."""
         from ..drawings.sheet import MISSED
 
-        return "" if self.design is None or self.design.met else MISSED
+        if self.result is None:
+            return str(self.data.certificate.get("mark", "")) if self.data else ""
+        return self.shown.certificate.mark or ("" if self.design is None or self.design.met else MISSED)
 
     @property
     def certified(self) -> bool:

@@ -235,6 +235,8 @@ class _Writer(NamedTuple):
             table = tables.setdefault(name, {})
             _drop(table, RISES if key == "tension" else ())
             table[key] = _number(value)
+        if all("snow" in tables.get(patch.name, ()) for patch in patches):  # the plan's counts for nothing
+            _drop(plan, ["snow"])
 
     def write_lines(self, wanted: Mapping[Name, float]) -> None:
         """Tensions of walls and cables, and weights of cables, in the lines of the plan that carry them."""

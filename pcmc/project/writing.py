@@ -44,8 +44,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
 
     add("surface", surface_files(outcome, output.files))
     if output.picture is not None:
-        painting = partial(draw_picture, views=output.all_views, colour=output.colour, units=outcome.units)
-        add("picture", [(Path(output.picture), partial(painting, outcome.shown.surface))])
+        add("picture", [picture_job(outcome, Path(output.picture), output.all_views, output.colour)])
     if not output.documents:
         return [job for _, job in made]
     about = outcome.units, output.sheet, outcome.name, outcome.mark
@@ -64,7 +63,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
             add("net of panels", net_files(net, output.net, *about))
         if output.structure is not None and project.structure is not None:
             model = outcome.model(project.structure, anyway)
-            add("structural model", [model_job(Path(output.structure), model)])
+            add("structural model", [model_job(outcome, Path(output.structure), model)])
         analysis = outcome.analysis(anyway, progress)
         if output.structure is not None and analysis is not None:
             add("under load", analysis_jobs(Path(output.structure), analysis))
@@ -93,8 +92,8 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         if some := [path.name for path in paths if _holds_members(path) == held]:
             warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
-        return certified_files(*outcome.shown, paths, outcome.units, colour, members)
-    data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour)
+        return certified_files(*outcome.shown, paths, outcome.units, colour, members, outcome.mark)
+    data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour, mark=outcome.mark)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
         unfold, half = unfolded(outcome.surface), outcome.surface
@@ -118,9 +117,11 @@ def certified_files(
     units: Units,
     colour: str = "",
     members: Mapping[str, Any] | None = None,
+    mark: str = "",
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, size of the reactions at supports (force), and ``members_filed``."""
+    relative curvature error, size of the reactions at supports (force), and ``members_filed``; with the
+    ``mark`` where the certificate has none."""
     scalars: dict[str, Floats] = {
         "mean curvature": mean_curvature(surface),
         "error": curvature_error(surface),
@@ -130,7 +131,7 @@ def certified_files(
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]
         coloured = {name: values for name, values in scalars.items() if name == colour}
-        about: dict[str, Any] = {"units": units, "colour": colour}
+        about: dict[str, Any] = {"units": units, "colour": colour, "mark": certificate.mark or mark}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
         about |= (members or {}) if form.members else {}
@@ -178,9 +179,9 @@ def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
     return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), draw), strict=True))
 
 
-def model_job(path: Path, model: StructuralModel) -> tuple[Path, Callable[[Path], Any]]:
+def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
     """The file of a structural model, with the function that writes it."""
-    return path, partial(write_structure, model=model)
+    return path, partial(write_structure, model=model, mark=outcome.mark)
 
 
 def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
@@ -194,8 +195,19 @@ def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
     return [(path.with_name(f"{path.stem}-{name}"), write) for name, write in jobs.items()]
 
 
+def picture_job(outcome: Outcome, path: Path, views: Sequence[Any], colour: str) -> FileJob:
+    """The picture of what is shown, with the function that draws it."""
+    look: dict[str, Any] = {"views": views, "colour": colour, "units": outcome.units, "mark": outcome.mark}
+    return path, partial(draw_picture, outcome.shown.surface, **look)
+
+
 def draw_picture(
-    surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
+    surface: Surface,
+    path: PathLike,
+    views: Sequence[Any],
+    colour: str,
+    units: Units = NO_UNITS,
+    mark: str = "",
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
     # needs the extra plot, which a project without a picture does not
@@ -203,9 +215,9 @@ def draw_picture(
 
     check_picture(views, colour)
     if colour == "reactions":
-        reactions(surface, path, view=views[0], units=units)
+        reactions(surface, path, view=views[0], units=units, mark=mark)
         return
-    look: dict[str, Any] = {"legend": True}
+    look: dict[str, Any] = {"legend": True, "mark": mark}
     if colour == "curvature":
         look = {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
     elif colour == "error":

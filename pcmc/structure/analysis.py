@@ -24,6 +24,7 @@ from .gas import balanced_pressure
 from .loads import FORM, Step
 from .member_forces import (
     MemberForces,
+    cable_notes,
     cable_offers,
     member_tables,
     members_in,
@@ -203,7 +204,8 @@ class Analysis:
         return depth if depth > THROUGH * surface.size else 0.0
 
     def answers(self, units: Units | None = None) -> list[str]:
-        """A sentence for each case that is not carried, or has slack parts, and what helps."""
+        """A sentence for each case that is not carried, or has slack parts, and what helps; what cables are
+        made of, where they have no material of their own."""
         units, lines, surface = units or self.model.units, [], self.model.surface
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
             at = np.array([row[f"least_{c}"] for c in "xyz"])
@@ -220,6 +222,7 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
+        lines += cable_notes(self.model)
         lines += weak_members(self.model, ((case.name, case.members) for case in self.cases), units)
         if any(case.taut < case.share < 1.0 for case in self.cases):
             lines.append(MESH)

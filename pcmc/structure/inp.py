@@ -33,13 +33,13 @@ KINDS = {"membrane": ("M3D3", "MEMBRANE", "P1"), "shell": ("S3", "SHELL", "P")}
 """Elements by the words of the file: their type, their section, a pressure along their normal."""
 
 
-def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> None:
+def write_structure(path: str | os.PathLike[str], model: StructuralModel, mark: str = "") -> None:
     """Write a structural model as an input file of CalculiX; run it with ``ccx roof`` for ``roof.inp``.
 
     Vertex i is node i + 1, face f element f + 1: membranes of three nodes (``M3D3``) or shells (``S3``). Each
     starts with the stress α/t in its plane (``*INITIAL CONDITIONS, TYPE=STRESS``). Sets: ``PATCH_k``
     (elements), ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_B1``, ``SUPPORT_S1`` and so on,
-    by the numbers in ``Certificate.supports``.
+    by the numbers in ``Certificate.supports``. ``mark`` is in the heading where the certificate has none.
 
     ``path`` has the suffix .inp; the file appears whole or not at all. FileError for another suffix, and
     where it cannot be written.
@@ -48,19 +48,21 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     check_name(path)
     suffix_of(path, (".inp",), "a structural model")
     expect_model(model)
-    text = text_of(model, model.steps)
+    text = text_of(model, model.steps, mark=mark)
     with writing(path), atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def text_of(model: StructuralModel, steps: Sequence[Step], every: bool = False, unit: float = 1.0) -> str:
+def text_of(
+    model: StructuralModel, steps: Sequence[Step], every: bool = False, unit: float = 1.0, mark: str = ""
+) -> str:
     """The input file of a model under these steps, the form-finding load first; with ``every`` it prints the
     results of each increment, and writes none for viewers. A length of 1 in the file is ``unit`` in the
     model.
     """
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
-    text = [f"*HEADING\npcmc structural model, {'' if model.certificate.certified else 'NOT CERTIFIED: '}"]
-    text += [f"{model.certificate.verdict.value}\n" + (f"** {model.note}\n" if model.note else "")]
+    heading = "pcmc structural model", certificate.mark or mark, certificate.verdict.value
+    text = [f"*HEADING\n{'; '.join(filter(None, heading))}\n" + (f"** {model.note}\n" if model.note else "")]
     text += [f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1)]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
     text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]

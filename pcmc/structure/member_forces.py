@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -269,6 +269,19 @@ def floating(model: StructuralModel, beam: MemberForces, units: Units) -> str:
         return ""
     text = f"nothing but the sheets holds {line.name} upright, and at rest they pull it up or down with"
     return f"{text} {pull:.3g}{units.behind('force')}: add propped = true to it, for columns or a wall below"
+
+
+def cable_notes(model: StructuralModel) -> list[str]:
+    """That cables are as soft as the cloth, where they have the material of a patch."""
+    patches = [replace(material, weft=None, shear=None) for material in model.materials]
+    sections = zip(model.standing.cables, model.cable_sections, strict=True)
+    soft = {cable.name: of.young for cable, (_, of) in sections if of in patches}
+    if not soft:
+        return []
+    names = ", ".join(f'"{name}"' for name in soft)
+    text = f"cables have the material of the patches, E = {next(iter(soft.values())):.4g}"
+    text += f'{model.units.behind("pressure")}; in a project a member of kind = "cable" with on = [{names}]'
+    return [f"{text} gives them their own"]
 
 
 def cable_offers(model: StructuralModel) -> list[str]:

@@ -169,7 +169,8 @@ class Structure:
     zones : snow and wind on parts of the roof, as more cases.
     combinations : factors by case, by the name of each combination: {uls = {form = 1.0, snow = 1.5}}.
     gas : true for air that is shut in, whose pressure follows its volume; or a table as of ``Gas``.
-    cable_area : of the cables' sections, length², or a table with one for each cable.
+    cable_area : of the cables' sections, length², or a table with one for each cable; their material is that
+        of [structure]. A member of kind = "cable" that is on them has its own.
     members : arches, beams and cables by name; dividers and holes of the plan name them.
     run : whether to run CalculiX: tables and a picture beside the model, and a chapter of the report.
     """

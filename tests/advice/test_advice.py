@@ -11,10 +11,10 @@ from nightly import at_night, night_but
 
 from pcmc import cli
 from pcmc.advice.advice import changes
-from pcmc.advice.walls import firmer_walls
+from pcmc.advice.persisting import firmer_walls, flatter
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.plan import Divider, PatchSpec, Plan
-from pcmc.project import load, run_project
+from pcmc.project import firmer, load, run_project
 from pcmc.project.drawn import Chosen
 
 HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
@@ -100,10 +100,35 @@ def test_a_line_for_a_divider_that_may_be_a_curve_alone_says_what_that_becomes()
     assert table.endswith("upright = true  (now false)")
 
 
-def test_a_sail_has_no_walls_to_make_firmer():
+def test_a_sail_is_neither_made_firmer_nor_flatter():
     """No patch of it has a pressure: it was the greatest tension of none."""
     sail = Plan([[0, 0], [4, 0], [4, 4], [0, 4]], tension=1.0, pressure=0.0, edge_length=1.0)
-    assert firmer_walls(sail, sail.surface(), "type in sail.toml", lambda plan: True) == []
+    assert [*firmer_walls(sail, sail.surface(), []), *flatter(sail, [])] == []
+
+
+STEEP = """[plan]
+outline = [[0, 0], [18, 0], [18, 12], [0, 12]]
+holes = [{circle = {centre = [9, 6], radius = 1.5}}]
+edge_length = 0.57
+"""
+
+
+WISHES = {"rise = 2.5": "12", "span_ratio = 3": "345", "tension = 3.91": "4567"}  # first digits advised
+
+
+@pytest.mark.parametrize("wish", night_but(WISHES, "rise = 2.5"))
+def test_a_roof_too_steep_at_a_hole_is_advised_to_be_flatter(tmp_path, wish):
+    """It was "held by the mesh" without a word on what to type."""
+    first = outcome_of(tmp_path, STEEP + wish)
+    assert first.good
+    assert first.check_mesh().verdict.name == "HELD_BY_MESH"
+    heading, line = firmer(first)
+    assert heading == "type in roof.toml, which was tried and persists:"
+    key, value = wish.split(" = ")
+    assert re.fullmatch(rf"\[plan\] {key} = [{WISHES[wish]}](\.\d)?  \(now {value}\)", line)
+    flatter = outcome_of(tmp_path, STEEP + line.removeprefix("[plan] ").split("  (")[0])
+    assert flatter.good
+    assert flatter.check_mesh().persists
 
 
 CORNERED = """[plan]
@@ -115,6 +140,29 @@ south = {apex = 3, at = [10, 1]}
 west = {apex = 3, at = [5, 7]}
 east = {apex = 2.5, at = [15, 7]}
 """
+
+
+HALF = """[plan]
+edge_length = 0.8
+outline = [[0, 0], [9, 0], [9, 10], [0, 10]]
+mirrors = [[[9, 0], [9, 10]]]
+dividers = [{curve = [[4, 0], [4, 10]]}]
+[plan.patches]
+a = {rise = 1.6}
+b = {rise = 2.2}
+"""
+
+
+def test_walls_are_advised_to_stay_upright_where_heights_are_missed(tmp_path):
+    """The wall leans by 56 degrees, and the roof was "not met" without advice."""
+    first = outcome_of(tmp_path, HALF)
+    assert first.certified
+    assert first.check_mesh().persists
+    assert not first.good
+    heading, line = firmer(first)
+    assert heading == "type in roof.toml, which was tried and persists:"
+    assert ": upright = true  (now false" in line
+    assert outcome_of(tmp_path, typed(HALF, [line])).good
 
 
 @pytest.mark.nightly

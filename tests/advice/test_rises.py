@@ -48,6 +48,14 @@ def test_an_apex_above_held_gables_is_met(given):
     assert 4.0 < outcome.surface.patches[0].tension < 5.0
 
 
+@pytest.mark.parametrize("apex", [3, 2])
+def test_an_apex_that_is_not_above_the_outline_is_refused(given, apex):
+    """One at the outline's height ended in a division by zero, one below it was solved for in vain."""
+    raised = "[plan]\noutline = [[0, 0, 3], [12, 0, 3], [12, 8, 3], [0, 8, 3]]\n"
+    with pytest.raises(FileError, match=f"apex is {apex} over the plane, and the outline is at 3 and more"):
+        given(f"{raised}apex = {apex}\n")
+
+
 def test_each_patch_may_have_its_own_rise(given):
     patches = "[plan.patches]\nwest = {rise = 1.5}\neast = {apex = 1.0}\n"
     outcome = run_project(given(HALL + SEAM + patches), use_cache=False)

@@ -25,7 +25,7 @@ from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
-from pcmc.solvers.newton import newton
+from pcmc.solvers.newton import NewtonOptions, newton
 
 
 def held(surface):
@@ -91,9 +91,9 @@ def test_the_first_vertex_may_be_a_foot():
         np.testing.assert_allclose(there, here[order], rtol=1e-12, atol=1e-14)
 
 
-def test_a_foot_is_in_the_row_of_its_own_top_where_the_junction_leans_along_its_wall():
+def test_a_vertex_is_in_the_row_of_its_own_top_where_the_junction_leans_along_its_wall():
     """It was in that of the top nearest in plan, such as the corner, and a refined wall had no area there."""
-    full, _, resting, _ = pressed()
+    full, full_walls, resting, _ = pressed()
     lean = np.where(resting | full.fixed, 0.0, 1.0)[:, None] * [0.0, -1.0, 0.0]
     leaning = full.moved(full.vertices + lean * full.plane.height(full.vertices)[:, None])
     walls = find_walls(leaning)
@@ -102,8 +102,11 @@ def test_a_foot_is_in_the_row_of_its_own_top_where_the_junction_leans_along_its_
     above[walls.foot[tops]] = tops
     feet = np.flatnonzero(above[rows.vertices] >= 0)
     assert len(feet) == len(tops)
-    at = rows.top_ends[feet, rows.fraction[feet].astype(int)]
-    assert at.tolist() == above[rows.vertices[feet]].tolist()
+    at = rows.top_ends[np.arange(len(rows.vertices)), rows.fraction.astype(int)]
+    assert at[feet].tolist() == above[rows.vertices[feet]].tolist()
+    upright = full_walls.rows
+    assert upright.vertices.tolist() == rows.vertices.tolist()
+    assert at.tolist() == upright.top_ends[np.arange(len(at)), upright.fraction.astype(int)].tolist()
 
 
 def test_walls_that_cannot_pair_their_vertices_cannot_pinch():
@@ -363,3 +366,17 @@ def test_a_bottom_with_more_vertices_than_the_junction_is_no_place_to_rest():
     found = newton(split).certificate
     assert found.verdict is Verdict.WALL_DOWN
     assert "comes down on the held bottom of its wall" in found.detail
+
+
+def test_newton_closes_where_a_junction_is_low_over_its_bottom():
+    """Three walls meet; while rows followed the junction to the end, a step left a 15th of the forces."""
+    outline = [[10, 0], [5, 8.66], [-5, 8.66], [-10, 0], [-5, -8.66], [5, -8.66]]
+    walls = {(10.0, 0.0): 6.7, (-5.0, 8.66): 4.4, (-5.0, -8.66): 5.0}
+    dividers = [Divider([[0, 0], end], wall=tension) for end, tension in walls.items()]
+    patches = {"a": {"tension": 3.19, "at": [3, 4]}, "b": {"tension": 3.79, "at": [-6, 0]}}
+    patches["c"] = {"tension": 4.22, "at": [3, -4]}
+    start = Plan(outline, dividers, edge_length=1.6, patches=patches).surface()
+    found = newton(start, NewtonOptions(levels=1))
+    assert found.converged
+    residual = found.history[found.history["step"] == "newton"]["residual"].to_numpy()
+    assert residual[-1] < 1e-3 * residual[-2]

@@ -11,16 +11,16 @@ from volume_cases import cap
 import pcmc
 from generators import hypar_roof, spherical_cap
 from pcmc import Parameter, Patch, Surface, Target, cli, io
-from pcmc.base.errors import LostWarning, SurfaceError
+from pcmc.base.errors import LostWarning, OptionError, SurfaceError
 from pcmc.certificate.balance import load_name, load_ratio
 from pcmc.cli.arguments import Loads
 from pcmc.design.targets import measure
 from pcmc.explore.following import between, reach, wanted
 from pcmc.forces.rooms import room_pressures
 from pcmc.io.mesh_data import scaled_surface
-from pcmc.plan import PatchSpec, Plan
+from pcmc.plan import PatchSpec, Plan, plan_from
 from pcmc.project import digest, run, varied
-from pcmc.project.values import changeable_values
+from pcmc.project.values import changeable_values, data_with_values
 from pcmc.solvers.homotopy import Solves, attempt, raise_loads
 from pcmc.solvers.starts import low_start
 from pcmc.structure import Material, Snow, StructuralModel
@@ -187,6 +187,18 @@ def test_sweeps_vary_the_snow(tmp_path):
     pcmc.write(one, hall())
     pcmc.write(other, hall(0.3, 0.55))
     assert digest(one) != digest(other)
+
+
+def test_snow_of_a_plan_whose_patches_have_their_own_is_refused_and_not_saved(tmp_path):
+    own = {"west": {"tension": 3.0, "snow": 0.1}, "east": {"tension": 3.0}}
+    plan = {"outline": [[0, 0], [8, 0], [8, 4], [0, 4]], "dividers": [[[4, 0], [4, 4]]], "edge_length": 1.0}
+    data = {"plan": {**plan, "snow": 0.3, "patches": own}}
+    roof = plan_from(data["plan"]).surface()
+    saved, _, again = data_with_values(tmp_path / "roof.toml", data, roof.retensioned(snows={"east": 0.2}))
+    assert again.snows[:2].tolist() == [0.1, 0.2]
+    assert "snow" not in saved["plan"]
+    with pytest.raises(OptionError, match=r"snow = 0\.3 of the plan counts for nothing"):
+        plan_from({**saved["plan"], "snow": 0.3})
 
 
 def test_the_page_follows_the_snow():

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import ezdxf
+import ifcopenshell
 import numpy as np
 import pytest
+import pyvista
+import rhino3dm
+import trimesh
 from nightly import at_night
 from PIL import Image
 from printed import words_of
 from refusals import refused
 
 import pcmc
-from pcmc import cli, project
+from pcmc import cli, io, project
 from pcmc.base.errors import FileError
 from pcmc.structure import calculix
 
@@ -107,6 +112,7 @@ def test_all_documents_appear_together_or_none(tmp_path, monkeypatch):
 
 OUTPUT = "[output]\n"
 UNFINISHED = "[solve]\niterations = 1\n"
+MISSED = '[targets]\nmeet = [{quantity = "apex", value = 30.0}]\nvary = ["roof"]\n'
 
 
 @pytest.mark.parametrize(
@@ -197,6 +203,55 @@ def test_an_uncertified_roof_writes_nothing_or_marked_documents(tmp_path, monkey
     assert (tmp_path / "roof.inp").exists()
     for name in ("report.pdf", "sheets.pdf"):
         assert all("NOT CERTIFIED" in page for page in words_of(name))
+
+
+MARKED = {  # what each format has of a mark, besides sheets and pages
+    ".pcmc": lambda path: io.load(path).certificate["mark"],
+    ".ifc": lambda path: ifcopenshell.open(path).by_type("IfcRoof")[0].Name.removeprefix("Roof, "),
+    ".obj": lambda path: path.read_text().splitlines()[1].removeprefix("# "),
+    ".fe": lambda path: path.read_text().splitlines()[1].removeprefix("// "),
+    ".ply": lambda path: path.read_bytes().split(b"\n")[3].decode().removeprefix("comment "),
+    ".vtp": lambda path: pyvista.read(path).field_data["mark"][0],
+    ".glb": lambda path: trimesh.load_scene(path).metadata["pcmc mark"],
+    ".usda": lambda path: re.search('string mark = "(.*)"', path.read_text())[1],
+    ".3dm": lambda path: next(
+        one.Geometry.Text
+        for one in rhino3dm.File3dm.Read(str(path)).Objects
+        if one.Attributes.Name == "PCMC-MARK"
+    ),
+    ".inp": lambda path: path.read_text().splitlines()[1].split("; ")[1],
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "mark"), [(UNFINISHED, "NOT CERTIFIED: not converged"), (MISSED, "TARGETS NOT MET"), ("", "")]
+)
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.LostWarning")
+def test_files_have_the_mark_of_a_roof_that_is_not_in_order(tmp_path, monkeypatch, change, mark):
+    """Each in its own way, and again where they are converted; a picture has it in a corner."""
+    monkeypatch.chdir(tmp_path)
+    names = [f"roof{suffix}" for suffix in MARKED if suffix != ".inp"]
+    output = f"[output]\nfiles = {names}\nstructure = 'roof.inp'\npicture = 'roof.png'\n"
+    text = UNITS + SMALL.partition("[solve]")[0] + change + STRUCTURE + output
+    (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
+    drawn = []
+
+    def draw(_surface, path, *, mark, **_look):
+        drawn.append(mark)
+        path.touch()
+
+    monkeypatch.setattr("pcmc.plot.draw", draw)
+    cli.main(["solve", "roof.toml", "--allow-uncertified"])
+    if mark:
+        assert {suffix: read(Path(f"roof{suffix}")) for suffix, read in MARKED.items()} == dict.fromkeys(
+            MARKED, mark
+        )
+        assert cli.main(["convert", "roof.pcmc", "again.obj"]) == 0
+        assert MARKED[".obj"](Path("again.obj")) == mark
+    else:
+        assert not any(b"NOT" in Path(name).read_bytes() for name in names)
+    assert drawn == [mark]
+    io.read("roof.3dm")  # without a note on objects that are left out
 
 
 def test_the_plan_drawing_is_not_written_over(tmp_path, monkeypatch):

@@ -21,6 +21,7 @@ from pcmc.base.units import Units
 from pcmc.certificate.forces import total_load
 from pcmc.forces.functional import patch_areas
 from pcmc.project import Structure
+from pcmc.structure.member_forces import cable_notes
 from pcmc.surface.geometry import face_areas
 
 
@@ -155,6 +156,18 @@ def test_cables_have_their_tension_and_need_an_area(tmp_path):
     cable = stress[stress[:, 0] > surface.m]
     assert len(cable) == 4 * 8
     np.testing.assert_allclose(cable[:, 2:5].sum(axis=1), 3e4)
+
+
+def test_cables_as_soft_as_the_cloth_are_named(capsys, tmp_path):
+    """A cable of E = 5e5 kN/m² stretches 300 times as far as one of steel."""
+    surface, steel = square(4, cable=3.0), Material(2.1e8)
+    assert cable_notes(model_of(surface, anyway=True, cable_area=1e-4, cable_material=steel)) == []
+    assert cable_notes(model_of(square(4), anyway=True)) == []
+    pcmc.write(tmp_path / "sail.pcmc", surface, units="m")
+    given = ["--thickness", "0.001", "--young", "5e5", "--cable-area", "1e-4", "--allow-uncertified"]
+    cli.main(["structure", str(tmp_path / "sail.pcmc"), "-o", str(tmp_path / "sail.inp"), *given])
+    text = "cables have the material of the patches, E = 5e+05 force/m²; in a project a member of kind"
+    assert text in capsys.readouterr().out
 
 
 def test_elements_are_numbered_in_turn_faces_first_then_cable_after_cable(tmp_path):
