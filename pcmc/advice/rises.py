@@ -112,7 +112,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             raise OptionError(text, what=rise.kind, where=rise.patch)
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
-        if height - lowest <= LEVEL * plan.outline.length:
+        if height - lowest <= ON * plan.outline.length:
             where = f"of {rise.patch!r} " if rise.patch else ""
             text = (
                 f"{rise.kind} {where}is {height:g} over the plane, and the outline is at {lowest:g} and more;"
