@@ -54,7 +54,7 @@ def pattern_drawings(
     length = expect_length(as_units(units).length, "a cutting pattern")
     millimetres, decimals = length_factor(length, "mm"), length_decimals(length, pattern.surface.size)
     size = sheet, millimetres, None, decimals
-    sheets = [seam_sheet(pattern, *size)]
+    sheets = [seam_sheet(pattern, sheet, length)]
     for first in range(0, len(pattern.strips), PER_SHEET):
         group, views = pattern.strips[first : first + PER_SHEET], list[DrawnView]()
         for strip in group:  # as it is cut, with its net length and width
@@ -101,9 +101,7 @@ def _middles(pattern: CuttingPattern) -> list[tuple[Strip, Floats]]:
     return [(s, s.areas @ s.roof[s.faces].mean(axis=1) / s.area) for s in pattern.strips]
 
 
-def seam_sheet(
-    pattern: CuttingPattern, sheet: str, millimetres: float, scale: int | None = None, decimals: int = 3
-) -> Sheet:
+def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
     """The seams from above, with the numbers of strips, and the places of corners along both axes."""
     axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
     lines = [curve._replace(points=curve.points @ axes.T) for curve in _curves(pattern)]
@@ -111,7 +109,8 @@ def seam_sheet(
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
-    return placed([view], "Seams on the roof", sheet, millimetres, scale, decimals)
+    decimals = length_decimals(length, pattern.surface.size)
+    return placed([view], "Seams on the roof", sheet, length_factor(length, "mm"), None, decimals)
 
 
 def _inside(strip: Strip) -> Floats:
@@ -165,7 +164,8 @@ def strip_lines(
 
 def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
     """The polygon of a strip with the cloth added outside each edge of its outline; in corners up to where
-    the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther."""
+    the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther. Along the
+    weft it reaches no farther than the allowance from the widest place."""
     shapely = load_library("shapely", "cloth")
     parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
     for loop in strip.outlines:
@@ -188,7 +188,10 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
             parts.append(shapely.Polygon(v + np.array([0.0 * v, out[k - 1], *tips, out[k]])))
     # along a straight side rounding leaves slits between the parts, which close where they grow by as little
     little = SLIT * float(np.ptp(strip.cut, axis=0).max())
-    return shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
+    cloth = shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
+    # corners that point across the warp reach no farther than seams do: else the strip would be too wide
+    (left, _, right, _), most = cloth.bounds, max(added.values())
+    return cloth.intersection(shapely.box(left, -most, right, strip.width + most))
 
 
 def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, Floats]:

@@ -88,6 +88,16 @@ def test_beyond_an_acute_corner_there_is_as_much_cloth_as_beside_it():
     assert cut.hausdorff_distance(net) == pytest.approx(np.hypot(0.3, across))
 
 
+def test_corners_that_point_across_the_warp_stay_within_the_width_of_the_cloth():
+    """With 3 hems of 0.2 beyond its acute corner the first strip of the triangle would be 0.2 too wide."""
+    flat = Plan([[0, 0], [6, 0], [6, 1]], edge_length=0.5, tension=2.0, pressure=0.0).surface()
+    pattern = cutting_pattern(flat, 1.4, hem=0.2, allowance=0.1, direction=90.0, anyway=True)
+    for strip in pattern.strips:
+        (cut,) = (line.points for line in strip_lines(pattern, strip)[0] if line.layer == "PCMC-CUT")
+        assert np.ptp(cut[:, 1]) <= 1.4 + 1e-9
+        assert Polygon(cut).exterior.distance(Polygon(strip.cut[strip.outlines[0]])) >= 0.1 - 1e-9
+
+
 def test_a_hole_in_a_strip_is_cut_out_smaller_by_its_hem():
     square = [[2, 0.5], [4, 0.5], [4, 1.5], [2, 1.5]]
     plan = Plan([[0, 0], [6, 0], [6, 2], [0, 2]], holes=[square], edge_length=0.5, tension=2.0, pressure=0.0)
