@@ -19,6 +19,7 @@ from ..base.tolerances import EVENT_ACCURACY
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict, certify
 from ..certificate.balance import pressures_left_over
+from ..certificate.certificate import certified
 from ..certificate.diagnosis import worst_face
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
@@ -276,7 +277,8 @@ def margin(
     validate.number("most", most, above=1.0)
     validate.integer("meshes", meshes, least=1)
     varied = Varied.of(surface, what, towards)
-    certificate = certify(surface) if certificate is None else certificate
+    validate.callback("callback", callback, "a function of a Progress")
+    certificate = certified(surface, True, certificate)
     index = certificate.index
     if index is None:
         message = f"margin: the surface is not at rest, so it has none ({certificate.verdict.value})"

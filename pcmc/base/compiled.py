@@ -6,7 +6,6 @@ import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +76,7 @@ def blocks(count: int, workers: int) -> list[tuple[int, int]]:
     [(0, 1000)]
     """
     parts = max(1, min(workers, count // BLOCK))
-    edges = np.linspace(0, count, parts + 1).astype(int)
-    return [(int(a), int(b)) for a, b in pairwise(edges)]
+    return [(count * k // parts, count * (k + 1) // parts) for k in range(parts)]
 
 
 def sum_blocks(work: Callable[[int, int, Any], None], count: int, shape: tuple[int, ...]) -> Any:

@@ -100,6 +100,12 @@ def flag(name: str, value: object) -> bool:
     return value
 
 
+def callback(name: str, value: object, expected: str) -> None:
+    """Refuse what is called at each step and is no function, nor None."""
+    if not (value is None or callable(value)):
+        refuse(name, value, expected)
+
+
 def sequence(
     name: str, value: Any, expected: str = "a list", error: type[PcmcError] = OptionError
 ) -> list[Any]:

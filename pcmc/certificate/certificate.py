@@ -303,6 +303,8 @@ def certify(
     validate.number("tolerance", tolerance, above=0.0)
     if not isinstance(evidence, Evidence | None):
         validate.refuse("evidence", evidence, "an Evidence or None")
+    if not isinstance(clear, SecondVariation | None):
+        validate.refuse("clear", clear, "a SecondVariation or None")
     if whole is not False:
         surface = mirrored(surface, None if whole is True else whole)
     at = Equilibrium.of(surface)

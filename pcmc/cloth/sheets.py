@@ -54,7 +54,7 @@ def pattern_drawings(
     length = expect_length(as_units(units).length, "a cutting pattern")
     millimetres, decimals = length_factor(length, "mm"), length_decimals(length, pattern.surface.size)
     size = sheet, millimetres, None, decimals
-    sheets = [seam_sheet(pattern, *size)]
+    sheets = [seam_sheet(pattern, sheet, length)]
     for first in range(0, len(pattern.strips), PER_SHEET):
         group, views = pattern.strips[first : first + PER_SHEET], list[DrawnView]()
         for strip in group:  # as it is cut, with its net length and width
@@ -101,9 +101,7 @@ def _middles(pattern: CuttingPattern) -> list[tuple[Strip, Floats]]:
     return [(s, s.areas @ s.roof[s.faces].mean(axis=1) / s.area) for s in pattern.strips]
 
 
-def seam_sheet(
-    pattern: CuttingPattern, sheet: str, millimetres: float, scale: int | None = None, decimals: int = 3
-) -> Sheet:
+def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
     """The seams from above, with the numbers of strips, and the places of corners along both axes."""
     axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
     lines = [curve._replace(points=curve.points @ axes.T) for curve in _curves(pattern)]
@@ -111,7 +109,8 @@ def seam_sheet(
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
-    return placed([view], "Seams on the roof", sheet, millimetres, scale, decimals)
+    decimals = length_decimals(length, pattern.surface.size)
+    return placed([view], "Seams on the roof", sheet, length_factor(length, "mm"), None, decimals)
 
 
 def _inside(strip: Strip) -> Floats:

@@ -108,8 +108,7 @@ def meet(
             if (other := pressed.get(sheet, parameter)) is not parameter:
                 text = f"{parameter.label} and {other.label}: both sheets of a cushion have one pressure"
                 raise OptionError(f"{text}; leave out one", what="vary", found=other.label)
-    if callback is not None and not callable(callback):
-        validate.refuse("callback", callback, "a function of a row")
+    validate.callback("callback", callback, "a function of a row")
     validate.positive("tolerance", tolerance)
     validate.integer("solves", solves, least=1)
     given = np.array([p.value(surface) for p in parameters])

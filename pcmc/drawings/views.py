@@ -175,7 +175,7 @@ def placed(
     name: str,
     millimetres: float,
     scale: int | None,
-    decimals: int = 3,
+    decimals: int,
 ) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 

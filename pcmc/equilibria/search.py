@@ -135,8 +135,7 @@ def find_equilibria(
     given = surface.surface if isinstance(surface, Result) else surface
     expect_surface(given)
     expect_flat(given, "find_equilibria")
-    if callback is not None and not callable(callback):
-        validate.refuse("callback", callback, "a function of a sentence")
+    validate.callback("callback", callback, "a function of a sentence")
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
     every = (
         [along] if isinstance(along, str | Direction | BoundaryMotion) else validate.sequence("along", along)

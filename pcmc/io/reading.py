@@ -21,7 +21,7 @@ from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, Surfa
 from ..base.files import as_path, check_regular, system_error
 from ..base.libraries import unreadable
 from ..base.units import MICROMETRES, Units
-from ..base.validate import choice
+from ..base.validate import choice, refuse
 from ..surface import Plane, Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from ..surface.topology import topology
@@ -83,6 +83,8 @@ def read(
     >>> folder.cleanup()
     """
     choice("units", units, tuple(MICROMETRES))
+    if not isinstance(plane, Plane | None):
+        refuse("plane", plane, "a Plane or None")
     return _surface(path, converted(load(path), units), (tensions, pressures, fixed, on_plane, plane))
 
 

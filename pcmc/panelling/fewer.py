@@ -122,6 +122,7 @@ def fewer_families(
     change = validate.positive("change", change)
     validate.flag("at_rest", at_rest)
     validate.integer("rounds", rounds, least=1)
+    validate.callback("callback", callback, "a function of two numbers")
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     before = panels(surface, tolerance, anyway=anyway, **options)
     search = _Search(before, change, at_rest)

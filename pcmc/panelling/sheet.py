@@ -16,12 +16,12 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.compiled import compiled
 from ..surface import Surface
 from ..surface.geometry import area_vectors, unit_vectors, vertex_sums
 from ..surface.topology import POINT, EdgeCurve, Topology, components, topology
 
 LEAST_POINTS = 18  # around a vertex, to fit the nine coefficients of a cubic
+RANK = 1e-10  # smaller singular values, as shares of the largest, are none: regular grids have too few places
 MOST_RINGS = 4  # of neighbours that are taken together
 KINK = np.cos(np.radians(35.0))  # a boundary that turns by more has a corner
 
@@ -126,36 +126,24 @@ def shape_operators(X: Floats, F: Ints) -> Floats:
             pick = csr_array((few.astype(float), (np.arange(n), np.arange(n))), shape=(n, n))
             rings = csr_array(rings + pick @ rings @ near)
     normal = unit_vectors(vertex_sums(area_vectors(X[F]), F, n))
-    return np.asarray(_fitted(X, normal, rings.indptr.astype(np.int64), rings.indices.astype(np.int64)))
+    tensors = np.empty((n, 3, 3))
+    for count in np.unique(np.diff(rings.indptr)):  # those with as many neighbours at once
+        at = np.flatnonzero(np.diff(rings.indptr) == count)
+        around = rings.indices[rings.indptr[at, None] + np.arange(count)]
+        tensors[at] = _fitted(X[around] - X[at, None], normal[at])
+    return tensors
 
 
-@compiled
-def _fitted(X: Floats, normal: Floats, start: Ints, around: Ints) -> Floats:
-    out = np.zeros((len(X), 3, 3))
-    for i in range(len(X)):
-        N = normal[i]
-        k = np.argmin(np.abs(N))
-        e = np.zeros(3)
-        e[k] = 1.0
-        e -= N[k] * N
-        e /= np.sqrt((e * e).sum())
-        f = np.array([N[1] * e[2] - N[2] * e[1], N[2] * e[0] - N[0] * e[2], N[0] * e[1] - N[1] * e[0]])
-        count = start[i + 1] - start[i]
-        A, b = np.zeros((count, 9)), np.zeros(count)
-        reach = 0.0
-        for r in range(count):
-            d = X[around[start[i] + r]] - X[i]
-            reach = max(reach, np.sqrt((d * d).sum()))
-        for r in range(count):
-            d = (X[around[start[i] + r]] - X[i]) / reach
-            x, y = (d * e).sum(), (d * f).sum()
-            b[r] = (d * N).sum()
-            A[r] = np.array([x, y, 0.5 * x * x, x * y, 0.5 * y * y, x**3, x * x * y, x * y * y, y**3])
-        terms = 9 if count > 12 else 5
-        c = np.linalg.lstsq(np.ascontiguousarray(A[:, :terms]), b)[0]
-        rise = np.sqrt(1.0 + c[0] ** 2 + c[1] ** 2)
-        J = np.stack((e + c[0] * N, f + c[1] * N))  # tangents, rows
-        D = np.linalg.inv(J @ J.T) @ J
-        second = np.array([[c[2], c[3]], [c[3], c[4]]]) / (rise * reach)
-        out[i] = -(D.T @ second @ D)
-    return out
+def _fitted(d: Floats, N: Floats) -> Floats:
+    """(k,3,3) shape operators at vertices with normals N (k,3), from the ways d (k,c,3) to neighbours."""
+    k = np.abs(N).argmin(axis=1)
+    e = unit_vectors(np.eye(3)[k] - np.take_along_axis(N, k[:, None], axis=1) * N)
+    frame = np.stack([e, np.cross(N, e), N], axis=1)
+    reach = np.linalg.norm(d, axis=2).max(axis=1)
+    x, y, z = np.einsum("kci,kai->akc", d, frame) / reach[:, None]
+    terms = [x, y, 0.5 * x * x, x * y, 0.5 * y * y, x**3, x * x * y, x * y * y, y**3]
+    A = np.stack(terms[: 9 if d.shape[1] > 12 else 5], axis=2)
+    c = np.einsum("ktc,kc->tk", np.linalg.pinv(A, RANK), z)
+    D = np.linalg.pinv(frame[:, :2] + c[:2].T[:, :, None] * N[:, None])  # of tangents
+    second = (c[[[2, 3], [3, 4]]] / (reach * np.sqrt(1.0 + c[0] ** 2 + c[1] ** 2))).transpose(2, 0, 1)
+    return np.asarray(-D @ second @ D.swapaxes(1, 2))

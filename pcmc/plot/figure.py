@@ -60,14 +60,13 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
     ``ratios`` are height / width by axes, one of each row; titles, scales and legends keep their space.
     """
     _as_written(figure)
-    for _ in range(4):
+    for _ in range(5):
         figure.draw_without_rendering()
         boxes = {axes: axes.get_window_extent() for axes in ratios}
         missing = sum(ratio * boxes[axes].width - boxes[axes].height for axes, ratio in ratios.items())
         if abs(missing) < 0.5:  # pixels
             break
         figure.set_figheight(round(figure.get_figheight() * DPI + missing) / DPI)
-    figure.draw_without_rendering()
     figure.set_layout_engine("none")
 
 

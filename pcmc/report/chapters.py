@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..base.units import Units, length_factor
+from ..base.units import Units
 from ..drawings.sheet import column
 from ..plot import member_forces, strains, under_load
 from ..plot.figure import png
@@ -141,7 +141,7 @@ def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     from ..cloth.sheets import seam_sheet
 
     table, sewn = pattern.table, pattern.seam_table.query("kind != 'rim'")
-    sheet = seam_sheet(pattern, FORMAT, length_factor(units.length, "mm"))
+    sheet = seam_sheet(pattern, FORMAT, units.length)
     yield Heading(f"Cutting pattern, scale {sheet.scale}, lengths in {units.length}", new_page=True)
     yield on_paper(sheet.scale, *sheet.drawn())
     area, long = one(float(table["cut_area"].sum())), one(float(sewn["length"].sum()))

@@ -12,7 +12,7 @@ from ..base.units import Units, length_factor
 from ..certificate import Certificate
 from ..certificate.supports import support_vertices
 from ..drawings import views
-from ..drawings.sheet import SheetLine, Text, box, place_labels
+from ..drawings.sheet import SheetLine, Text, box, length_decimals, place_labels
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 
@@ -38,7 +38,8 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     OptionError if it does not fit a page at the smallest usual scale.
     """
     view = views.plan_view(surface, views.model_curves(surface), ())
-    sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None)
+    decimals = length_decimals(units.length, surface.size)
+    sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None, decimals)
     panels = [line for line in sheet.lines if line.layer == "PCMC-PANEL"]
     edges = [float(np.linalg.norm(line.points[1] - line.points[0])) for line in panels]
     drop = bool(edges) and float(np.mean(edges)) < LEAST_EDGE

@@ -66,8 +66,7 @@ def solve_once(
     if cannot and method != "newton":
         message = f"method {method!r} cannot {cannot}; use method='newton'"
         raise OptionError(message, what="method", found=method, expected="newton")
-    if callback is not None and not callable(callback):
-        validate.refuse("callback", callback, "a function of a Progress")
+    validate.callback("callback", callback, "a function of a Progress")
     if surface.size == 0.0:
         message = "solve: all vertices are at one point; start from a surface that has a size"
         raise SurfaceError(message, what="vertices")

@@ -86,8 +86,7 @@ def run(
     """
     crew = Workers(executor, scheduler, workers, time_limit)
     for name, called in (("on_record", on_record), ("on_resume", on_resume)):
-        if not (called is None or callable(called)):
-            validate.refuse(name, called, "a function")
+        validate.callback(name, called, "a function")
     with ExitStack() as stack:
         stored = None if store is None else stack.enter_context(open_store(store, sweep))
         records = {} if stored is None else dict(stored.records)

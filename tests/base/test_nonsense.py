@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from pcmc.plan import CableLine, Divider, Hole, PatchSpec, Plan
 ROUGH, NAN, HUGE = [[1, 2], [3]], float("nan"), 10**400
 TABLE = np.full((3, 3), NAN)
 ONCE = iter(())  # the next to read it finds nothing
+GRADED = Path(__file__).resolve().parents[2] / "results" / "accuracy" / "graded.pcmc"
 OUTLINE = [[0, 0], [4, 0], [4, 3], [0, 3]]
 plan = partial(Plan, OUTLINE, tension=2.0)
 FILM = pcmc.Surface(
@@ -70,6 +72,11 @@ CASES = [
     ),
     *((lambda v: pcmc.find_equilibria(FILM, v), (v,)) for v in (NAN, None, True)),
     (lambda v: pcmc.check_mesh(FILM, corners=v), (ROUGH,)),
+    *((lambda v: pcmc.certify(FILM, clear=v), (v,)) for v in (5, "x", NAN)),
+    *((lambda v: pcmc.margin(FILM, "pressure", callback=v), (v,)) for v in (5, "x", NAN)),
+    *((lambda v: pcmc.margin(FILM, "pressure", certificate=v), (v,)) for v in (5, "x", NAN)),
+    *((lambda v: pcmc.fewer_families(FILM, 0.1, 0.1, anyway=True, callback=v), (v,)) for v in (5, NAN)),
+    *((lambda v: pcmc.read(GRADED, plane=v), (v,)) for v in (5, "x", NAN)),
 ]
 
 

@@ -66,6 +66,18 @@ def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
 
 
 @pytest.mark.nightly
+def test_a_number_may_have_a_decimal_comma_and_what_is_none_is_not_taken(page):
+    name = "Tension α of left wall"
+    page.enter(name, "10,5")
+    assert page.number(name).get_attribute("value") == "10.5"
+    page.enter(name, "1.2.3")
+    assert page.number(name).get_attribute("value") == "10.5"
+    page.find("#undo").click()
+    page.idle()
+    assert page.number(name).get_attribute("value") == "10"
+    assert page.complaints() == []
+
+
 def test_dragging_a_slider_with_the_mouse_is_one_step(page):
     from selenium.webdriver import ActionChains
 

@@ -27,7 +27,7 @@ for library in ("pyvista", "rhino3dm", "trimesh"):
     pytest.importorskip(library)
 
 READABLE = [suffix for suffix, form in FORMATS.items() if form.reads]
-FLIPS = int(os.environ.get("PCMC_FLIPS", "200"))  # PCMC_FLIPS=2000 for a long run
+FLIPS = int(os.environ.get("PCMC_FLIPS", "100"))  # PCMC_FLIPS=2000 for a long run
 OWN = (".obj", ".ply", ".fe")  # read by readers of our own, which check all themselves: no net below them
 NET = "not a readable ."  # how an error of the net begins
 

@@ -320,7 +320,7 @@ def test_flipped_bits_never_crash_the_repair(tmp_path):
     random = np.random.default_rng(3)
     file = tmp_path / "flipped.obj"
     outcomes = set()
-    for _ in range(int(os.environ.get("PCMC_FLIPS", "200")) // 10):
+    for _ in range(int(os.environ.get("PCMC_FLIPS", "100")) // 10):
         flipped = bytearray(data)
         for place in random.integers(0, len(flipped), 5):
             flipped[place] ^= 1 << int(random.integers(8))

@@ -19,6 +19,7 @@ import pcmc
 from pcmc import Patch, Surface, Verdict, cli
 from pcmc.base.errors import FileError, MissingExtra, OptionError, SurfaceError
 from pcmc.base.units import Units
+from pcmc.cloth.sheets import seam_sheet
 from pcmc.plan import Divider, Plan
 from pcmc.report import RoofReport, roof_report, tables, words
 from pcmc.report.plan import paper_plan
@@ -108,6 +109,17 @@ def test_the_plan_is_to_scale(caps):
     places = np.array([text.at for text in plan.texts if text.text in names])
     away = np.linalg.norm(places[:, None] - places[None], axis=2) + 100.0 * np.eye(len(places))
     assert away.min() > 2.0  # mm, also where a wall stands below its ridge
+
+
+@pytest.mark.parametrize(("unit", "factor", "text"), [("m", 1.0, "12.000"), ("mm", 1e3, "12000")])
+def test_dimensions_have_the_decimals_of_the_unit(unit, factor, text):
+    """A plan in mm with "12000.000" pretends to a thousandth of a millimetre."""
+    corners = factor * np.array([[0, 0], [12, 0], [12, 8], [0, 8]])
+    roof = pcmc.solve(Plan(corners, edge_length=2.0 * factor, tension=6.0, pressure=1.0 / factor).surface())
+    plan = paper_plan(roof.surface, roof.certificate, Units(unit, "kN"))
+    assert text in {text.text for text in plan.texts}
+    pattern = pcmc.cutting_pattern(roof.surface, strips=2, compensation=(0, 0))
+    assert text in {found.text for found in seam_sheet(pattern, "A4", unit).drawn()[1]}
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from nightly import at_night
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from starts import spherical_cap
@@ -31,16 +32,17 @@ def disc(edge):
 
 
 @needs_ccx
-def test_a_flat_membrane_sinks_as_a_paraboloid():
+@pytest.mark.parametrize("edges", [[0.2, 0.1], *at_night([0.2, 0.1, 0.05])])
+def test_a_flat_membrane_sinks_as_a_paraboloid(edges):
     """w = q (R² - r²) / 4T, to the second order in the edge; the load is small."""
     off = []
-    for edge in (0.2, 0.1, 0.05):
+    for edge in edges:
         model = model_of(disc(edge), loads=[Snow(1e-3, patches=["cap"])], anyway=True)
         found = -analyse(model)["snow"].results.deflections
         x, y, _ = model.surface.vertices.T
         off.append(np.sqrt(np.mean((found / (1e-3 / 8.0) - (1.0 - x**2 - y**2)) ** 2)))
-    assert np.polyfit(np.log([0.2, 0.1, 0.05]), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.25)
-    assert off[-1] < 2e-3
+    assert np.polyfit(np.log(edges), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.25)
+    assert off[-1] < 0.8 * edges[-1] ** 2
 
 
 @needs_ccx
@@ -67,7 +69,7 @@ def test_the_example_of_analyse_prints_what_it_says():
 def test_a_cap_under_more_pressure_grows_as_a_sphere():
     """Apart from a narrow ring at its rim, which may raise it as a whole, it is larger by w / R."""
     young = 1e6
-    model = model_of(cap(), material=Material(young), thickness=THICK, loads=[Wind({"cap": 0.2})])
+    model = model_of(cap(0.1), material=Material(young), thickness=THICK, loads=[Wind({"cap": 0.2})])
     found = analyse(model)["wind"].results
     X, inside = model.surface.vertices, np.linalg.norm(model.surface.vertices[:, :2], axis=1) < 0.5
     grown = (found.displacements * X)[inside, :2].sum() / (X[inside, :2] ** 2).sum()

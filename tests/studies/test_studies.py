@@ -65,7 +65,7 @@ def test_mesh_comes_back_with_a_stage_that_has_collapsed(tmp_path):
 def test_large_figures_shrink_and_small_ones_stay_as_all_of_a_short_run(tmp_path):
     from PIL import Image
 
-    noise = np.random.default_rng(1).integers(0, 255, (300, 300, 3), dtype=np.uint8)
+    noise = np.random.default_rng(1).integers(0, 255, (200, 200, 3), dtype=np.uint8)
 
     def figure(folder):
         Image.fromarray(noise).save(folder.figure("large"))

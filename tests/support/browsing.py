@@ -83,7 +83,7 @@ class Explored:
         return self.find(f"input[type=range][aria-label='{name}']")
 
     def number(self, name: str) -> Any:
-        return self.find(f"input[type=number][aria-label='{name}, as a number']")
+        return self.find(f"input.number[aria-label='{name}, as a number']")
 
     def enter(self, name: str, value: float) -> None:
         from selenium.webdriver.common.keys import Keys

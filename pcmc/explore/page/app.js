@@ -365,7 +365,7 @@ class Page {
     }
     prefersDark.addEventListener("change", () => this.viewer?.setOptions({}));
     addEventListener("keydown", (event) => {
-      if (!(event.ctrlKey || event.metaKey) || event.target.type === "number") return;
+      if (!(event.ctrlKey || event.metaKey) || event.target.matches("input.number")) return;
       const key = event.key.toLowerCase();
       const act = key === "y" || (key === "z" && event.shiftKey) ? "redo" : key === "z" ? "undo" : "";
       if (!act) return;

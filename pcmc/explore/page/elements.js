@@ -33,6 +33,13 @@ export const coordinate = (x, size, count = 4) =>
 export const input = (type, name, attributes = {}) =>
   element("input", { type, "aria-label": name }, attributes);
 
+/** A field of one number, with a decimal point or comma: the browser's own makes 32 of "3,2" in English. */
+export function numberField(name, attributes = {}) {
+  const field = element("input.number", { type: "text", inputMode: "decimal", "aria-label": name }, attributes);
+  const read = () => (field.value.trim() ? Number(field.value.replace(",", ".")) : NaN);
+  return Object.defineProperty(field, "valueAsNumber", { get: read });
+}
+
 export const button = (text, onclick, name = text) =>
   element("button", { type: "button", onclick, ...(name !== text && { "aria-label": name }) }, text);
 

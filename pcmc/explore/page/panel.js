@@ -1,6 +1,6 @@
 // A card for each patch, cable and room, with a slider and a number for each of its values.
 
-import { coordinate, digits, element, input } from "./elements.js";
+import { coordinate, digits, element, input, numberField } from "./elements.js";
 
 const STEPS = 1000;
 const ROOM = 2; // times a value beyond the slider's end: where it ends then
@@ -80,8 +80,7 @@ export class Panel {
   /** A single held point: three numbers, which dragging it in the picture changes, too. */
   point(group, asked) {
     const entry = { group, kind: "points", value: asked.points[group.name] };
-    entry.numbers = AXES.map((axis, k) => input("number", `${axis} of ${group.name}`, {
-      step: "any",
+    entry.numbers = AXES.map((axis, k) => numberField(`${axis} of ${group.name}`, {
       onchange: ({ target: { valueAsNumber: x } }) =>
         this.movePoint(group.name, Number.isFinite(x) ? entry.value.with(k, x) : entry.value, true),
     }));
@@ -106,8 +105,7 @@ export class Panel {
       oninput: () => this.change(entry, range.value(entry.slider.value), false),
       onchange: () => this.changed(true),
     });
-    entry.number = input("number", `${name}, as a number`, {
-      step: "any",
+    entry.number = numberField(`${name}, as a number`, {
       onchange: ({ target: { valueAsNumber: x } }) =>
         (Number.isFinite(x) ? this.change(entry, x, true) : this.put(entry, entry.value)),
     });

@@ -1,6 +1,6 @@
 // Targets: quantities and the values wanted for them, and the tensions that may change for these.
 
-import { button, capital, choice, digits, element, input, select } from "./elements.js";
+import { button, capital, choice, digits, element, numberField, select } from "./elements.js";
 
 const WORDS = {
   "reaction per length": "Largest reaction", pressure: "Pressure of a room", length: "Length of a cable",
@@ -61,7 +61,7 @@ export class Targets {
       ? element("span.fixed", target.label ?? `height at (${target.of.join(", ")})`)
       : select("Quantity", this.choices.map((one) => [one.quantity, WORDS[one.quantity] ?? capital(one.quantity)]));
     const [of, limit, unit] = [select("Of", []), select("Relation", LIMITS), element("span.unit")];
-    const number = input("number", "Value wanted", { step: "any", required: true });
+    const number = numberField("Value wanted", { required: true });
     const entry = { target, point, quantity, of, limit, number };
     const remove = button("×", () => {
       this.rows.splice(this.rows.indexOf(entry), 1);

@@ -295,8 +295,7 @@ def follow(
     """
     expect_surface(surface)
     expect_flat(surface, "follow")
-    if callback is not None and not callable(callback):
-        validate.refuse("callback", callback, "a function of a Progress")
+    validate.callback("callback", callback, "a function of a Progress")
     chosen = validate.options_from(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
