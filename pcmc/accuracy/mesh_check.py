@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -182,14 +183,12 @@ def check_mesh(
         message = f"check_mesh needs a surface at rest; solve it first ({certificate.verdict.value}"
         message += f"; {certificate.detail})" if certificate.detail else ")"
         raise SurfaceError(message, what="surface", found=certificate.residual)
+    solved = partial(_solved, callback=callback, stable=certificate.index == 0)
     surfaces, certificates = [first], [certificate]
     finding, order = None, None
     for _ in range(meshes - 1):
         start = _refined(surfaces[-1], boundary, sharp)
-        result = _solved(start, callback)
-        if not result.converged and certificate.index == 0:  # downhill it may come to rest all the same
-            again = _solved(start, callback, "minimum")
-            result = again if again.converged else result
+        result = solved(start)
         if not result.converged or result.certificate.index is None:
             finding, order = lost(start, result), -np.inf
             break
@@ -203,7 +202,7 @@ def check_mesh(
         advice = f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh"
         finding = finding._replace(advice=f"{advice} --edge-length {finer:g}")
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
-    doubts = _curve_doubts(first, known, found, callback) if boundary == "smooth" else {}
+    doubts = _curve_doubts(first, known, found, solved) if boundary == "smooth" else {}
     table = _table(found, shape_order(surfaces) if order is None else order, doubts)
     return MeshCheck(*finding, table, tuple(surfaces), doubts)
 
@@ -226,20 +225,25 @@ def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Sur
     return refine(surface, 1, boundary if callable(boundary) else None)
 
 
-def _solved(start: Surface, callback: Callback | None, target: str = "stationary") -> Result:
-    result = solve_once(start, "newton", callback, target=target, iterations=STEPS)
-    if result.status is Status.STOPPED:
-        raise KeyboardInterrupt
-    return result
+def _solved(start: Surface, callback: Callback | None, stable: bool) -> Result:
+    """The surface on a finer mesh, at rest nearby; a ``stable`` one may be so only downhill."""
+    results = list[Result]()
+    for target in ("stationary", "minimum") if stable else ("stationary",):
+        results.append(solve_once(start, "newton", callback, target=target, iterations=STEPS))
+        if results[-1].status is Status.STOPPED:
+            raise KeyboardInterrupt
+        if results[-1].converged:
+            return results[-1]
+    return results[0]
 
 
 def _curve_doubts(
-    first: Surface, corners: Ints, found: Sequence[dict[Key, Reading]], callback: Callback | None
+    first: Surface, corners: Ints, found: Sequence[dict[Key, Reading]], solved: Callable[[Surface], Result]
 ) -> dict[tuple[str, str], float]:
     """How far limits may be off as curves are guesses: the next mesh is solved with other guesses, too."""
 
     def read_with(places: Floats) -> dict[Key, Reading]:
-        result = _solved(refine(first, 1, lambda _: places), callback)
+        result = solved(refine(first, 1, lambda _: places))
         return readings(result.surface, result.certificate, first.n) if result.converged else {}
 
     doubts: dict[tuple[str, str], float] = {}

@@ -18,6 +18,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..base.libraries import require
+from ..base.tolerances import ON
 from ..plan import Divider, Hole, Plan, patch_names
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 RISES = ("rise", "apex")  # of a patch
 WHOLE = (*RISES, "span_ratio")  # of all patches together
 LEAST = 1.15  # times the tension below which no roof over the plan is in equilibrium: the first one at least
-LEVEL = 1e-9  # of the outline's length: heights that differ by less are one
 
 
 @dataclass(frozen=True)
@@ -106,13 +106,13 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     level, lowest, loads = float(heights.mean()), float(heights.min()), net_pressures(plan)
     targets, vary = [], []
     for rise in rises:
-        if rise.kind != "apex" and np.ptp(heights) > LEVEL * plan.outline.length:
+        if rise.kind != "apex" and np.ptp(heights) > ON * plan.outline.length:
             text = f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex"
             text += " instead, the greatest height over the plane"
             raise OptionError(text, what=rise.kind, where=rise.patch)
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
-        if height - lowest <= LEVEL * plan.outline.length:
+        if height - lowest <= ON * plan.outline.length:
             where = f"of {rise.patch!r} " if rise.patch else ""
             text = (
                 f"{rise.kind} {where}is {height:g} over the plane, and the outline is at {lowest:g} and more;"

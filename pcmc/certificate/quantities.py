@@ -196,6 +196,17 @@ class Parameter:
         """The unit of its value, as a name of ``Units``."""
         return dimension_of(self.kind)
 
+    @property
+    def plain(self) -> Any:
+        """The parameter as in a project: its name, a list of names, or a table.
+
+        >>> Parameter(["west", "east"]).plain, Parameter("hall", "volume", low=2.0).plain
+        (['west', 'east'], {'patch': 'hall', 'kind': 'volume', 'low': 2.0})
+        """
+        names = list(self.names) if len(self.names) > 1 else self.names[0]
+        entry = {k: v for k, v in vars(self).items() if v is not None} | {"patch": names}
+        return names if entry == {"patch": names, "kind": "tension"} else entry
+
     def value(self, surface: Surface) -> float:
         """Its value on a surface; of several patches that of the first."""
         return float(part_values(surface, self.key)[part_index(surface, self.key, self.names[0])])

@@ -255,7 +255,7 @@ def project_with(
     if aims is not None and aims != kept and _meets(surface, aims[0]):
         kept, points = aims, data["plan"].get("points", {})
         entries = [_target(target, points) for target in aims[0]]
-        found = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        found = {"meet": entries, "vary": [p.plain for p in aims[1]]}
         data.pop("targets", None)  # until a rise that these replace is a tension
         note = f"with its targets: {', '.join(t.label for t in aims[0])}"
     elif not _meets(surface, roof.aims[0]):
@@ -315,13 +315,6 @@ def _target(target: Target, points: Mapping[str, Any]) -> dict[str, Any]:
     entry = {key: getattr(target, key) for key in FIELDS}
     entry |= {"of": target.name} if target.name in points else {}
     return {k: list(v) if isinstance(v, tuple) else v for k, v in entry.items() if v is not None}
-
-
-def _parameter(parameter: Parameter) -> Any:
-    """A parameter as in a project: its name, a list of names, or a table."""
-    names = list(parameter.names) if len(parameter.names) > 1 else parameter.names[0]
-    entry = {k: v for k, v in vars(parameter).items() if v is not None} | {"patch": names}
-    return names if entry == {"patch": names, "kind": "tension"} else entry
 
 
 def _change(tomlkit: Any, table: Any, data: Mapping[str, Any]) -> None:

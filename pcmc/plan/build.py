@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints, toml
 from ..base.errors import PlanError, PlanWarning, SurfaceError
+from ..base.tolerances import ON
 from ..forces.rooms import check_rooms
 from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..meshing.quality import improve_angles
@@ -26,7 +27,7 @@ from ..surface.pieces import Piece, point_text, to_space
 from ..surface.values import BELOW
 from .draft import Draft, Roof, drafted, rooms_between, upright_planes, walls_of
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
-from .lines import EXACT, SNAP, Kind, PlanLine
+from .lines import SNAP, Kind, PlanLine
 from .parts import PatchSpec
 
 if TYPE_CHECKING:
@@ -371,7 +372,7 @@ def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> Hel
     part = part.mapped(plane.axes.T, np.array(plane.point))
     there = part.at(t)
     away = np.linalg.norm(X[V] - there, axis=1)
-    near = EXACT * bounding_size(X)
+    near = ON * bounding_size(X)
     if away[1:-1].max(initial=0.0) > near or away.max() > REACH * draft.plan.edge_length:
         return None
     pieces = list(part.pieces)

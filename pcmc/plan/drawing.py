@@ -16,11 +16,12 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
+from ..base.tolerances import ON
 from ..base.units import conversion_note, unlikely_size
 from ..surface.curves import Curve, polyline
 from ..surface.parts import listed
 from ..surface.pieces import Piece, point_text, two_digits
-from .lines import EXACT, Kind, LineTree, PlanLine, check_line
+from .lines import Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
 from .strokes import (
@@ -104,7 +105,7 @@ class _Reader:
             hint = "leave it out, and draw what is missing"  # a wide one would swallow short lines
             validate.number("gap", gap, least=LEAST_GAP * self.size, most=MOST_GAP * self.size, hint=hint)
         self.gap = GAP * self.size if gap is None else gap
-        self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= EXACT * self.size else 0.0
+        self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= ON * self.size else 0.0
 
     def layers_of(self, role: str) -> list[tuple[Layer, list[Stroke]]]:
         """The layers of a role with their strokes."""
@@ -335,7 +336,7 @@ class _Reader:
                 " to rest on some meshes and not on others; draw a mast's top as a ring, and the roof is the"
                 " same on all"
             )
-        if not all(map(math.isnan, tops)) or np.nanmax([0.0, *heights]) > EXACT * self.size:
+        if not all(map(math.isnan, tops)) or np.nanmax([0.0, *heights]) > ON * self.size:
             return True
         if not cables and not all(map(math.isnan, heights)):
             self.notes.append(
@@ -365,7 +366,7 @@ class _Reader:
     def _on_plane(self, curve: Curve) -> Curve:
         """The curve as a plane one if all of it is at the level of Π."""
         heights = curve.at(curve.dense)[:, 2]
-        return _projected(curve) if np.abs(heights - self.level).max() <= EXACT * self.size else curve
+        return _projected(curve) if np.abs(heights - self.level).max() <= ON * self.size else curve
 
 
 def _points(strokes: Sequence[Stroke]) -> list[Floats]:

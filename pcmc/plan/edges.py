@@ -12,6 +12,7 @@ import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
+from ..base.tolerances import ON
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from ..surface.curves import Curve
@@ -19,7 +20,7 @@ from ..surface.geometry import angles, bounding_size
 from ..surface.pieces import point_text, to_local, to_space, two_digits
 from ..surface.topology import SIDES, edge_places
 from .arrangement import Arrangement
-from .lines import EXACT, SNAP, Kind, LineTree, PlanLine
+from .lines import SNAP, Kind, LineTree, PlanLine
 from .parts import cable_label
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def _mirror_distances(plan: Plan, points: Floats) -> list[Floats]:
         a, b = mirror.local(plan.plane).at([0.0, 1.0])[:, :2]
         along = (b - a) / np.linalg.norm(b - a)
         distance = (points - a) @ [-along[1], along[0]]
-        distances.append(np.where(np.abs(distance) <= EXACT * bounding_size(points), 0.0, distance))
+        distances.append(np.where(np.abs(distance) <= ON * bounding_size(points), 0.0, distance))
     return distances
 
 
@@ -181,7 +182,7 @@ def cable_for(outline: Curve, tension: float, supports: Sequence[Any]) -> float:
     radius = 1.5 * size
     points = np.array([p[:2] for p in supports], dtype=float).reshape(-1, 2)
     t, away = PlanLine("the outline", Kind.OUTLINE, outline).nearest(points)
-    on = np.flatnonzero(away <= EXACT * size)
+    on = np.flatnonzero(away <= ON * size)
     if len(on) > 2:
         corners = points[on[np.argsort(t[on])]]
         before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
@@ -217,7 +218,7 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
             vertices = vertices[np.isin(vertices, inside)]
         heights[vertices] = np.where(np.isnan(heights[vertices]), given, heights[vertices])
         steps = given - heights[vertices]
-        wrong = np.flatnonzero((np.abs(steps) > EXACT * size) & ~np.isin(vertices, loose))
+        wrong = np.flatnonzero((np.abs(steps) > ON * size) & ~np.isin(vertices, loose))
         if len(wrong):
             xy, height, there = (a[wrong[0]] for a in (drawn.points[vertices], given, heights[vertices]))
             problem = f"the support at {point_text(xy)} is at height {height:g}, but the edge or line there"

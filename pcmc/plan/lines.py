@@ -17,7 +17,6 @@ from ..surface.curves import Curve
 from ..surface.geometry import cross_2d
 from ..surface.pieces import point_text
 
-EXACT = 1e-9  # of the size: points and heights nearer to each other than this are one
 SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
 SAG = 1e-3  # of a curve's length: no curve is farther from the chords between its dense points
 BLOCK = 64  # chords of a line that are looked up at once

@@ -12,11 +12,12 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
+from ..base.tolerances import ON
 from ..surface.curves import Curve, arc
 from ..surface.parts import listed
 from ..surface.pieces import Piece
 from ..surface.topology import components
-from .lines import EXACT, Kind, LineTree, PlanLine
+from .lines import Kind, LineTree, PlanLine
 from .strokes import Stroke
 
 
@@ -76,7 +77,7 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
     places[node[alone]] = ends[alone]
     of_node = pd.DataFrame(ends).groupby(node)
     gaps = np.linalg.norm(of_node.max() - of_node.min(), axis=1)
-    gaps[gaps <= EXACT * tolerance] = 0.0
+    gaps[gaps <= ON * tolerance] = 0.0
     moved = []
     for curve, both, old in zip(curves, places[node].reshape(-1, 2, 3), ends.reshape(-1, 2, 3), strict=True):
         steps = both - old
@@ -215,7 +216,7 @@ def _extent(curve: Curve) -> bool:
 
 def _steps(steps: Floats, tolerance: float) -> Floats:
     """(k,3) the steps (k,2) in plan, those to nearly the same place left out."""
-    steps[np.linalg.norm(steps, axis=1) <= EXACT * tolerance] = 0.0
+    steps[np.linalg.norm(steps, axis=1) <= ON * tolerance] = 0.0
     return np.pad(steps, ((0, 0), (0, 1)))
 
 

@@ -13,6 +13,7 @@ import shapely
 from shapely.affinity import affine_transform
 
 from ..base.errors import OptionError, PlanError, unknown
+from ..base.tolerances import ON
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
 from ..surface.values import balanced_wall
@@ -32,7 +33,6 @@ ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
 ABOVE_LEAST = 1.6  # a first tension, over the least at which a roof over the plan exists
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
-SEAM = 1e-9  # of a plan's size: rounding that would leave a gap between it and its image
 MANY, ROUGH = 4000, 1e-5  # curves of more points are simplified, by so much of their length
 NEAR = 1e-4  # of the length of all parts' edges: a part this near to a point of a divider is beside it
 
@@ -99,7 +99,7 @@ def _unfolded(area: Any, mirrors: Sequence[Curve]) -> Any:
         along = (b - a) / np.linalg.norm(b - a)
         turn = 2.0 * np.outer(along, along) - np.eye(2)
         image = affine_transform(area, [*turn.ravel(), *(a - turn @ a)])
-        area = shapely.union_all([area, image], grid_size=SEAM * math.sqrt(area.area))
+        area = shapely.union_all([area, image], grid_size=ON * math.sqrt(area.area))
     return area
 
 

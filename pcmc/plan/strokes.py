@@ -19,6 +19,7 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, PlanError, unknown
 from ..base.files import check_regular, system_error
 from ..base.libraries import read_arrays, require
+from ..base.tolerances import ON
 from ..base.units import MICROMETRES, length_factor, unit_in_file
 from ..base.validate import checked_name
 from ..surface.curves import Curve
@@ -29,7 +30,6 @@ LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
 READERS = {".dxf": "dxf_entities", ".3dm": "rhino_entities"}
 LARGEST = 1e12  # of a coordinate; beyond, the digits of a double are too few for a roof
 HIGHEST_DEGREE = 11  # of a NURBS curve, in Rhino
-ROUNDING = 1e-9  # of a stroke's length: pieces nearer to each other than this are joined
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ def _strokes(entity: Mapping[str, Any], factor: float) -> list[Stroke]:
         size = float(np.linalg.norm(piece.points, axis=1).max())
         if not piece.sweep and np.ptp(piece.points, axis=0).max() <= 1e-14 * size:
             continue  # a point drawn twice in a polyline
-        if runs and np.linalg.norm(before - ends[0]) <= ROUNDING * (size + 1.0):
+        if runs and np.linalg.norm(before - ends[0]) <= ON * (size + 1.0):
             runs[-1].append(replace(piece, points=factor * piece.points))
         else:
             runs.append([replace(piece, points=factor * piece.points)])

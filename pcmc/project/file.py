@@ -14,6 +14,7 @@ import numpy as np
 
 from ..advice.rises import RISES, Rise, mast_note, take_rises, taken, with_rises
 from ..base import validate
+from ..base.arrays import toml
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.libraries import require
@@ -332,9 +333,9 @@ def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: P
         both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
         if not both:
             continue
-        names = [name for parameter in vary for name in parameter.names if name not in own]
-        quoted = ['"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"' for name in names]
-        change = f"type vary = [{', '.join(quoted)}]" if names else "remove vary and its targets"
+        left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
+        others = [replace(parameter, patch=names).plain for parameter, names in left if names]
+        change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
         where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
         text = f"targets.vary: the tension of {both[0]!r} is found for the {rise.kind} of {where}, too;"
         text += f" {change}, or give {where} tension = instead of {rise.kind} ="

@@ -18,7 +18,7 @@ from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..base.errors import FileError
 from ..base.files import check_regular, suffix_of, system_error
 from ..forces.cables import directions
-from ..surface.geometry import area_vectors, unit_vectors
+from ..surface.geometry import area_vectors, segment_lengths, unit_vectors
 from .loads import Step, nothing
 from .model import StructuralModel, expect_model
 
@@ -151,9 +151,11 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
     stresses = np.full((model.surface.m, 3, 3), np.nan)
     stresses[model.faces] = stress.means(model.faces + 1)[:, TENSOR]
     tensions, moved = {}, surface.vertices + displacements
-    for cable, area, _, numbers, _ in model.cable_edges() if "cables" in blocks else ():
+    for cable, area, of, numbers, _ in model.cable_edges() if "cables" in blocks else ():
         mine, along = blocks["cables"].means(numbers)[:, TENSOR], directions(moved, cable.edges)[0]
-        tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
+        stretch = segment_lengths(moved, cable.edges) / segment_lengths(surface.vertices, cable.edges)
+        section = area * (1.0 - of.poisson * (stretch**2 - 1.0))  # as far as it is drawn in
+        tensions[cable.name] = section * np.einsum("ki,kij,kj->k", along, mine, along)
     done = 1.0 if share >= 1.0 - WHOLE else share
     taut = min(_taut(model, k, tables), done)
     return StepResults(step.name, model, displacements, reactions, stresses, tensions, step, done, taut)

@@ -9,6 +9,7 @@ from scipy.spatial import Delaunay
 
 from generators import spherical_cap
 from pcmc import MeshVerdict, Patch, Plane, Room, Surface, certify, check_mesh, solve, solve_to_accuracy
+from pcmc.accuracy import mesh_check
 from pcmc.accuracy.adaptive import AccuracyStatus
 from pcmc.accuracy.extrapolation import extrapolate
 from pcmc.accuracy.quantities import readings
@@ -70,6 +71,24 @@ def test_a_curve_of_few_edges_may_have_no_corners(seed):
     row, exact = check_mesh(solve(film)).row("area", "film"), np.pi * (1.0 + 0.5 * 0.15**2)
     assert abs(row.value - exact) <= row.error
     assert abs(row.limit - exact) <= row.limit_error
+
+
+def test_doubts_are_known_where_finer_meshes_come_to_rest_downhill_alone(monkeypatch):
+    """They were solved in one way alone, and all bars were infinite."""
+    case = FORMS["Scherk", SCHERK[0]]
+    film = solve(case.start())
+    usual = check_mesh(film, 2, corners=case.corners)
+    solve_once = mesh_check.solve_once
+
+    def lame(start, method, callback, target, iterations):
+        return solve_once(
+            start, method, callback, target=target, iterations=iterations * (target == "minimum")
+        )
+
+    monkeypatch.setattr(mesh_check, "solve_once", lame)
+    downhill = check_mesh(film, 2, corners=case.corners)
+    assert usual.curve_doubts
+    assert downhill.curve_doubts == pytest.approx(usual.curve_doubts, rel=1e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize("sides", [5, 6, 8])

@@ -111,7 +111,14 @@ def test_the_command_takes_a_rise(given, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("vary", "line"),
-    [('["west", "east"]', 'type vary = ["east"]'), ('["west"]', "remove vary and its targets")],
+    [
+        ('["west", "east"]', 'type vary = ["east"]'),
+        ('["west"]', "remove vary and its targets"),
+        (
+            '["west", {patch = "west", kind = "pressure", low = 0.5}]',
+            'type vary = [{patch = "west", kind = "pressure", low = 0.5}], or give',
+        ),
+    ],
 )
 def test_a_tension_is_found_for_a_rise_or_for_the_targets(tmp_path, vary, line):
     path = tmp_path / "roof.toml"
