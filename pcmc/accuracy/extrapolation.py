@@ -17,7 +17,7 @@ from ..base.arrays import Bools, Floats
 USUAL = 2.0  # order of smooth surfaces on triangles
 LOWEST, HIGHEST = 0.25, 4.0  # orders between which the observed one is used
 SAFETY = 2.0  # times the distance of two extrapolations
-UNSETTLED = 1.5  # order of the surface's own moves below which quantities are not believed more
+UNSETTLED = 1.5  # order of the surface's own moves up to which quantities are not believed more
 FAST = 2.5  # an order above is a coincidence: on triangles no error shrinks so fast for long
 LEAST = 0.05  # of the last correction: least uncertainty of the limit, as equal orders may be a coincidence
 
@@ -66,7 +66,7 @@ def extrapolate(
     value : (q,) the values whose bars are wanted, by default the first estimates; of the same limit.
     shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh: what
         corners, ends of junctions, contact or uneven triangles let it have. A quantity may owe a better one
-        to errors that cancel. With S = 2^s the last difference would leave d_2 / (S - 1). Below 1.5 the
+        to errors that cancel. With S = 2^s the last difference would leave d_2 / (S - 1). Up to 1.5 the
         bar is also at least what |d_1| / (S (S - 1)), the rest where d_1 shrinks by S with each mesh, and
         |limit - q_2| differ by. If s ≤ 0, no limit is in sight. It counts where s < 2.
     doubt : (q,) how far limits may be off as the curves of the boundary are not known; added to the bars.
@@ -93,7 +93,7 @@ def extrapolate(
         order, limit, bar = _three(q[-1], steps[-2], steps[-1], rounding, min(shape_order, USUAL))
     if shape_order <= 0.0:
         bar = np.full_like(none, np.inf)
-    elif shape_order < UNSETTLED and len(steps) > 1:
+    elif shape_order <= UNSETTLED and len(steps) > 1:
         left = np.abs(steps[-2]) / (2.0**shape_order * (2.0**shape_order - 1.0))
         bar = np.maximum(bar, np.abs(left - np.abs(limit - q[-1])))
     limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar) + doubt

@@ -16,6 +16,7 @@ from ..certificate.balance import overload
 from ..certificate.diagnosis import worst_face
 from ..certificate.tables import names_of
 from ..forces.pinching import standing_part
+from ..forces.wall_rows import find_walls
 from ..solvers.result import Result, Status
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
@@ -27,6 +28,7 @@ FLAT = 0.1  # of its size: the least extent that counts
 STILL = 1e-8  # of its size: moves up to here are none
 MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no trend (0.7 and more where
 # the mesh holds a surface, 0.15 to 2 where it converges, below 0.03 on meshes of symmetric minimal surfaces)
+CONTACT = 1.5  # order where a rest ends: beside it a junction rises as the distance to the power of 3/2
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
 FURTHER = 3  # meshes ahead at which an eigenvalue that only falls is foreseen
@@ -104,8 +106,33 @@ def shape_order(surfaces: Sequence[Surface]) -> float:
     Infinite with fewer than three meshes, or where the last move is none beside the error of the shape: a
     coarse mesh may be at rest on the smooth surface itself, so that first moves are small and later ones
     larger. The error is how far the last refinement's new vertices are from the middles of their edges.
+    At most 3/2 where a junction rests on its bottom, or will on finer meshes: that where its rest ends.
     """
-    return _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
+    order = _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
+    return min(order, CONTACT) if len(surfaces) > 2 and _comes_to_rest(*surfaces[-2:]) else order
+
+
+def _comes_to_rest(coarse: Surface, fine: Surface) -> bool:
+    """Whether a junction rests on its bottom, or may on finer meshes: at an end it rises less than before.
+
+    There it rises as c s - k s log(1/s): by k log 2 less on each finer mesh, until it rests.
+    """
+    if coarse.periodic:
+        return False
+    slopes = [_end_slopes(surface)[: coarse.n] for surface in (coarse, fine)]
+    return bool(standing_part(fine).resting.any() or (slopes[1] < slopes[0]).any())
+
+
+def _end_slopes(surface: Surface) -> Floats:
+    """(n,) how steeply junctions rise at their ends on Π, the least of several; infinite elsewhere."""
+    X, walls = surface.vertices, find_walls(surface, held=True)
+    pairs = np.concatenate([walls.top_edges, walls.top_edges[:, ::-1]])
+    end, top = pairs[walls.corner[pairs[:, 0]] & walls.top_free[pairs[:, 1]]].T
+    rise = surface.plane.height(X[top])
+    run = np.linalg.norm(surface.plane.along(X[top] - X[end]), axis=1)
+    slopes = np.full(surface.n, np.inf)
+    np.minimum.at(slopes, end, np.abs(rise) / run)
+    return slopes
 
 
 def _order(surfaces: Sequence[Surface], moves: Sequence[Floats]) -> float:

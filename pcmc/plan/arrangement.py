@@ -63,7 +63,8 @@ def arrange(
         ends = [] if line.curve.closed else [0.0, float(len(line.curve.pieces))]
         cuts += [[(k, t)] for t in (*ends, *line.curve.corners.tolist())]
     tree = LineTree(lines)
-    cuts += [*tree.crossings(), *_ends(tree, snap)]
+    corners = np.concatenate([line.curve.at(line.curve.corners)[:, :2] for line in lines])
+    cuts += [*tree.crossings(), *_ends(tree, snap), *tree.at(corners, snap)]  # a corner may touch a line
     xy = required_points[:, :2]
     passing = tree.at(xy, snap)
     for point, places, within in zip(xy, passing, shapely.contains_xy(tree.area, xy), strict=True):

@@ -65,7 +65,6 @@ def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
     assert page.complaints() == []
 
 
-@pytest.mark.nightly
 def test_a_number_may_have_a_decimal_comma_and_what_is_none_is_not_taken(page):
     name = "Tension α of left wall"
     page.enter(name, "10,5")
@@ -78,6 +77,7 @@ def test_a_number_may_have_a_decimal_comma_and_what_is_none_is_not_taken(page):
     assert page.complaints() == []
 
 
+@pytest.mark.nightly
 def test_dragging_a_slider_with_the_mouse_is_one_step(page):
     from selenium.webdriver import ActionChains
 

@@ -8,7 +8,7 @@ import pytest
 from pcmc import Direction, Parameter, Plane, Surface, Target, Verdict, certify, follow, meet, solve
 from pcmc.base.errors import PlanError, PlanWarning
 from pcmc.forces.functional import patch_areas
-from pcmc.meshing.planar import triangulate
+from pcmc.meshing.planar import signed_areas, triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Divider, Hole, PatchSpec, Plan, draft, patch_names, plan_from
 from pcmc.plan.build import dome, harmonic_heights
@@ -365,3 +365,15 @@ def test_a_cushion_needs_a_fixed_rim_and_air(more):
     with pytest.raises(PlanError, match=says) as refused:
         plan.surface()
     assert "\n" not in str(refused.value)
+
+
+def test_a_corner_that_touches_a_line_cuts_it():
+    """A divider passes the corner of a hole without entering it: both have one vertex there."""
+    hole, across = [[4, 2], [4.4, 2], [4, 2.4]], [[0, 0], [10, 6]]
+    mesh = drafted(
+        Plan([[0, 0], [10, 0], [10, 6], [0, 6]], [across], [hole], tension=4.0, edge_length=0.4)
+    ).mesh
+    A, B, C = np.moveaxis(mesh.points[mesh.triangles], 1, 0)
+    longest = np.max([np.sum((B - A) ** 2, axis=1), np.sum((C - B) ** 2, axis=1)], axis=0)
+    assert (signed_areas(mesh.points, mesh.triangles) > 0.05 * longest).all()
+    assert mesh.region.max() == 1

@@ -70,12 +70,14 @@ class Tracer:
         self.rows: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
         self.surfaces: dict[int, Surface] = {}
-        self.arclength, self.held = 0.0, False  # walls with held bottoms pinch once the branch is lost
+        self.arclength, self.held = 0.0, False  # whether walls with held bottoms can pinch
         self.here = first or self.first_point(self.mesh(surface))
 
     def mesh(self, surface: Surface) -> BranchMesh:
-        """A mesh of the branch."""
-        return BranchMesh(surface, self.line, self.options.backend, self.held)
+        """A mesh of the branch; where walls with held bottoms have pinched once, they can from then on."""
+        mesh = BranchMesh(surface, self.line, self.options.backend, self.held)
+        self.held = self.held or bool(mesh.part.walls.held.any())
+        return mesh
 
     def first_point(self, mesh: BranchMesh) -> BranchPoint:
         """The surface given, corrected to the tolerance."""
@@ -235,9 +237,10 @@ class Tracer:
 
     def let_held_walls_pinch(self) -> bool:
         """From here on let walls come down on held bottoms; False if none can, or they already do."""
-        if self.held or self.here.state.mesh.part.walls.held.any():
+        here = self.here.state
+        if self.held or here.mesh.surface.periodic:
             return False
-        self.held, here = True, self.here.state
+        self.held = True
         mesh = self.mesh(here.whole)
         if mesh.part.walls.held.any():
             start = BranchState(mesh, mesh.surface.vertices, here.parameter)

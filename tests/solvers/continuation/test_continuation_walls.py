@@ -179,3 +179,15 @@ def test_a_branch_goes_on_where_a_junction_comes_down_on_a_held_bottom(upright):
     direct = solve(start.retensioned({"wall 1": end}))
     assert standing_part(direct.surface).resting.sum() == 2
     assert branch.points.energy.iloc[-1] == pytest.approx(direct.energy, rel=2e-4)  # triangles lie otherwise
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_branch_goes_on_where_the_last_vertex_lifts_off_a_held_bottom(upright):
+    """No vertex that rests shows any longer that the wall can pinch; it is low, and counts for no quality."""
+    start = solve(hall(4.0, 6.0, upright)).surface
+    branch = follow(start, "wall 1", 3.4)
+    assert branch.ending is Ending.REACHED
+    resting = [int(standing_part(surface).resting.sum()) for surface in branch.surfaces.values()]
+    assert resting[0] == 9 > 0 == resting[-1]
+    direct = solve(start.retensioned({"wall 1": 3.4}))
+    assert branch.points.energy.iloc[-1] == pytest.approx(direct.energy, rel=1e-4)
