@@ -6,7 +6,7 @@ depends on the mesh, and on some meshes it comes to rest, on others not. A ring 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from ..base.tolerances import ON
 from ..plan import Divider, Hole, Plan, patch_names
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
+from ..plan.parts import BALANCED
 from ..surface import checks
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
@@ -126,7 +127,16 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         plan = _retensioned(plan, rise.patch, least, height - lowest)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
+    if any(divider.wall != BALANCED for divider in plan.dividers):
+        plan = _levelled(plan, {rise.patch for rise in rises})
     return plan, targets, vary
+
+
+def _levelled(plan: Plan, names: Container[str | None]) -> Plan:
+    """The plan with the largest of some patches' tensions in all of these, which any wall balances."""
+    most = max((area.tension for area in plan.patches if area.name in names), default=0.0)
+    areas = [replace(area, tension=most) if area.name in names else area for area in plan.patches]
+    return replace(plan, patches=areas)
 
 
 def net_pressures(plan: Plan) -> dict[str, float]:

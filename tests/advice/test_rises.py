@@ -63,6 +63,16 @@ def test_each_patch_may_have_its_own_rise(given):
     assert (apex(outcome, "west"), apex(outcome, "east")) == pytest.approx((1.5, 1.0), rel=1e-6)
 
 
+def test_a_typed_wall_need_not_balance_the_first_tensions_of_heights(given):
+    """They are 4 and 8, those found 4 and 6: with a wall of 2 there was "no stable roof"."""
+    patches = "[plan.patches]\nwest = {rise = 2.0}\neast = {rise = 1.0}\n"
+    divider = "dividers = [{curve = [[9, 0], [9, 8]], wall = 2.0}]\n"
+    outline = "[plan]\nedge_length = 1.0\noutline = [[0, 0], [16, 0], [16, 8], [0, 8]]\n"
+    outcome = run_project(given(outline + divider + patches), use_cache=False)
+    assert outcome.good
+    assert (apex(outcome, "west"), apex(outcome, "east")) == pytest.approx((2.0, 1.0), rel=1e-6)
+
+
 def test_one_rise_for_all_gives_them_one_tension(given, monkeypatch):
     with monkeypatch.context() as without:
         without.setattr("pcmc.plan.draft.triangulate", None)  # loading meshes nothing
