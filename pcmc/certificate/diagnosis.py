@@ -16,6 +16,7 @@ from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
 from ..surface.pieces import point_text
+from ..surface.supports import members
 from .forces import held_boundary
 from .tables import names_of
 
@@ -276,11 +277,9 @@ def slipping_rings(surface: Surface, mode: Floats) -> list[str]:
     A junction from mirror to mirror is closed, too, or has no end.
     """
     motion, names = np.linalg.norm(mode, axis=1), list[str]()
-    mirrored = np.zeros(surface.n, dtype=bool)
-    for plane, mask in surface.on_planes:
-        mirrored |= plane.mirror & mask
+    in_mirror = members([pair for pair in surface.on_planes if pair[0].mirror], surface.n)
     for curve in surface.topology.junctions:
-        closed = all(mirrored[end] for end, _ in curve.ends)
+        closed = all(in_mirror[end] for end, _ in curve.ends)
         if closed and motion[curve.vertices].max() >= SLIPS * motion.max() > 0.0:
             for wall in (i for i in curve.sheets if surface.walls[i]):
                 F = surface.faces[surface.patch_of_face == wall]

@@ -14,6 +14,7 @@ import pandas as pd
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..base.libraries import load_library
+from ..base.tolerances import ON
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..drawings import DrawingSet, Sheet
 from ..drawings.drawing_set import CSV, document_files
@@ -28,7 +29,6 @@ LAYER_OF = {"seam": "PCMC-SEAM", "junction": "PCMC-RIDGE", "mirror": "PCMC-SEAM"
 PER_SHEET = 4  # strips drawn to scale on a sheet
 LETTERS, GAP = 40.0, 150.0  # mm: height of labels at true size; between strips there
 MITRE = 3.0  # of an allowance: so far from a corner cloth is cut across, if the lines outside meet farther
-SLIT = 1e-9  # of a strip's size: a narrower slit is one of rounding
 MOST_NOTCHES = 1000  # on a seam; more mean a mistake in the unit
 ARROW = 0.3  # of a strip's length: the arrow of its warp
 
@@ -187,7 +187,7 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
                 tips = [n + (most - begin) / (far - begin) * (tip - n) for n, begin in short]
             parts.append(shapely.Polygon(v + np.array([0.0 * v, out[k - 1], *tips, out[k]])))
     # along a straight side rounding leaves slits between the parts, which close where they grow by as little
-    little = SLIT * float(np.ptp(strip.cut, axis=0).max())
+    little = ON * float(np.ptp(strip.cut, axis=0).max())
     cloth = shapely.union_all(parts).buffer(little, join_style="mitre").buffer(-little, join_style="mitre")
     # corners that point across the warp reach no farther than seams do: else the strip would be too wide
     (left, _, right, _), most = cloth.bounds, max(added.values())

@@ -78,6 +78,8 @@ def write(
     expect_surface(surface)
     known: Any = getattr(solved, "certificate", None) if certificate is None else certificate
     mark = (known.get("mark") if isinstance(known, Mapping) else getattr(known, "mark", "")) or mark
+    if not (isinstance(mark, str) and mark.isprintable()):
+        refuse("mark", mark, "a text of one line")
     if form.certificate:
         certificate = known
     if not isinstance(scalars, Mapping | None):

@@ -77,6 +77,7 @@ CASES = [
     *((lambda v: pcmc.margin(FILM, "pressure", certificate=v), (v,)) for v in (5, "x", NAN)),
     *((lambda v: pcmc.fewer_families(FILM, 0.1, 0.1, anyway=True, callback=v), (v,)) for v in (5, NAN)),
     *((lambda v: pcmc.read(GRADED, plane=v), (v,)) for v in (5, "x", NAN)),
+    *((lambda v: pcmc.write("film.obj", FILM, mark=v), (v,)) for v in (5, "a\nv 1 2 3")),
 ]
 
 
