@@ -114,11 +114,9 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
         if height - lowest <= ON * plan.outline.length:
-            where = f"of {rise.patch!r} " if rise.patch else ""
-            text = (
-                f"{rise.kind} {where}is {height:g} over the plane, and the outline is at {lowest:g} and more;"
-            )
-            raise OptionError(f"{text} give a greater one", what=rise.kind, where=rise.patch, found=height)
+            of = f" of {rise.patch!r}" if rise.patch else ""
+            text = f"{rise.kind}{of} is {height:g} over the plane, and the outline is at {lowest:g} and more"
+            raise OptionError(f"{text}; give a greater one", what=rise.kind, where=rise.patch, found=height)
         names: str | list[str] = rise.patch or [
             name for name in patch_names(plan) if loads.get(name, plan.pressure - plan.snow)
         ]

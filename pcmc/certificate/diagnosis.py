@@ -271,10 +271,17 @@ def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
 
 
 def slipping_rings(surface: Surface, mode: Floats) -> list[str]:
-    """The walls below closed junctions that slip in a mode (n,3): nothing holds their sliding bottoms."""
+    """The walls below closed junctions that slip in a mode (n,3): nothing holds their sliding bottoms.
+
+    A junction from mirror to mirror is closed, too, or has no end.
+    """
     motion, names = np.linalg.norm(mode, axis=1), list[str]()
+    mirrored = np.zeros(surface.n, dtype=bool)
+    for plane, mask in surface.on_planes:
+        mirrored |= plane.mirror & mask
     for curve in surface.topology.junctions:
-        if curve.closed and motion[curve.vertices].max() >= SLIPS * motion.max() > 0.0:
+        closed = all(mirrored[end] for end, _ in curve.ends)
+        if closed and motion[curve.vertices].max() >= SLIPS * motion.max() > 0.0:
             for wall in (i for i in curve.sheets if surface.walls[i]):
                 F = surface.faces[surface.patch_of_face == wall]
                 if surface.on_ground[F].any() and not surface.pinned[F].any():
@@ -295,7 +302,7 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     part = f"the junction {names_of(surface, curves[0].sheets)}" if curves else part
     text += f"; the mode moves {part} most, near {point_text(surface.vertices[most], surface.size)}"
     if rings := " and of ".join(map(repr, slipping_rings(surface, mode))):
-        text += f"; the ring of {rings} slips: hold its bottom ({KEY.format('held')})"
+        text += f"; the bottom of {rings} slips: hold it ({KEY.format('held')})"
     ends = slipping_ends(surface, mode)
     if not ends:
         return text

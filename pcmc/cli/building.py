@@ -331,7 +331,7 @@ def structure(
         model = roof.model(wanted, build.allow_uncertified)
         jobs = [model_job(roof, output, model)]
         analysis = analyse(model, progress=progress) if run else None
-        jobs += analysis_jobs(output, analysis) if analysis is not None else []
+        jobs += analysis_jobs(roof, output, analysis) if analysis is not None else []
         written = write_all(jobs, progress)
     if model.note:
         print(model.note)

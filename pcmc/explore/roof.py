@@ -6,7 +6,7 @@ import os
 import re
 import threading
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -69,6 +69,12 @@ class ShownRoof:
         """The targets of its project, and what may vary for them."""
         project = self.project
         return ((), ()) if project is None else (tuple(project.targets), tuple(project.vary))
+
+    def meets(self, surface: Surface, targets: Sequence[Target]) -> bool:
+        """Whether a surface meets targets, to the project's tolerance where it is a wider one."""
+        most = max(HELD, (self.project and self.project.target_tolerance) or 0.0)
+        values = [(target, measure(surface, target).value) for target in targets]
+        return all(abs(value - t.nearest(value)) <= most * t.scale(surface) for t, value in values)
 
     @cached_property
     def note(self) -> str:
@@ -252,15 +258,15 @@ def project_with(
     document, data = tomlkit.parse(text), tomllib.loads(text)
     given, note, dropped, found = data.get("targets"), "", "", {}
     kept: Aims = roof.aims
-    if aims is not None and aims != kept and _meets(surface, aims[0]):
+    if aims is not None and aims != kept and roof.meets(surface, aims[0]):
         kept, points = aims, data["plan"].get("points", {})
         entries = [_target(target, points) for target in aims[0]]
         found = {"meet": entries, "vary": [p.plain for p in aims[1]]}
         data.pop("targets", None)  # until a rise that these replace is a tension
         note = f"with its targets: {', '.join(t.label for t in aims[0])}"
-    elif not _meets(surface, roof.aims[0]):
+    elif not roof.meets(surface, roof.aims[0]):
         kept = (), ()
-        labels = ", ".join(t.label for t in roof.aims[0] if not _meets(surface, (t,)))
+        labels = ", ".join(t.label for t in roof.aims[0] if not roof.meets(surface, (t,)))
         if given is not None:
             del data["targets"]
             dropped = tomlkit.dumps({"targets": document["targets"]}).strip()
@@ -303,11 +309,6 @@ def _renamed(name: str, old: str, new: str) -> str:
     path = Path(name)
     rest = path.name.removeprefix(old) if path.name.startswith(old) else f"-{path.name}"
     return path.with_name(new + rest).as_posix()
-
-
-def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
-    values = [(target, measure(surface, target).value) for target in targets]
-    return all(abs(value - t.nearest(value)) <= HELD * t.scale(surface) for t, value in values)
 
 
 def _target(target: Target, points: Mapping[str, Any]) -> dict[str, Any]:

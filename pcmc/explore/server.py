@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import FileWarning, SurfaceError, unknown
+from ..drawings.sheet import MISSED
 from ..io import FORMATS
 from ..project import load
 from ..project.members import has_members, members_drawn, members_filed
@@ -207,9 +208,11 @@ class Explorer:
         known = {(False, "certificate"): state.certificate}
         outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known=known)
         members = members_filed(outcome) if FORMATS[suffix].members else {}
+        targets, _ = state.aims or roof.aims
+        mark = "" if roof.meets(state.surface, targets) else MISSED
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
-            for file, write in certified_files(*outcome.shown, [path], outcome.units, "", members):
+            for file, write in certified_files(*outcome.shown, [path], outcome.units, "", members, mark):
                 write(file)
             return f"{roof.name}{suffix}", path.read_bytes()
 

@@ -35,9 +35,8 @@ from .motion_space import MotionSpace, VertexClasses, vertex_classes
 from .triangles import effective_tensions
 from .wall_rows import WallRows, Walls, find_walls
 
-STILL = (
-    1e-3  # of a wall's height: where its top edge moves by less, its rows stay, or Newton would not converge
-)
+# of a wall's height: where its top edge moves by less, its rows stay, or Newton would not converge
+STILL = 1e-3
 WEISZFELD = 30  # steps to the direction of the largest pull where walls meet
 
 

@@ -120,9 +120,8 @@ def write(
         findings = {name: getattr(certificate, name) for name in findings.FILED}
     if findings:
         findings = {**findings, "mark": mark}
-    content = Content(
-        metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {}, mark
-    )
+    areas = cable_areas or {}
+    content = Content(metadata, carried, colour, findings, walls, units, bare, members, areas, mark)
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
             text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"

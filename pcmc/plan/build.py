@@ -107,9 +107,8 @@ def _check_cushion(plan: Plan) -> None:
     bad = [f'{name} has edge = "{edge}"; make it "fixed"' for name, edge in edges.items() if edge != "fixed"]
     bad += [f"divider {d.name!r} has a wall; type wall = false" for d in plan.dividers if d.wall is not None]
     bad += [f"divider {d.name!r} has a cable; leave it out" for d in plan.dividers if d.cable is not None]
-    bad += [
-        f"the plan has {key}; leave them out" for key in ("cables", "rooms", "supports") if getattr(plan, key)
-    ]
+    parts = ("cables", "rooms", "supports")
+    bad += [f"the plan has {key}; leave them out" for key in parts if getattr(plan, key)]
     bad += [f"patch {p.name!r} has a volume; give it a pressure instead" for p in plan.patches if p.volume]
     pressures = {f"patch {p.name!r}": p.pressure for p in plan.patches} or {"the plan": plan.pressure}
     bad += [f"{of} has the pressure {p:g}; give one above 0" for of, p in pressures.items() if p <= 0.0]

@@ -193,10 +193,9 @@ class PatchSpec:
 def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
     """A Curve from plain data; ``what`` names it in errors."""
     if isinstance(spec, list) and len(spec) in (2, 3) and all(isinstance(x, int | float) for x in spec):
-        message = (
-            f"{what}: {spec} is a point; a curve has two or more, [[x, y], [x, y]], and a list of curves"
-        )
-        raise OptionError(f"{message} is [[[x, y], [x, y]], ...]", what=what, found=spec)
+        message = f"{what}: {spec} is a point; a curve has two or more, [[x, y], [x, y]]"
+        message += ", and a list of curves is [[[x, y], [x, y]], ...]"
+        raise OptionError(message, what=what, found=spec)
     try:
         return curve(spec, closed=closed)
     except OptionError as error:

@@ -151,10 +151,8 @@ class Plan:
                 problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"
                 raise OptionError(f"{problem} give it to each of the patches", what=key)
         if self.snow and self.patches and all(patch.snow is not None for patch in self.patches):
-            problem = f"snow = {self.snow:g} of the plan counts for nothing, as each patch has its own;"
-            raise OptionError(
-                f"{problem} leave it out, or leave it out of a patch", what="snow", found=self.snow
-            )
+            problem = f"snow = {self.snow:g} of the plan counts for nothing, as each patch has its own; leave"
+            raise OptionError(f"{problem} it out, here or of a patch", what="snow", found=self.snow)
         names = [d.name for d in self.dividers if d.wall is not None] + [p.name for p in self.patches]
         names += [d.name for d in self.dividers if d.wall is None and d.cable is not None]
         names += dict.fromkeys(c.name for c in self.cables if c.name)

@@ -176,7 +176,7 @@ def compose(
     colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
     heights = [frame.size[1] for frame in frames[::columns]]
     figure = new(width, sum(heights) + 100.0, pad=0.0)
-    if any(drawing.title for drawing in drawings):
+    if mark or any(drawing.title for drawing in drawings):
         figure.get_layout_engine().set(h_pad=ABOVE / DPI)
     axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):
@@ -194,8 +194,7 @@ def compose(
     if legend:
         add_picture_legend(figure, list(zip(drawings, dotted, images, strict=True)))
     if mark:
-        look = {"va": "top", "color": RED, "weight": "bold", "fontsize": TEXT}
-        figure.text(0.01, 1.0 - 4.0 / figure.bbox.height, mark, **look)
+        figure.suptitle(mark, x=0.01, ha="left", color=RED, weight="bold", fontsize=TEXT)
     if foot:
         figure.supxlabel(foot, fontsize=2.0 * SMALL)
     first = zip(axes[::columns], frames[::columns], strict=True)

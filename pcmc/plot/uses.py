@@ -12,7 +12,7 @@ from ..base.units import NO_UNITS, Units
 from ..surface import Patch, Surface
 from .curves import add_branches, add_legend, label_axes
 from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, grid, new, style
-from .pictures import draw, panel
+from .pictures import RED, draw, panel
 
 if TYPE_CHECKING:
     from ..cloth import CuttingPattern
@@ -97,6 +97,7 @@ def member_forces(
     cases: tuple[str, ...] = (),
     members: tuple[str, ...] = (),
     units: Units | None = None,
+    mark: str = "",
     width: int = 900,
 ) -> Image:
     """N, V and M along the beams of a roof under its cases; see ``pcmc.analyse``.
@@ -110,6 +111,7 @@ def member_forces(
         displacements, six at most.
     members : names of the beams; by default those with the largest moments, six at most.
     units : of the axes; by default those of the model.
+    mark : a text in the corner, of a roof that is not in order.
 
     Raises
     ------
@@ -149,6 +151,8 @@ def member_forces(
     handles, labels = axes[0].get_legend_handles_labels()
     look = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4), **look)
+    if mark:
+        figure.suptitle(mark, x=0.01, ha="left", color=RED, weight="bold", fontsize=TEXT)
     return finish(figure, path)
 
 

@@ -68,10 +68,8 @@ def _check_range(text: str, value: Any, place: Place) -> None:
 def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
     if not isinstance(table, Mapping):
         above, below = ".".join(place[:-2]), ".".join(place[:-1])
-        misplaced = place[-1] in [
-            key.name for one in main_sections() if one.name == above for key in one.keys
-        ]
-        hint = f"; as a key of [{above}] it stands above [{below}]" if misplaced else ""
+        keys = [key.name for one in main_sections() if one.name == above for key in one.keys]
+        hint = f"; as a key of [{above}] it stands above [{below}]" if place[-1] in keys else ""
         raise _wrong_kind(text, place, table, "a table", hint)
     known = {key.name: key for key in section.keys}
     title = f"[{'.'.join(place)}]" if place else "the project"

@@ -86,12 +86,8 @@ class Project:
     @property
     def where_to_type(self) -> str:
         """How a line begins that says what to type; of a drawing alone, which command writes its project."""
-        name = self.path.with_suffix(TOML).name
-        return (
-            f"type in {name}"
-            if self.has_file
-            else f"write a project ({self.plan_command}) and type in {name}"
-        )
+        here = f"type in {self.path.with_suffix(TOML).name}"
+        return here if self.has_file else f"write a project ({self.plan_command}) and {here}"
 
     @property
     def plan_command(self) -> str:

@@ -66,7 +66,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
             add("structural model", [model_job(outcome, Path(output.structure), model)])
         analysis = outcome.analysis(anyway, progress)
         if output.structure is not None and analysis is not None:
-            add("under load", analysis_jobs(Path(output.structure), analysis))
+            add("under load", analysis_jobs(outcome, Path(output.structure), analysis))
         if project.pattern is not None and (output.pattern or output.report):
             progress("cutting strips")
             pattern = outcome.cutting_pattern(project.pattern, anyway)
@@ -184,14 +184,16 @@ def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
     return path, partial(write_structure, model=model, mark=outcome.mark)
 
 
-def analysis_jobs(path: Path, analysis: Analysis) -> FileJobs:
+def analysis_jobs(outcome: Outcome, path: Path, analysis: Analysis) -> FileJobs:
     """The tables and pictures of an analysis beside the structural model."""
     from ..plot import member_forces, under_load  # needs the extra plot
 
     pictures: dict[str, Any] = {"cases": under_load}
     pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
     tables = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
-    jobs = tables | {f"{name}.png": partial(draw, analysis) for name, draw in pictures.items()}
+    jobs = tables | {
+        f"{name}.png": partial(draw, analysis, mark=outcome.mark) for name, draw in pictures.items()
+    }
     return [(path.with_name(f"{path.stem}-{name}"), write) for name, write in jobs.items()]
 
 
@@ -217,11 +219,11 @@ def draw_picture(
     if colour == "reactions":
         reactions(surface, path, view=views[0], units=units, mark=mark)
         return
-    look: dict[str, Any] = {"legend": True, "mark": mark}
+    look: dict[str, Any] = {"mark": mark, "legend": colour not in ("curvature", "error")}
     if colour == "curvature":
-        look = {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
+        look |= {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
     elif colour == "error":
-        look = {"scalars": curvature_error(surface), "label": "curvature error"}
+        look |= {"scalars": curvature_error(surface), "label": "curvature error"}
     if len(views) == 1:
         draw(surface, path, view=views[0], **look)
     else:

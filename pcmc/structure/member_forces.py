@@ -132,10 +132,12 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
     s = model.standing
     X = s.vertices if found is None else s.vertices + np.nan_to_num(found.displacements)
     faces = s.faces[model.active]
-    thickness = model.thicknesses[s.patch_of_face[model.active], None, None]
-    tensors = model.stresses if found is None else found.stresses[model.faces]
+    if found is None:
+        thickness, tensors = model.thicknesses[s.patch_of_face[model.active]], model.stresses
+    else:
+        thickness, tensors = found.thicknesses[model.faces], found.stresses[model.faces]
     forces = model.nodal_loads(step, X - s.vertices)
-    forces += vertex_sums(corner_forces(X[faces], thickness * tensors), faces, s.n)
+    forces += vertex_sums(corner_forces(X[faces], thickness[:, None, None] * tensors), faces, s.n)
     for cable in s.cables:
         pull = pull_along(s, cable, cable.edges) if found is None else found.cable_tensions[cable.name]
         along = pull[:, None] * directions(X, cable.edges)[0]

@@ -54,16 +54,36 @@ class StepResults:
     def principal_stresses(self) -> Floats:
         """(m,2) the two principal membrane stresses in each face's plane under the loads, ascending,
         force/area."""
-        shown = np.flatnonzero(np.isfinite(self.stresses).all(axis=(1, 2)))
-        surface = self.model.surface
-        values, X = np.full((surface.m, 2), np.nan), surface.vertices + self.displacements
-        values[shown] = _in_planes(X[surface.faces[shown]], self.stresses[shown])
+        values = np.full((self.model.surface.m, 2), np.nan)
+        values[self.model.faces] = _in_planes(self._corners, self.stresses[self.model.faces])
+        return values
+
+    @property
+    def _corners(self) -> Floats:
+        """(e,3,3) the corners of the elements under the loads."""
+        standing = self.model.standing
+        return (standing.vertices + self.displacements)[standing.faces[self.model.active]]
+
+    @cached_array
+    def thicknesses(self) -> Floats:
+        """(m,) thickness of each face under the loads, t √(1 - ν (tr C - 2) / (1 - ν)), length.
+
+        C is the right Cauchy-Green tensor in its plane: stretched sheets are drawn in. Cloth keeps its t.
+        """
+        model, standing = self.model, self.model.standing
+        faces, patch = standing.faces[model.active], standing.patch_of_face[model.active]
+        before, after = (P[:, 1:] - P[:, :1] for P in (standing.vertices[faces], self._corners))
+        metric, stretched = before @ before.swapaxes(1, 2), after @ after.swapaxes(1, 2)
+        thinner = [0.0 if of.cloth else of.poisson / (1.0 - of.poisson) for of in model.materials]
+        growth = np.trace(np.linalg.solve(metric, stretched), axis1=1, axis2=2) - 2.0
+        values = model.thicknesses[model.surface.patch_of_face]
+        values[model.faces] *= np.sqrt(1.0 - np.array(thinner)[patch] * growth)
         return values
 
     @cached_array
     def principal_forces(self) -> Floats:
         """(m,2) the principal stresses times the thickness, force/length, to compare with the tension α."""
-        return self.principal_stresses * self.model.thicknesses[self.model.surface.patch_of_face, None]
+        return self.principal_stresses * self.thicknesses[:, None]
 
     @cached_array
     def slack(self) -> Bools:
@@ -164,12 +184,12 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
 def _taut(model: StructuralModel, k: int, tables: list[Tables]) -> float:
     """The time in step k at which the first face gets slack, by lines through the least principal stress at
     the increments, from the end of the step before on; 1 if none does."""
-    places, faces = np.full((model.surface.n, 3), np.nan), model.surface.faces[model.faces]
+    places, faces = np.full((model.surface.n, 3), np.nan), model.standing.faces[model.active]
     least = [] if k else [(0.0, float(model.prestress.min()))]
     last = {kind: blocks[-1:] for kind, blocks in tables[k - 1].items()} if k else {}
     both = [last.get(kind, []) + tables[k][kind] for kind in ("displacements", "stresses")]
     for moved, block in zip(*both, strict=True):
-        places[moved.ids - 1] = model.surface.vertices[moved.ids - 1] + moved.values
+        places[moved.ids - 1] = model.standing.vertices[moved.ids - 1] + moved.values
         stresses = block.means(model.faces + 1)[:, TENSOR]
         least.append((block.time - k, float(_in_planes(places[faces], stresses).min())))
     for (time, before), (end, after) in pairwise(least):

@@ -17,10 +17,12 @@ from nightly import at_night
 from PIL import Image
 from printed import words_of
 from refusals import refused
+from starts import spherical_cap
 
 import pcmc
 from pcmc import cli, io, project
 from pcmc.base.errors import FileError
+from pcmc.project.writing import draw_picture
 from pcmc.structure import calculix
 
 ROOF = Path(__file__).resolve().parents[2] / "notebooks" / "roof.toml"
@@ -252,6 +254,16 @@ def test_files_have_the_mark_of_a_roof_that_is_not_in_order(tmp_path, monkeypatc
         assert not any(b"NOT" in Path(name).read_bytes() for name in names)
     assert drawn == [mark]
     io.read("roof.3dm")  # without a note on objects that are left out
+
+
+@pytest.mark.parametrize("colour", ["patches", "curvature", "error", "reactions"])
+@pytest.mark.parametrize("views", [["plan"], ["plan", "elevation"]])
+def test_a_picture_of_any_colour_has_the_mark(monkeypatch, colour, views):
+    marks, views = [], views[: 1 if colour == "reactions" else 2]
+    for drawn in ("draw", "panel", "reactions"):
+        monkeypatch.setattr(f"pcmc.plot.{drawn}", lambda *_, mark, **_look: marks.append(mark))
+    draw_picture(spherical_cap(0.5), "roof.png", views, colour, mark="TARGETS NOT MET")
+    assert marks == ["TARGETS NOT MET"]
 
 
 def test_the_plan_drawing_is_not_written_over(tmp_path, monkeypatch):

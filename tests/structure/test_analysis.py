@@ -16,7 +16,7 @@ from under_load import ALPHA, THICK, cap, parts, stiffness, strip
 import pcmc
 from generators.grid import grid_faces
 from pcmc import Material, Patch, Plane, SelfWeight, Snow, Surface, Wind
-from pcmc.plan import Plan
+from pcmc.plan import Divider, Plan
 from pcmc.structure import analyse, analysis, calculix
 from pcmc.surface.geometry import area_vectors
 from pcmc.surface.pieces import to_space
@@ -247,14 +247,15 @@ def test_the_tension_of_a_cable_is_along_it_as_it_hangs(poisson):
 
 
 @needs_ccx
-def test_forces_of_a_sheet_are_in_it_as_it_hangs():
+@pytest.mark.parametrize("poisson", [0.0, 0.3])
+def test_forces_of_a_sheet_are_in_it_as_it_hangs(poisson):
     """A flat band between mirrors under snow: its force has the same part H along the plan everywhere, and
     the band carries half of the snow at each end, H tan θ."""
     x, y = (values.ravel() for values in np.meshgrid(np.linspace(0, 2, 33), [0, 0.1, 0.2], indexing="ij"))
     sides = {Plane((0, at, 0), (0, at - 0.1, 0), mirror=True): y == at for at in (0.0, 0.2)}
     faces, film = grid_faces(32, 2), [Patch("film", 2.0, 0.0)]
     band = Surface(np.column_stack([x, y, 0.0 * x]), faces, [0] * 128, film, x % 2 == 0.0, on_planes=sides)
-    cloth = Material(5e4, poisson=0.0)
+    cloth = Material(1e4, poisson)
     model = model_of(band, material=cloth, loads=[Snow(1.0, patches=["film"])], anyway=True)
     found = analyse(model, remedy=False)["snow"].results
     normal = area_vectors((band.vertices + found.displacements)[faces])
@@ -263,3 +264,17 @@ def test_forces_of_a_sheet_are_in_it_as_it_hangs():
     assert along == pytest.approx(np.full(128, along.mean()), rel=2e-3)
     carried = 1.0 - 1.0 / 32  # half of the snow, less that on the vertices of the end
     assert along.mean() * -drop / run == pytest.approx(carried, rel=5e-3)
+
+
+@needs_ccx
+def test_forces_beside_a_contact_are_those_of_the_elements():
+    """Where a wall has come down on its bottom, its triangles beside have the corners of what rests there."""
+    patches = {"west": {"tension": 4.0, "at": [3, 4]}, "east": {"tension": 4.0, "at": [9, 4]}}
+    wall = Divider([[6, 0], [6, 8]], wall=4.5, bottom="held")
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [wall], edge_length=0.8, patches=patches)
+    model = model_of(pcmc.solve(plan.surface()).surface)
+    assert (model.standing.faces[model.active] != model.surface.faces[model.faces]).any()
+    found = analyse(model)["form pressure"].results
+    tensions = model.surface.tensions[model.surface.patch_of_face[model.faces]]
+    assert found.principal_forces[model.faces] == pytest.approx(np.stack(2 * [tensions], axis=1), rel=0.01)
+    assert found.taut == 1.0
