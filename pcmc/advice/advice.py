@@ -18,6 +18,7 @@ from ..certificate.certificate import Certificate
 from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
 from ..plan import Divider, Plan
+from ..plan.edges import usual_cable
 from ..plan.parts import BALANCED
 from ..solvers import solve
 from ..solvers.result import Result, Status
@@ -242,11 +243,17 @@ def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
 
 
 def _step(plan: Plan, result: Result) -> Plan:
-    """The plan with the tensions and supports that remove what its certificate complains of."""
+    """The plan with the tensions, cables and supports that remove what its certificate complains of."""
     certificate = result.certificate
     grew = any(isinstance(proof, Overload) for proof in certificate.proofs)
     if grew or certificate.verdict in (Verdict.RAN_AWAY, Verdict.NONE_FOUND):
         plan = _stiffer(plan, result)
+    if plan.cable is not None and plan.cable < (usual := usual_cable(plan)):  # its arcs may not fit
+        plan = replace(plan, cable=usual)
+    if not plan.supports:  # a ring that a cable alone holds is at rest at one radius, and stable at none
+        rings = [hole for hole in plan.holes if hole.edge == "cable" and not hole.cable_weight]
+        holes = [replace(h, edge="fixed", cable=None) if h in rings else h for h in plan.holes]
+        plan = replace(plan, holes=holes)
     sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
     plan = with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
@@ -325,7 +332,8 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
             why = f"instead of {kind}" if kind else f"now {_shown(old)}"
             if isinstance(before, Divider) and vars(before) == vars(Divider(before.curve, name=before.name)):
                 why += f"; a curve alone becomes {{curve = ..., {key} = {_shown(new)}}}"
-            lines.append(f"{place} {key} = {_shown(new)}  ({why})")
+            change = f"remove {key}" if new is None else f"{key} = {_shown(new)}"
+            lines.append(f"{place} {change}  ({why})")
     return lines
 
 

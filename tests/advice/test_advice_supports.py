@@ -133,6 +133,23 @@ def test_for_a_drawing_without_a_project_the_advice_says_how_to_write_one(tmp_pa
     assert cli.main(["solve", "hall.toml", "--no-cache"]) == cli.OK
 
 
+def test_a_ring_that_a_cable_alone_holds_is_advised_to_be_fixed(tmp_path):
+    """It is at rest at the radius cable / tension alone, and there a saddle: "remesh" does not help."""
+    file = tmp_path / "roof.toml"
+    hole = "[[plan.holes]]\ncurve = {circle = {centre = [5, 4], radius = 1.5}}\n"
+    plan = "[plan]\nedge_length = 0.7\noutline = [[0, 0], [10, 0], [10, 8], [0, 8]]\n"
+    plan += "tension = 4.0\npressure = 0.0\n" + hole
+    file.write_text(f"{plan}edge = 'cable'\ncable = 8.0\n")
+    outcome = project.run(file)
+    assert not outcome.good
+    assert outcome.advice[1:] == [
+        '[[plan.holes]] number 1: edge = "fixed"  (now "cable")',
+        "[[plan.holes]] number 1: remove cable  (now 8)",
+    ]
+    file.write_text(f"{plan}edge = 'fixed'\n")
+    assert project.run(file).good
+
+
 def stalled(surface, *_, **__):
     """A solve that is stopped after a step, as on a mesh with too sharp a peak."""
     from pcmc.solvers import solve_once
