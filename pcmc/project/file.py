@@ -92,7 +92,7 @@ class Project:
     @property
     def plan_command(self) -> str:
         """The command that writes the project of a drawing."""
-        return f"pcmc plan {self.path.name} -o {self.path.with_suffix(TOML).name}"
+        return f"pcmc plan {self.path} -o {self.path.with_suffix(TOML)}"
 
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""

@@ -116,21 +116,19 @@ def test_for_a_drawing_without_a_project_the_advice_says_how_to_write_one(tmp_pa
     space.add_line((6, 0), (6, 6), dxfattribs=drawn.on("divider chancel"))
     for name, x in (("west = 1", 3), ("east = 9", 8)):
         space.add_text(name, dxfattribs=drawn.on("patch")).set_placement((x, 3))
-    document.saveas("hall.dxf")
-    assert cli.main(["solve", "hall.dxf", "--no-cache"]) == cli.NOT_CERTIFIED
+    file = Path("plans", "hall.toml")
+    file.parent.mkdir()
+    document.saveas("plans/hall.dxf")
+    assert cli.main(["solve", "plans/hall.dxf", "--no-cache"]) == cli.NOT_CERTIFIED
     _, _, advised = capsys.readouterr().out.partition("write a project ")
     heading, line = advised.splitlines()
     command = heading[1 : heading.index(")")]
     assert heading == f"({command}) and type in hall.toml, which was tried and comes to rest:"
     assert cli.main(command.split()[1:]) == cli.OK
-    text = (
-        Path("hall.toml")
-        .read_text(encoding="utf-8")
-        .replace("west = {tension = 1.0", "west = {tension = 3.2")
-    )
     assert line == "  [plan.patches] west: tension = 3.2  (now 1)"
-    Path("hall.toml").write_text(text, encoding="utf-8")
-    assert cli.main(["solve", "hall.toml", "--no-cache"]) == cli.OK
+    text = file.read_text(encoding="utf-8").replace("west = {tension = 1.0", "west = {tension = 3.2")
+    file.write_text(text, encoding="utf-8")
+    assert cli.main(["solve", str(file), "--no-cache"]) == cli.OK
 
 
 def test_a_ring_that_a_cable_alone_holds_is_advised_to_be_fixed(tmp_path):
