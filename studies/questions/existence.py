@@ -89,7 +89,7 @@ def _rays(folder: Folder, lengths: tuple[float, ...], degrees: tuple[int, ...]) 
         for degree in degrees:
             angle = math.radians(degree)
             ray = Direction({"large": math.cos(angle), "small": math.sin(angle)}, relative=True)
-            branch = follow(start, ray, FARTHEST, step=0.03, smallest=2e-4, folds=1)
+            branch = follow(start, ray, FARTHEST, step=0.03, smallest=1e-4, folds=1)
             rows.append({"edge_length": length, "degrees": degree, **_end(branch)})
             points.append(branch.points.assign(edge_length=length, degrees=degree))
             if degree in DRAWN:
