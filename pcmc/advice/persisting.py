@@ -37,7 +37,7 @@ def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:
     loaded = rises or any(net_pressures(plan).values()) or (plan.tension and plan.pressure != plan.snow)
     for share in FLATTER if loaded else ():
         lower = [_lower(rise, share) for rise in rises]
-        other = plan if rises else _stiffer(plan, 1.0 / share)
+        other = plan if rises else _scaled(plan, 1.0 / share)
         lines = [_line(*both) for both in zip(rises, lower, strict=True)] or changes(plan, other)
         yield other, lower, lines
 
@@ -52,7 +52,7 @@ def _line(rise: Rise, lower: Rise) -> str:
     return f"{place} {rise.kind} = {lower.value:g}  (now {rise.value:g})"
 
 
-def _stiffer(plan: Plan, factor: float) -> Plan:
+def _scaled(plan: Plan, factor: float) -> Plan:
     areas = [replace(area, tension=two_digits(area.tension * factor)) for area in plan.patches]
     whole = None if plan.tension is None else two_digits(plan.tension * factor)
     return replace(plan, patches=areas, tension=whole)

@@ -19,7 +19,7 @@ from ..surface.images import expect_no_images
 from ..surface.supports import Admissible, members
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
-SAMPLES = 65  # points of each line from a foot to its top, the nearest of which says which line is nearest
+SAMPLES = 65  # points on each line from a foot to its top, to find the line that is nearest to a vertex
 MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
 
 

@@ -85,7 +85,7 @@ class Project:
 
     @property
     def where_to_type(self) -> str:
-        """How a line begins that says what to type; of a drawing alone, which command writes its project."""
+        """Where to type advice: "type in roof.toml"; of a drawing alone, after the command that writes it."""
         here = f"type in {self.path.with_suffix(TOML).name}"
         return here if self.has_file else f"write a project ({self.plan_command}) and {here}"
 

@@ -114,7 +114,7 @@ def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(
         assert "expected a finite number" in until(lambda: page.text("#note"), "the note")
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         assert all("400 (Bad Request)" in line for line in page.complaints())
-        running.close()  # and when the program has ended, the page says so
+        running.close()  # the page then says that the program has ended
         page.enter("Tension α of cap", 0.7)
         assert "has stopped" in until(
             lambda: "stopped" in page.text("#note") and page.text("#note"), "the note"
