@@ -219,8 +219,15 @@ class StructuralModel:
 
     @cached_array
     def beam_vertices(self) -> Ints:
-        """The vertices of beams; their nodes come after the vertices' numbers."""
+        """The vertices of beams."""
         return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
+
+    @cached_array
+    def tied(self) -> Ints:
+        """The vertices where beams, and the cables of shells, have nodes of their own, tied to those of the
+        sheets. Their numbers come after the vertices'."""
+        cables = self.standing.cables if self.elements == "shell" else ()
+        return np.unique(np.concatenate([self.beam_vertices, *(cable.edges.ravel() for cable in cables)]))
 
     @cached_property
     def lines(self) -> tuple[PlacedMember, ...]:

@@ -58,7 +58,7 @@ def test_beams_have_nodes_of_their_own_tied_to_the_vertices_where_these_are(tmp_
     pcmc.write_structure(tmp_path / "hall.inp", model)
     text = (tmp_path / "hall.inp").read_text()
     [line] = model.beams
-    part = re.search(r"^\*NODE, NSET=BEAMS\n(.*?)^\*", text, re.M | re.S)[1]
+    part = re.search(r"^\*NODE, NSET=MEMBERS\n(.*?)^\*", text, re.M | re.S)[1]
     nodes = {int(row[0]): row[1:] for row in np.loadtxt(part.splitlines(), delimiter=",").tolist()}
     assert len(nodes) == len(np.unique(line.pairs))
     blocks = re.findall(r"^\*ELEMENT.*\n([^*]*)", text, re.M)
