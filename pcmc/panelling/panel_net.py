@@ -116,7 +116,7 @@ class PanelNet:
     def write_obj(self, path: str | PathLike[str], mark: str = "") -> None:
         """Write the panels as polygons of a Wavefront .obj, a group per patch; with the mark of the
         certificate, or else ``mark``, as a comment."""
-        mark = self.certificate.mark or mark
+        mark = self.certificate.mark or validate.one_line("mark", mark)
         lines = ["# panels of pcmc", *[f"# {mark}"] * bool(mark)]
         lines += ("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())
         patch = self.panels["patch"].tolist()

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats, Ints, format_rows
 from ..base.files import as_path, atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
@@ -48,7 +49,7 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel, mark: 
     check_name(path)
     suffix_of(path, (".inp",), "a structural model")
     expect_model(model)
-    text = text_of(model, model.steps, mark=mark)
+    text = text_of(model, model.steps, mark=validate.one_line("mark", mark))
     with writing(path), atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hall_with_members import STEEL, TUBE, hall_with
 from starts import spherical_cap
-from structures import model_of, square
+from structures import model_of, scaled, square
 
 import pcmc
 from pcmc import Circle, Material, SelfWeight, Snow
@@ -125,7 +125,7 @@ def test_a_member_that_buckles_is_told_with_what_would_hold_it():
     assert line.startswith("rest: rim buckles at ")
     factor = float(line.split("; ")[1].split(" times")[0])
     assert factor == pytest.approx(1.0 / table["buckling"][0], rel=0.05)
-    stiff = replace(rim, profile=wire.scaled(1.01 * factor))
+    stiff = replace(rim, profile=scaled(wire, 1.01 * factor))
     assert 1.0 < members_at_rest(model_of(cap, members=[stiff], anyway=True))[0].buckling < 1.1
 
 
