@@ -109,6 +109,9 @@ class StructuralModel:
                 validate.refuse("material", material, "a Material", where, hint)
         thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
+        if self.elements == "shell" and any(plane.mirror for plane, _ in surface.on_planes):
+            text = "elements: shells would have a hinge in a mirror plane; take the whole, pcmc.mirrored(surface)"
+            raise OptionError(text, what="elements", found="shell")
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
         if self.cable_material is None and surface.cables and isinstance(self.material, Mapping):
