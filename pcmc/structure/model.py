@@ -110,7 +110,7 @@ class StructuralModel:
         thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
         if self.elements == "shell" and any(plane.mirror for plane, _ in surface.on_planes):
-            text = "elements: shells would be hinged in a mirror plane; take the whole, pcmc.mirrored(surface)"
+            text = "elements: shells would be hinged in a mirror; take the whole roof, pcmc.mirrored(surface)"
             raise OptionError(text, what="elements", found="shell")
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
