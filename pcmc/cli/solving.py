@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .. import project as projects
-from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..base.errors import OptionError
@@ -46,7 +45,7 @@ from .arguments import (
 from .reports import sweeping, working
 
 if TYPE_CHECKING:
-    from ..project.solving import Changed
+    from ..project.firmer import Changed
     from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
@@ -139,11 +138,7 @@ def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: C
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
         print(f"nothing written (use {otherwise})")
-    reports.mesh_check(outcome, brief=True)
-    with working() as progress:
-        lines = projects.firmer(outcome, changed, progress)
-    if lines:
-        print("\n  ".join(lines))
+    reports.mesh_check(outcome, None, "brief", changed)
     reports.margins(outcome)
 
 
@@ -178,23 +173,15 @@ def certify_(
                 Varied.of(start, name)
         roof = what.roof(project, progress, whole)
         progress("certifying")
-        surface, certificate = roof.shown
+        certificate = roof.shown.certificate
     if roof.result is not None:
         reports.report(roof, verdict=False)
     print(certificate.text(roof.units))
     reports.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
-    if meshes is None and roof.project is not None and roof.project.mesh_check:
-        meshes = 3
-    if meshes is not None and certificate.index is None:
-        print(reports.NO_CHECK)
-    elif meshes is not None:
-        print(end="", flush=True)
-        with working() as progress:
-            progress("checking the mesh")
-            check = check_mesh(surface, meshes)
-        print(f"\n{check.text(roof.units)}")
+    wanted = meshes is not None or bool(roof.mesh_check_wanted())
+    reports.mesh_check(roof, wanted, "text", what.change, meshes)
     return OK if roof.good else NOT_CERTIFIED
 
 
