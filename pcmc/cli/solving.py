@@ -61,6 +61,10 @@ RISE = "Find the tension with which the whole roof rises so much over its outlin
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
+SWAP = (
+    "Swap the neighbours of a film or wall between two junctions: it opens the other way (T1); 'vanished': of all"
+    " that have vanished; may be repeated. Undone where nothing comes to rest."
+)
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 Verify = Annotated[bool, switch("--verify", VERIFY)]
@@ -74,6 +78,7 @@ def solve_(
     method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
     target: Annotated[str | None, option("NAME", TARGET)] = None,
     loads: Loads,
+    swap: Annotated[list[str] | None, option("NAME", SWAP)] = None,
     rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
     apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
     span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
@@ -126,13 +131,19 @@ def solve_(
         print(proposal_text(project))
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
-        outcome = projects.run_project(project, progress, changed=loads.change, **how)
-    _print_solved(outcome, project, "--allow-uncertified to write it", loads.change)
+        outcome = projects.run_project(project, progress, changed=loads.change, swap=swap or (), **how)
+    _print_solved(outcome, project, "--allow-uncertified to write it", loads.change, advise=not swap)
     load = outcome.under_load
     return OK if outcome.good and (load is None or load.carried) else NOT_CERTIFIED
 
 
-def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: Changed | None = None) -> None:
+def _print_solved(
+    outcome: Outcome,
+    project: Project,
+    otherwise: str,
+    changed: Changed | None = None,
+    advise: bool = True,
+) -> None:
     """Print a roof that was solved, and what its project wants to know; make the mesh check last."""
     reports.report(outcome)
     if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
@@ -141,7 +152,7 @@ def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: C
         print(f"nothing written (use {otherwise})")
     reports.mesh_check(outcome, brief=True)
     with working() as progress:
-        lines = projects.firmer(outcome, changed, progress)
+        lines = projects.firmer(outcome, changed, progress) if advise else []
     if lines:
         print("\n  ".join(lines))
     reports.margins(outcome)

@@ -14,6 +14,8 @@ from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
 from ..certificate.balance import unbalanced
+from ..certificate.diagnosis import VANISHED, vanished_films
+from ..equilibria.neighbours import swap_neighbours
 from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..plan import Plan
@@ -152,8 +154,12 @@ def run_project(
     anyway: bool = False,
     use_cache: bool = True,
     check_after: bool = True,
+    swap: Sequence[str] = (),
 ) -> Outcome:
     """As ``run``, for a loaded project; ``changed`` is applied to its initial surface, solved in any case.
+
+    ``swap`` names films and walls whose neighbours are to be swapped, see ``swap_neighbours``; ``VANISHED``
+    are all that have vanished. Such a roof is not kept in the cache.
 
     The mesh check comes last, so that Ctrl-C during it leaves the files; before a report, which shows it.
     Without ``check_after`` the caller makes it.
@@ -162,7 +168,7 @@ def run_project(
     project = project if project.folder is not None else project.in_folder(project.path.parent)
     outputs = project.output.paths
     check_outputs(outputs, project.folder, inputs=project.inputs)
-    outcome = solve_from_start(project, progress, changed)
+    outcome = solve_from_start(project, progress, changed, swap)
     if project.output.whole:
         progress("certifying the whole")
         outcome.whole  # noqa: B018 — computed here, while the progress is shown
@@ -175,21 +181,23 @@ def run_project(
         jobs = project_files(project, outcome, anyway, progress)
         with output_folder(project.folder or Path()):
             outcome = replace(outcome, files=write_all(jobs, progress))
-    if use_cache and changed is None:
+    if use_cache and changed is None and not swap:
         cache.keep(project, outcome)
     if check_after and project.mesh_check and outcome.wants_mesh_check():
         outcome.check_mesh(progress)
     return outcome
 
 
-def solve_from_start(project: Project, report: OnStep, changed: Changed | None) -> Outcome:
-    """Make the start shape of a project, and solve it; ``changed`` is applied to the start shape."""
+def solve_from_start(
+    project: Project, report: OnStep, changed: Changed | None, swap: Sequence[str] = ()
+) -> Outcome:
+    """Make the start shape of a project, and solve it; ``changed`` and ``swap`` as of ``run_project``."""
     report("reading" if project.plan is None else "meshing the plan")
     given = start_of(project)
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
     _check_wishes(project, surface)
-    solved = solve_project(project, surface, report)
+    solved, swapped = _solve_and_swap(project, surface, report, swap)
     notes = [*solved.notes]
     starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
     if starts:
@@ -202,7 +210,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas, volumes and lengths are those of the part between the mirror planes")
     outcome = replace(solved, notes=notes, units=start.units, data=start.data)
-    if outcome.good:
+    if outcome.good or swapped:
         return outcome
     notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")
@@ -239,6 +247,36 @@ def _check_wishes(project: Project, surface: Surface) -> None:
     if imbalance := unbalanced(surface, pinchable):
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
         warnings.warn(f"{imbalance.imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
+
+
+def _solve_and_swap(
+    project: Project, surface: Surface, report: OnStep, names: Sequence[str]
+) -> tuple[Outcome, bool]:
+    """Solve a surface, with other neighbours of the named films; and whether it has these.
+
+    They are swapped on the first mesh and with the first tensions; what else the project asks for follows.
+    """
+    if not names:
+        return solve_project(project, surface, report), False
+    known = {patch.name for patch in surface.patches}
+    for name in names:
+        if name != VANISHED:
+            surface.patch_index(name)  # refuses an unknown one before the work
+    options = {key: value for key, value in project.options.items() if key not in ("order", "levels")}
+    first = replace(project, options=options, targets=(), remeshing=(), wanted=AccuracyWanted())
+    outcome, kept = solve_project(first, surface, report), False
+    surface, note = outcome.surface, "nothing swapped: no film or wall between two junctions has vanished"
+    vanished = vanished_films(surface)
+    if films := [film for name in names for film in ([name] if name in known else vanished)]:
+        report("swapping neighbours")
+        how: dict[str, Any] = {"method": project.method, "callback": reporter(report), **options}
+        swapped = swap_neighbours(surface, list(dict.fromkeys(films)), **how)
+        if swapped.result.status is Status.STOPPED:
+            raise KeyboardInterrupt
+        surface, kept, note = swapped.surface, swapped.kept, swapped.message
+    if kept or outcome.good:
+        outcome = solve_project(project, surface, report)
+    return replace(outcome, notes=[note, *outcome.notes], project=project), kept
 
 
 def solve_project(project: Project, surface: Surface, progress: OnStep = ignore) -> Outcome:
