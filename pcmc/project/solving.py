@@ -15,7 +15,6 @@ from ..base.files import PathLike
 from ..base.files import folder as output_folder
 from ..certificate.balance import unbalanced
 from ..certificate.diagnosis import VANISHED, vanished_films
-from ..equilibria.neighbours import swap_neighbours
 from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..plan import Plan
@@ -258,6 +257,8 @@ def _solve_and_swap(
     """
     if not names:
         return solve_project(project, surface, report), False
+    from ..equilibria import swap_neighbours  # takes long to import
+
     known = {patch.name for patch in surface.patches}
     for name in names:
         if name != VANISHED:
