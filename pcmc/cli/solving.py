@@ -62,8 +62,8 @@ APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 SWAP = (
-    "Swap the neighbours of a film or wall between two junctions: it opens the other way (T1); 'vanished': of all"
-    " that have vanished; may be repeated. Undone where nothing comes to rest."
+    "Swap the neighbours of a film or wall between two junctions, a T1: it opens the other way; 'vanished': of"
+    " all that have vanished; may be repeated. Undone where nothing comes to rest."
 )
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."

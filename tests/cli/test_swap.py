@@ -93,7 +93,9 @@ def test_where_no_film_has_vanished_the_roof_is_as_without(here, capsys):
 def test_a_swap_that_does_not_come_to_rest_is_undone(here, capsys):
     pcmc.write("films.pcmc", steiner_films(2.0, 1.0))  # wider than √3: no film along y is at rest
     assert cli.main(["solve", "films.pcmc", "--swap", "middle", "-o", "same.pcmc"]) == 0
-    assert "undone, as nothing comes to rest after the swap: patch 'middle' vanishes" in capsys.readouterr().out
+    assert (
+        "undone, as nothing comes to rest after the swap: patch 'middle' vanishes" in capsys.readouterr().out
+    )
     assert pcmc.energy(pcmc.read("same.pcmc")) == pytest.approx(2.0 + 3**0.5, abs=1e-12)
 
 
