@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .. import project as projects
-from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..base.errors import OptionError
@@ -46,7 +45,7 @@ from .arguments import (
 from .reports import sweeping, working
 
 if TYPE_CHECKING:
-    from ..project.solving import Changed
+    from ..project.firmer import Changed
     from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
@@ -62,8 +61,8 @@ APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 SWAP = (
-    "Swap the neighbours of a film or wall between two junctions, a T1: it opens the other way; 'vanished': of"
-    " all that have vanished; may be repeated. Undone where nothing comes to rest."
+    "Swap the neighbours of a film or wall between two junctions, a T1: it opens the other way; 'vanished':"
+    " of all that have vanished; may be repeated. Undone where nothing comes to rest."
 )
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
@@ -125,36 +124,27 @@ def solve_(
         wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
         mesh_check=project.mesh_check if mesh_check is None else mesh_check,
         verify=verify or project.verify,
+        swap=swap or (),
         output=own,
     )
     if project.specified and not project.has_file:  # a drawing alone
         print(proposal_text(project))
     with working() as progress:
         how: dict[str, Any] = {"anyway": allow_uncertified, "use_cache": cache, "check_after": False}
-        outcome = projects.run_project(project, progress, changed=loads.change, swap=swap or (), **how)
-    _print_solved(outcome, project, "--allow-uncertified to write it", loads.change, advise=not swap)
+        outcome = projects.run_project(project, progress, changed=loads.change, **how)
+    _print_solved(outcome, project, "--allow-uncertified to write it", loads.change)
     load = outcome.under_load
     return OK if outcome.good and (load is None or load.carried) else NOT_CERTIFIED
 
 
-def _print_solved(
-    outcome: Outcome,
-    project: Project,
-    otherwise: str,
-    changed: Changed | None = None,
-    advise: bool = True,
-) -> None:
+def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: Changed | None = None) -> None:
     """Print a roof that was solved, and what its project wants to know; make the mesh check last."""
     reports.report(outcome)
     if project.verify and outcome.certificate.tried == () == outcome.certificate.proofs:
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
         print(f"nothing written (use {otherwise})")
-    reports.mesh_check(outcome, brief=True)
-    with working() as progress:
-        lines = projects.firmer(outcome, changed, progress) if advise else []
-    if lines:
-        print("\n  ".join(lines))
+    reports.mesh_check(outcome, None, "brief", changed)
     reports.margins(outcome)
 
 
@@ -189,23 +179,15 @@ def certify_(
                 Varied.of(start, name)
         roof = what.roof(project, progress, whole)
         progress("certifying")
-        surface, certificate = roof.shown
+        certificate = roof.shown.certificate
     if roof.result is not None:
         reports.report(roof, verdict=False)
     print(certificate.text(roof.units))
     reports.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
-    if meshes is None and roof.project is not None and roof.project.mesh_check:
-        meshes = 3
-    if meshes is not None and certificate.index is None:
-        print(reports.NO_CHECK)
-    elif meshes is not None:
-        print(end="", flush=True)
-        with working() as progress:
-            progress("checking the mesh")
-            check = check_mesh(surface, meshes)
-        print(f"\n{check.text(roof.units)}")
+    wanted = meshes is not None or bool(roof.mesh_check_wanted())
+    reports.mesh_check(roof, wanted, "text", what.change, meshes)
     return OK if roof.good else NOT_CERTIFIED
 
 

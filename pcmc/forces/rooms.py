@@ -205,7 +205,7 @@ def _whole_sixths(surface: Surface) -> Floats:
         out, middle = area_vectors(corners), corners.mean(axis=1)
         middle -= np.floor(middle @ np.linalg.inv(T)) @ T
         every = (middle + (shifts @ T)[:, None]).reshape(-1, 3)
-        distance, near = cKDTree(every).query(places, NEAREST)
+        distance, near = map(np.asarray, cKDTree(every).query(places, NEAREST))
         out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
         height = np.einsum("ikj,ikj->ik", places[:, None] - every[near], out[near % len(out)])
         # beyond a sharp edge the sheets at it are as near; the one that it faces most knows the side
