@@ -188,7 +188,11 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
     _check_wishes(project, surface)
-    solved, swapped = solve_and_swap(project, surface, report)
+    swapped = False
+    if project.swap:
+        solved, swapped = solve_and_swap(project, surface, report)
+    else:
+        solved = solve_project(project, surface, report)
     notes = [*solved.notes]
     starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
     if starts:

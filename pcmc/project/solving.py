@@ -63,8 +63,6 @@ def solve_and_swap(project: Project, surface: Surface, report: OnStep) -> tuple[
 
     They are swapped on the first mesh and with the first tensions; what else the project asks for follows.
     """
-    if not project.swap:
-        return solve_project(project, surface, report), False
     from ..equilibria import swap_neighbours  # takes long to import
 
     known = {patch.name for patch in surface.patches}
