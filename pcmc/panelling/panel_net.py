@@ -116,7 +116,7 @@ class PanelNet:
     def write_obj(self, path: str | PathLike[str], mark: str = "") -> None:
         """Write the panels as polygons of a Wavefront .obj, a group per patch; with the mark of the
         certificate, or else ``mark``, as a comment."""
-        mark = self.certificate.mark or mark
+        mark = self.certificate.mark or validate.one_line("mark", mark)
         lines = ["# panels of pcmc", *[f"# {mark}"] * bool(mark)]
         lines += ("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())
         patch = self.panels["patch"].tolist()
@@ -239,9 +239,10 @@ def _sheet_net(
     hexagons = pattern == "hexagons"
     angle = np.radians(direction)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    middle = 0.5 * (surface.vertices.max(axis=0) + surface.vertices.min(axis=0))
+    plan, every = (X @ surface.plane.axes[:2].T for X in (sheet.X, surface.vertices))
+    middle = 0.5 * (every.max(axis=0) + every.min(axis=0))
     steps = size * (np.array([0.5 * np.sqrt(3.0), 1.5]) if hexagons else np.ones(2))
-    grid = (sheet.X - middle)[:, :2] @ turn.T / steps
+    grid = (plan - middle) @ turn.T / steps
     at = np.stack([nudged(grid[:, k], sheet.F) for k in range(2)], axis=2)
     over = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) <= 0.0
     if over.any():
