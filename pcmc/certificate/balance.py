@@ -37,11 +37,11 @@ def load_ratio(surface: Surface) -> float:
     the shape; ``overload`` is the proof.
     """
     topo = surface.topology
-    fixed, held = (np.asarray(mask[topo.edges].all(axis=1)) for mask in (surface.fixed, surface.held))
+    fixed, held = (np.asarray(mask[topo.edges].all(axis=1)) for mask in (surface.fixed, surface.supported))
     corners = np.zeros(len(fixed), dtype=bool)  # edges that cut off one triangle between two held edges
     outer = topo.boundary_edge & fixed
     corners[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
-    carrying = (topo.boundary_edge & held) | (fixed & ~(corners & ~topo.boundary_edge))
+    carrying = (topo.boundary_edge & ~surface.mirror_edge & held) | (fixed & ~(corners & ~topo.boundary_edge))
     return _load_over_capacity(surface, carrying)
 
 
@@ -121,7 +121,7 @@ def _capacity(surface: Surface, carrying: Bools) -> Floats:
         steep = 0.0 if plane.mirror else abs(float(np.dot(plane.normal, surface.plane.normal)))
         lengths[slides & mask[topo.edges[carrying]].all(axis=1)] *= steep
     capacity = np.bincount(parts[topo.edges[carrying, 0]], sheets[carrying] * lengths, count)
-    supports = surface.fixed | surface.on_plane
+    supports = surface.pinned | surface.on_ground
     single = (surface.fixed & ~topo.on_boundary) | (supports & topo.on_boundary)
     single[topo.edges[carrying]] = False
     if single.any():

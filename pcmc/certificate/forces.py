@@ -145,12 +145,10 @@ class Forces:
         ends -= apply_supports(standing, ends.copy())
         clamped, on, by_plane, by_plane_ends = _divided(standing, forces, ends)
         mirror = np.array([False, *(plane.mirror for plane, _ in standing.on_planes)])
-        boundary, held = held_boundary(surface), standing.fixed | standing.on_plane
+        boundary, held = held_boundary(surface), standing.supported
         on_boundary, used = np.zeros((2, surface.n), dtype=bool)
         on_boundary[topo.edges[boundary]] = True
         used[standing.topology.faces] = used[standing.cable_edges.ends] = True
-        for plane, mask in standing.on_planes:
-            held = held | (mask & (not plane.mirror))
         single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
         between = topo.junction_edge | topo.seam_edge
         junction = between & at_both_ends(held, topo.edges)
@@ -219,7 +217,7 @@ def at_both_ends(mask: Bools, edges: Ints) -> Bools:
 def held_boundary(surface: Surface) -> Bools:
     """(e,) edges of the boundary that are held at both ends, but for those in mirror planes."""
     topo = surface.topology
-    return topo.boundary_edge & ~surface.mirror_edge & at_both_ends(surface.held, topo.edges)
+    return topo.boundary_edge & ~surface.mirror_edge & at_both_ends(surface.supported, topo.edges)
 
 
 def sheet_pulls(surface: Surface, ends: Ints) -> Floats:

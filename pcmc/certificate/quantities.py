@@ -121,7 +121,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
             add(cable.name, "cable", {"sag": float(np.linalg.norm(out, axis=1).max())})
     for room in surface.rooms:
         add(room.name, "room", {"volume": room.volume})
-    lowest = height[surface.held].min() if surface.held.any() else height.min()
+    lowest = height[surface.supported].min() if surface.supported.any() else height.min()
     apex = float(height[surface.faces[roof[surface.patch_of_face]]].max())
     whole = {
         "apex": apex,

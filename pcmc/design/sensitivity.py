@@ -19,8 +19,9 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
-from ..base.errors import SurfaceError
+from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import AT_REST
+from ..certificate.balance import pressures_left_over
 from ..certificate.measures import Measurement
 from ..forces.functional import gradient_by
 from ..stability.bordered import solve_preconditioned
@@ -61,7 +62,8 @@ def sensitivities(
     Raises
     ------
     SurfaceError : the surface is not at rest, or exactly at a fold.
-    OptionError : no quantity or parameter, an unknown patch, a quantity that cannot be measured.
+    OptionError : no quantity or parameter, an unknown patch, a quantity that cannot be measured, a pressure
+        at a free edge, where its change would depend on Π's point.
 
     Examples
     --------
@@ -100,8 +102,20 @@ def slopes(
         alike = (one for one in parameters if one.kind == parameter.kind)
         named = {name: float(name in parameter.names) for one in alike for name in one.names}
         rates.append(rates_of(at.surface, parameter.key, named))
+        if parameter.key == "pressures":
+            _refuse_left_over(surface, parameter)
     motions = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
     return [_slopes(at.surface, measure(at.surface, t), parameters, rates, motions) for t in targets]
+
+
+def _refuse_left_over(surface: Surface, parameter: Parameter) -> None:
+    """Refuse a pressure that has nothing to act against at a free edge once it changes (OptionError)."""
+    value = parameter.value(surface)
+    changed = dict.fromkeys(parameter.names, value + (abs(value) or 1.0))
+    left = pressures_left_over(surface.retensioned(pressures=changed))
+    if left and not surface.uncancelled.any():
+        message = f"{parameter.label}: where it changes, {left}, or hold these edges"
+        raise OptionError(message, what=parameter.label)
 
 
 def _slopes(

@@ -101,11 +101,11 @@ class TracedParameter:
 
         return callback
 
-    def crossings(self, branch: Branch, surface: Surface) -> Iterator[tuple[Surface | str, str]]:
+    def crossings(self, branch: Branch) -> Iterator[tuple[Surface | str, str]]:
         """The equilibria on a branch at the present value, or why one was not reached; and where that is.
 
-        ``surface`` has that value, and the boundary. The place is "" except beside a bifurcation: the first
-        point of a branch may be far from that, and the way back may lead onto the branch that was left.
+        The place is "" except beside a bifurcation: the first point of a branch may be far from that, and the
+        way back may lead onto the branch that was left.
         """
         values, slopes = branch.points.parameter.to_numpy(), branch.points.slope.to_numpy()
         off = values - self.value
@@ -113,8 +113,6 @@ class TracedParameter:
             beside = [int(k) for k in (i, i + 1) if slopes[k] != 0.0]  # a bifurcation is singular
             there = self._reached(branch, sorted(beside, key=lambda k: abs(off[k])))
             place = "" if len(beside) == 2 else f"{values[i]:.4g} and was first met at {values[i + 1]:.4g}"
-            if isinstance(there, Surface) and np.array_equal(there.faces, surface.faces):
-                there = surface.moved(there.vertices)
             yield there, place
 
     def _reached(self, branch: Branch, rows: Sequence[int]) -> Surface | str:

@@ -250,7 +250,7 @@ class _Search:
             following = list[Branch]()
             for branch in level:
                 self.branches[line.name].append(branch)
-                for there, beside in line.crossings(branch, self.surface):
+                for there, beside in line.crossings(branch):
                     self.cross(line, there, beside, how)
                 if depth < self.options.depth:
                     following += self.leaving(line, branch, watch)

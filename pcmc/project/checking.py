@@ -11,7 +11,17 @@ from typing import Any
 
 from ..base.errors import FileError, PcmcError, unknown
 from ..surface.curve_data import CURVES
-from .keys import KINDS, OR_CURVE, REQUIRED, Section, fits, main_sections, solve_section, target_sections
+from .keys import (
+    KINDS,
+    OR_CURVE,
+    REQUIRED,
+    Section,
+    fits,
+    main_sections,
+    sections,
+    solve_section,
+    target_sections,
+)
 
 LONGEST = 1023  # bits of a float's exponent
 VALUE = re.compile(r"(?<![\w.])[-+]?\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")  # a number of TOML
@@ -84,9 +94,10 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
         if name not in known:
             curves = CURVES if section.name in OR_CURVE and not known.keys() & table.keys() else ()
             message = unknown(f"key of {title}", name, [*known, *curves])
-            for home in () if "." in section.name else main_sections():
-                if home.name in ("plan", "output") and name in [key.name for key in home.keys]:
-                    message = f"unknown key of {title} {name!r}; it is a key of [{home.name}]"
+            homes = [one.name for one in sections()[:-1] if any(key.name == name for key in one.keys)]
+            if homes:
+                listed = " or ".join(f"[{home}]" if home else "the file itself" for home in homes[:2])
+                message = message.replace("Known:", f"it is a key of {listed}. Known:")
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
         if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):

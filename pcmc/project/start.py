@@ -162,9 +162,10 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 
     if not mesh.rises:
         return surface, [], []
-    edges, outer = surface.topology.edges, surface.topology.boundary_edge
-    held = edges[outer if outer.any() else surface.held[edges].all(axis=1)]  # the rim of a cushion
-    heights = surface.plane.height(surface.vertices[held[surface.held[held].all(axis=1)]])
+    edges, supported = surface.topology.edges, surface.supported
+    outer = surface.topology.boundary_edge & ~surface.mirror_edge
+    held = edges[outer if outer.any() else supported[edges].all(axis=1)]  # the rim of a cushion
+    heights = surface.plane.height(surface.vertices[held[supported[held].all(axis=1)]])
     level = float(heights.mean()) if heights.size else 0.0
     normal = np.array(surface.plane.normal)
     below = sheets_below(surface).values()  # which keep their factor

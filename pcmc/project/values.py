@@ -52,7 +52,7 @@ def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
 def single_points(surface: Surface) -> Ints:
     """The vertices that are held alone, such as masts: no vertex beside them is."""
     edges, alone = surface.topology.edges, surface.pinned.copy()
-    alone[edges[surface.held[edges].all(axis=1)]] = False
+    alone[edges[surface.supported[edges].all(axis=1)]] = False
     return np.flatnonzero(alone)
 
 

@@ -145,6 +145,12 @@ class Supported:
         """(n,) vertices that some support holds: fixed, or sliding on a plane, line or circle."""
         return self.fixed | self.on_plane | members(self.on_planes, len(self.fixed))
 
+    @cached_array
+    def supported(self) -> Bools:
+        """(n,) the same without those that mirror planes alone hold, where the surface only goes on."""
+        planes = [pair for pair in self.on_planes if not pair[0].mirror]
+        return self.pinned | self.on_ground | members(planes, len(self.fixed))
+
     @property
     def free(self) -> Bools:
         """(n,) vertices that no support holds at all."""

@@ -21,7 +21,8 @@ from generators import (
     spherical_cap_exact,
     two_squares,
 )
-from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, solve
+from generators.grid import grid_faces
+from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
@@ -129,6 +130,27 @@ def test_two_unduloids_leave_the_cylinder_of_length_2_pi():
     assert [evolver.inertia(one.surface).negative for one in found.found] == [1, 2, 2]
 
 
+def test_two_unduloids_leave_a_tube_of_prescribed_volume():
+    """A quarter of a tube between mirror planes at 0 and 3: below the radius 3/π it is a saddle.
+
+    Half a period of the unduloid of volume 3π has the area 18.862749, by its equation, and the tube 6π.
+    """
+    length, number = 3.0, np.arange(13 * 7).reshape(13, 7)
+    along, around = np.meshgrid(np.linspace(0.0, length, 13), np.linspace(0.0, np.pi / 2, 7), indexing="ij")
+    X = np.stack([np.cos(around), np.sin(around), along], axis=-1).reshape(-1, 3).round(15)
+    sides = {(1, 0, 0): number[:, -1], (0, 1, 0): number[:, 0], (0, 0, 1): number[0], (0, 0, -1): number[-1]}
+    planes = [(Plane(X[on[0]], normal, mirror=True), on) for normal, on in sides.items()]
+    room = Room("inside", {"tube": 1}, np.pi * length / 4.0)
+    faces = grid_faces(12, 6)[:, ::-1]
+    tube = Surface(X, faces, np.zeros(144, int), [Patch("tube", 1.0)], on_planes=planes, rooms=[room])
+    found = find_equilibria(solve(tube, target="stationary"), "volume", starts=0)
+    assert [one.index for one in found.found] == [0, 1, 1]
+    assert found[2].energy == pytest.approx(found[3].energy, rel=1e-12)
+    assert 4.0 * found.barrier(1) == pytest.approx(18.862749 - 6.0 * np.pi, rel=0.1)
+    critical = found.branches["volume"][0].bifurcations.parameter
+    assert critical.tolist() == pytest.approx([(length / np.pi) ** 2], rel=0.01)
+
+
 def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
     resume = Branch.resume
 
@@ -143,7 +165,11 @@ def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
     assert "not reached: the branch could not be followed further" in lines[0]
     assert "(too steep)" in lines[0]
 
-    monkeypatch.setattr(Branch, "resume", lambda branch, row, stop: resume(branch, row, 0.99 * stop))
+    def higher(branch, row, stop):
+        way = resume(branch, row, stop)
+        return replace(way, surfaces={0: way.last.moved(way.last.vertices * [1.0, 1.0, 1.01])})
+
+    monkeypatch.setattr(Branch, "resume", higher)
     found = find_equilibria(spherical_cap(0.5), starts=0)
     assert "A branch passes pressure 1, but its equilibrium there cannot be certified." in str(found)
 

@@ -5,7 +5,10 @@ import pytest
 
 import pcmc
 from pcmc.base.errors import PlanError
+from pcmc.certificate.balance import load_ratio
+from pcmc.certificate.quantities import figures
 from pcmc.plan import Plan
+from pcmc.project.values import single_points
 
 WHOLE = [[0, 0, 2], [10, 0, 2], [10, 10, 2], [0, 10, 2]]
 HALF = [[0, 0, 2], [5, 0, 2], [5, 10, 2], [0, 10, 2]]
@@ -61,3 +64,28 @@ def test_a_cable_along_a_mirror_is_refused():
         PlanError, match="cable 'ridge' runs along mirror 1, which is inside the whole roof; draw"
     ):
         Plan(HALF, mirrors=MIRROR, cables=along, edge_length=0.7, tension=2.0, pressure=0.0).surface()
+
+
+def test_a_mirror_plane_is_no_support_below_a_roof():
+    """The cushion's lower sheet is lowest in the mirror plane, where nothing holds it."""
+    half = pcmc.solve(Plan(HALF, mirrors=MIRROR, cushion=1.5, **VALUES).surface()).surface
+    rises = [
+        next(f.value for f in figures(roof, pcmc.certify(roof)) if f.quantity == "rise")
+        for roof in (half, pcmc.mirrored(half))
+    ]
+    assert rises[0] == pytest.approx(rises[1], rel=1e-12)
+
+
+def test_masts_in_the_mirror_carry_and_can_be_moved():
+    masts = [[0, 0, 0], [5, 0, 3], [5, 6, 4], [5, 10, 0], [0, 10, 2]]
+    flat = {
+        "edge": "cable",
+        "cable": 14.0,
+        "edge_length": 1.0,
+        "tension": 1.0,
+        "pressure": 0.0,
+        "weight": 0.02,
+    }
+    half = Plan([p[:2] for p in HALF], supports=masts, mirrors=MIRROR, **flat).surface()
+    assert load_ratio(half) == pytest.approx(load_ratio(pcmc.mirrored(half)), rel=1e-12)
+    assert len(single_points(half)) == len(masts)

@@ -25,6 +25,18 @@ def test_supports_of_a_project_leave_the_mirror_plane_of_its_mesh(tmp_path, supp
     assert roof.surface.vertices[:, 2].max() == pytest.approx(plain.surface.vertices[:, 2].max(), rel=1e-6)
 
 
+def test_the_rise_of_half_a_mesh_is_over_its_supports_and_not_over_its_mirror_plane(tmp_path):
+    plan = Plan([[0, 0], [6, 0], [6, 9], [0, 9]], edge_length=1.5, tension=3.0, mirrors=[[[6, 0], [6, 9]]])
+    half = pcmc.solve(plan.surface()).surface
+    heights = []
+    for name, roof in (("half", half), ("whole", pcmc.mirrored(half))):
+        pcmc.write(tmp_path / f"{name}.pcmc", roof)
+        (tmp_path / f"{name}.toml").write_text(f'[mesh]\nfile = "{name}.pcmc"\nrise = 1.5\n')
+        found = designed(tmp_path / f"{name}.toml", use_cache=False)
+        heights.append((float(found.surface.tensions[0]), found.surface.vertices[:, 2].max()))
+    assert heights[0] == pytest.approx(heights[1], rel=1e-6)
+
+
 def test_a_point_beside_the_nearest_vertex_is_told(tmp_path):
     pcmc.write(
         tmp_path / "sail.obj", Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=3.0, pressure=0.0).surface()
