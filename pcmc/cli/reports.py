@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..certificate.tables import lean_texts
+from ..project.firmer import Changed, firmer
 from ..project.outcome import MOST_CHECKED, Outcome
 from . import NOT_CERTIFIED, OK
 
@@ -77,8 +78,15 @@ def _against_lean(outcome: Outcome) -> str:
     return f"{upright if straight else ''}{limit}"
 
 
-def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False) -> None:
-    """Check the mesh of a roof at rest, if that is wanted; print why not, or, with ``brief``, the result."""
+def mesh_check(
+    roof: Outcome,
+    wanted: bool | None = None,
+    shown: str = "",
+    changed: Changed | None = None,
+    meshes: int | None = None,
+) -> None:
+    """Check the mesh of a roof at rest, if that is wanted, and look for advice; print why not, or what is
+    to be ``shown``, "brief" or "text", and what to type."""
     if not roof.wants_mesh_check(wanted):
         if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
@@ -87,11 +95,15 @@ def mesh_check(roof: Outcome, wanted: bool | None = None, *, brief: bool = False
         return
     print(end="", flush=True)
     with working() as progress:
-        check = roof.check_mesh(progress)
+        check = roof.check_mesh(progress, meshes)
     if check is None:  # the surface and its files are good without it
         print(f"no mesh check: {roof.mesh_failure}")
-    elif brief:
-        print(f"\n{check.brief(roof.units)}")
+        return
+    if shown:
+        print(f"\n{getattr(check, shown)(roof.units)}", flush=True)
+    with working() as progress:
+        if not check.advice and (advice := firmer(roof, changed, progress)):
+            print(advice)
 
 
 def margins(roof: Outcome, wanted: Sequence[str] = ()) -> None:

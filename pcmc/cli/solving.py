@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .. import project as projects
-from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..base.errors import OptionError
@@ -46,7 +45,7 @@ from .arguments import (
 from .reports import sweeping, working
 
 if TYPE_CHECKING:
-    from ..project.solving import Changed
+    from ..project.firmer import Changed
     from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
@@ -61,6 +60,10 @@ RISE = "Find the tension with which the whole roof rises so much over its outlin
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
+SWAP = (
+    "Swap the neighbours of a film or wall between two junctions, a T1: it opens the other way; 'vanished':"
+    " of all that have vanished; may be repeated. Undone where nothing comes to rest."
+)
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 Verify = Annotated[bool, switch("--verify", VERIFY)]
@@ -74,6 +77,7 @@ def solve_(
     method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
     target: Annotated[str | None, option("NAME", TARGET)] = None,
     loads: Loads,
+    swap: Annotated[list[str] | None, option("NAME", SWAP)] = None,
     rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
     apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
     span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
@@ -120,6 +124,7 @@ def solve_(
         wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
         mesh_check=project.mesh_check if mesh_check is None else mesh_check,
         verify=verify or project.verify,
+        swap=swap or (),
         output=own,
     )
     if project.specified and not project.has_file:  # a drawing alone
@@ -139,11 +144,7 @@ def _print_solved(outcome: Outcome, project: Project, otherwise: str, changed: C
         print(outcome.theorem.text(outcome.units))
     if project.output.paths and not outcome.files:
         print(f"nothing written (use {otherwise})")
-    reports.mesh_check(outcome, brief=True)
-    with working() as progress:
-        lines = projects.firmer(outcome, changed, progress)
-    if lines:
-        print("\n  ".join(lines))
+    reports.mesh_check(outcome, None, "brief", changed)
     reports.margins(outcome)
 
 
@@ -178,23 +179,15 @@ def certify_(
                 Varied.of(start, name)
         roof = what.roof(project, progress, whole)
         progress("certifying")
-        surface, certificate = roof.shown
+        certificate = roof.shown.certificate
     if roof.result is not None:
         reports.report(roof, verdict=False)
     print(certificate.text(roof.units))
     reports.margins(roof, margin or ())
     if verify or (roof.project is not None and roof.project.verify):
         print(roof.theorem.text(roof.units))
-    if meshes is None and roof.project is not None and roof.project.mesh_check:
-        meshes = 3
-    if meshes is not None and certificate.index is None:
-        print(reports.NO_CHECK)
-    elif meshes is not None:
-        print(end="", flush=True)
-        with working() as progress:
-            progress("checking the mesh")
-            check = check_mesh(surface, meshes)
-        print(f"\n{check.text(roof.units)}")
+    wanted = meshes is not None or bool(roof.mesh_check_wanted())
+    reports.mesh_check(roof, wanted, "text", what.change, meshes)
     return OK if roof.good else NOT_CERTIFIED
 
 

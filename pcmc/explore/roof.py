@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import threading
@@ -10,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from .. import project as projects
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
@@ -25,6 +26,9 @@ from ..project.file import project_of, read_data
 from ..project.planning import project_text
 from ..project.values import data_with_values, differences
 from ..surface import Surface
+
+if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
 
 EVERY = 0.5  # seconds between two looks at the files
 Signature = tuple[tuple[str, tuple[int, ...]], ...]
@@ -75,6 +79,24 @@ class ShownRoof:
         most = max(HELD, (self.project and self.project.target_tolerance) or 0.0)
         values = [(target, measure(surface, target).value) for target in targets]
         return all(abs(value - t.nearest(value)) <= most * t.scale(surface) for t, value in values)
+
+    def found(self, aims: Aims) -> set[tuple[str, str]]:
+        """The values, each by kind and name, that a search for targets finds."""
+        return {(f"{parameter.kind}s", name) for parameter in aims[1] for name in parameter.names}
+
+    def advised(self, check: MeshCheck, progress: Callable[[str], None]) -> MeshCheck:
+        """A mesh check with what to type, of ``projects.firmer``, if the project has the values checked."""
+        surface, project = check.surfaces[0], self.project
+        if check.advice or project is None or project.plan is None:
+            return check
+        own = surface is self.surface or self.meets(surface, self.aims[0])
+        if not own or differences(surface_of(project), surface, self.found(self.aims)):
+            save = "save the roof shown as a project: pcmc solve looks for a change of it that persists"
+            return check if check.persists else dataclasses.replace(check, advice=save)
+        known = {(self.outcome.unfold, "mesh check"): check}
+        outcome = dataclasses.replace(self.outcome, result=None, start=surface, _known=known)
+        projects.firmer(outcome, None, progress)
+        return cast("MeshCheck", outcome.mesh_check)
 
     @cached_property
     def note(self) -> str:
@@ -276,8 +298,7 @@ def project_with(
             raise OptionError(f"{problem}; change the drawing", what="targets")
         else:
             note = f"with tensions instead of heights that the surface saved does not have ({labels})"
-    sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
-    left = sought - differences(roof.surface, surface).keys() if kept == roof.aims else set()
+    left = roof.found(kept) - differences(roof.surface, surface).keys() if kept == roof.aims else set()
     data = data_with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
     old = project.path.stem
     if stem and stem != old:

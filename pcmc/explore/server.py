@@ -123,7 +123,7 @@ class Explorer:
         units = self.roof.outcome.units
         match act:
             case "check":
-                check = session.check_mesh(gone)
+                check = session.check_mesh(gone, self.roof.advised)
                 return None if check is None else ({"check": page_data.mesh_findings(check, units)}, {})
             case "margin":
                 margin = session.margin(**given, gone=gone)

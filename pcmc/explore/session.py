@@ -42,6 +42,7 @@ MOST_VARIANTS = 20
 
 Found = TypeVar("Found")
 Check = Callable[[object], None]  # raises StopIteration once the page shows another surface
+Advised = Callable[[MeshCheck, Callable[[str], None]], MeshCheck]  # with what to type; tells its progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,9 +331,15 @@ class Session:
         """Return to the start, as a new step."""
         return state.showing(self.start.surface).stepped()
 
-    def check_mesh(self, gone: Stop = lambda: False) -> MeshCheck | None:
-        """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
-        return self._look(check_mesh, gone)
+    def check_mesh(self, gone: Stop = lambda: False, advised: Advised | None = None) -> MeshCheck | None:
+        """The mesh check of the surface shown, with what to type of ``advised``; None if the page shows
+        another one, or is closed, before."""
+
+        def checked(shown: Surface, callback: Check) -> MeshCheck:
+            check = check_mesh(shown, callback=callback)
+            return check if advised is None else advised(check, partial(self._tell, callback))
+
+        return self._look(checked, gone)
 
     def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
         """How far the surface shown is from the edge; None as for ``check_mesh``."""
@@ -342,11 +349,7 @@ class Session:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
 
         def search(shown: Surface, callback: Check) -> Equilibria:
-            def tell(step: str) -> None:
-                self.progress = step
-                callback(step)
-
-            return find_equilibria(shown, what, callback=tell)
+            return find_equilibria(shown, what, callback=partial(self._tell, callback))
 
         found = self._look(search, gone)
         if found is None or found.stopped:
@@ -359,6 +362,10 @@ class Session:
         with self.checks:
             return verify(self.surface)
 
+    def _tell(self, callback: Check, step: str) -> None:
+        self.progress = step
+        callback(step)
+
     def _look(self, at: Callable[..., Found], gone: Stop) -> Found | None:
         shown = self.surface
 
@@ -369,7 +376,7 @@ class Session:
         with self.checks:
             try:
                 return at(shown, callback=check)
-            except KeyboardInterrupt:
+            except (KeyboardInterrupt, StopIteration):
                 return None
             finally:
                 self.progress = ""

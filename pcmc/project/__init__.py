@@ -1,4 +1,5 @@
 from .cache import cached_files, clear_cache
+from .designing import designed, opened, run, run_project
 from .drawn import is_drawing
 from .file import Project, load
 from .firmer import firmer
@@ -6,7 +7,7 @@ from .keys import json_schema, reference, sections
 from .outcome import Outcome
 from .planning import project_text
 from .settings import AccuracyWanted, Output, Remeshing, Structure
-from .solving import designed, opened, run, run_project, solve_project
+from .solving import solve_project
 from .start import build, start_of, surface_of
 from .varied import check_varied, digest, varied
 

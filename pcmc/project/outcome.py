@@ -340,23 +340,37 @@ class Outcome:
         small = self.shown.surface.m <= MOST_CHECKED
         return self.certificate.index is not None and (small if asked is None else asked)
 
-    def check_mesh(self, progress: OnStep | None = None) -> MeshCheck | None:
-        """The mesh check of what is shown, made once; None where it fails, see ``mesh_failure``."""
+    def check_mesh(self, progress: OnStep | None = None, meshes: int | None = None) -> MeshCheck | None:
+        """The mesh check of what is shown, made once, by default on three ``meshes``; None where it fails,
+        see ``mesh_failure``. With a number of ``meshes`` an error is raised."""
         from ..accuracy import check_mesh  # takes long to import
 
         def check() -> MeshCheck | None:
             found = None if self.unfold else self.accurate
-            if found is not None and found.check is not None and found.surface is self.surface:
+            if found is not None and found.check is not None and found.surface is self.surface and not meshes:
                 return found.check
             given = self.result if self.result is not None and not self.unfold else self.shown.surface
             try:
                 callback = _reporter("mesh check", progress)
-                return check_mesh(given, callback=callback)
+                return check_mesh(given, meshes or 3, callback=callback)
             except PcmcError as error:  # the roof is good without it
+                if meshes is not None:
+                    raise
                 self._known[self.unfold, "mesh failure"] = str(error)
                 return None
 
         return self._once("mesh check", check)
+
+    def advise(self, look: Callable[[], str]) -> str:
+        """What ``look`` finds to type, once; the mesh check has it as its advice from then on."""
+
+        def found() -> str:
+            if advice := look():
+                check = cast("MeshCheck", self.mesh_check)
+                self._known[self.unfold, "mesh check"] = replace(check, advice=advice)
+            return advice
+
+        return self._once("advice", found)
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""

@@ -1,244 +1,24 @@
-"""Projects solved: opened or designed for commands, pages and notebooks; or run, with all their files."""
+"""A surface solved as its project says: remeshed, its targets met, as accurate as asked for."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
-from ..base.errors import BalanceWarning, OptionError
-from ..base.files import PathLike
-from ..base.files import folder as output_folder
-from ..certificate.balance import unbalanced
-from ..forces.pinching import standing_part
-from ..io import metres_note
-from ..plan import Plan
+from ..base.errors import OptionError
+from ..certificate.diagnosis import VANISHED, vanished_films
 from ..solvers import solve, solve_once
 from ..solvers.result import Progress, Result, Status
-from ..structure.calculix import expect_program
 from ..surface import Surface
-from . import cache
 from .checking import in_file
-from .file import Project, load
-from .outcome import EXTENSIVE, OnStep, Outcome, ignore
-from .settings import AccuracyWanted, of_material
-from .start import start_of
-from .writing import check_outputs, project_files, write_all
+from .file import Project
+from .outcome import OnStep, Outcome, ignore
+from .settings import AccuracyWanted
 
 if TYPE_CHECKING:
     from ..design import Target
-
-Changed = Callable[[Surface], Surface]
-
-
-def opened(
-    path: Project | PathLike,
-    progress: OnStep | None = None,
-    *,
-    units: str = "",
-    start: bool = False,
-    changed: Changed | None = None,
-    use_cache: bool = True,
-) -> Outcome:
-    """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
-
-    ``units`` is the unit of length that the roof is to be in; with ``start`` a project has its start shape,
-    not solved. The others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
-
-    >>> roof = opened("notebooks/roof.toml", start=True)
-    >>> roof.result is None, roof.certificate.certified
-    (True, False)
-    """
-    project = path if isinstance(path, Project) else load(path, units=units)
-    if project.specified and not start:
-        return designed(project, progress, changed=changed, use_cache=use_cache)
-    return start_of(project).changed(changed)
-
-
-def designed(
-    project: Project | PathLike,
-    progress: OnStep | None = None,
-    *,
-    changed: Changed | None = None,
-    use_cache: bool = True,
-) -> Outcome:
-    """The roof that a project describes: solved, its targets met, remeshed, as accurate as asked for.
-
-    Nothing is written but the cache: a good roof is kept there, and comes from there the next time. A roof
-    that is not certified, or misses a target, is solved again each time.
-
-    Parameters
-    ----------
-    project : a Project, or the path of its file.
-    progress : called with a few words at each step.
-    changed : applied to the initial surface; such a roof is neither kept nor taken from the cache.
-    use_cache : False solves in any case, and keeps nothing.
-
-    Returns
-    -------
-    Outcome : ``surface`` is the roof, ``good`` whether it is what the project asks for. With ``whole = true``
-        ``shown`` is the whole roof.
-
-    Errors and warnings as of ``run``; KeyboardInterrupt for Ctrl-C, and nothing is kept.
-
-    Examples
-    --------
-    >>> roof = designed("notebooks/roof.toml")
-    >>> roof.good, [f"{area:.0f}" for area in roof.certificate.patches["area"][:3]]
-    (True, ['78', '174', '150'])
-    """
-    if not isinstance(project, Project):
-        project = load(project)
-    use_cache = use_cache and changed is None
-    known = cache.cached(project) if use_cache else None
-    if known is not None:
-        return replace(known, unfold=project.output.whole, project=project)
-    outcome = solve_from_start(project, progress or ignore, changed)
-    if use_cache:
-        cache.keep(project, outcome)
-    return outcome
-
-
-def run(
-    path: PathLike, out_dir: PathLike | None = None, progress: OnStep | None = None, *, anyway: bool = False
-) -> Outcome:
-    """Mesh, solve, meet the targets, certify, and write all output of a project.
-
-    Parameters
-    ----------
-    path : the project file.
-    out_dir : folder for the output, made if it is missing; by default that of the project file.
-    progress : called with a few words at each step.
-    anyway : write the output even if the surface is not certified or misses a target.
-
-    Returns
-    -------
-    Outcome : ``files`` is empty, and nothing is written, if the surface is not certified or misses a target.
-
-    Raises
-    ------
-    FileError, PlanError, OptionError : one line that names the file. Nothing is written.
-
-    Warns
-    -----
-    BalanceWarning : before solving, if the tensions at a junction cannot balance.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> plan = "[plan]\\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\\ntension = 3.0\\n"
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "hall.toml")
-    ...     _ = path.write_text(plan + '[output]\\nfiles = ["hall.pcmc"]', encoding="utf-8")
-    ...     outcome = run(path)
-    >>> outcome.good, outcome.certificate.verdict.name, [file.name for file in outcome.files]
-    (True, 'STABLE', ['hall.pcmc'])
-    """
-    project = load(path)
-    project = project if out_dir is None else project.in_folder(out_dir)
-    return run_project(project, progress, anyway=anyway)
-
-
-def run_project(
-    project: Project,
-    progress: OnStep | None = None,
-    *,
-    changed: Changed | None = None,
-    anyway: bool = False,
-    use_cache: bool = True,
-    check_after: bool = True,
-) -> Outcome:
-    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface, solved in any case.
-
-    The mesh check comes last, so that Ctrl-C during it leaves the files; before a report, which shows it.
-    Without ``check_after`` the caller makes it.
-    """
-    progress = progress or ignore
-    project = project if project.folder is not None else project.in_folder(project.path.parent)
-    outputs = project.output.paths
-    check_outputs(outputs, project.folder, inputs=project.inputs)
-    outcome = solve_from_start(project, progress, changed)
-    if project.output.whole:
-        progress("certifying the whole")
-        outcome.whole  # noqa: B018 — computed here, while the progress is shown
-    for what in project.margin if outcome.certified else ():
-        outcome.margin(what, progress)
-    if outcome.good or anyway:
-        with in_file(project.path):
-            outcome.analysis(anyway, progress)
-    if outputs and (outcome.good or anyway):
-        jobs = project_files(project, outcome, anyway, progress)
-        with output_folder(project.folder or Path()):
-            outcome = replace(outcome, files=write_all(jobs, progress))
-    if use_cache and changed is None:
-        cache.keep(project, outcome)
-    if check_after and project.mesh_check and outcome.wants_mesh_check():
-        outcome.check_mesh(progress)
-    return outcome
-
-
-def solve_from_start(project: Project, report: OnStep, changed: Changed | None) -> Outcome:
-    """Make the start shape of a project, and solve it; ``changed`` is applied to the start shape."""
-    report("reading" if project.plan is None else "meshing the plan")
-    given = start_of(project)
-    start = given.changed(changed)
-    project, surface = start.project or project, start.surface
-    _check_wishes(project, surface)
-    solved = solve_project(project, surface, report)
-    notes = [*solved.notes]
-    starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
-    if starts:
-        label, more = starts[0].label, " and others" * (len(starts) > 1)
-        notes.append(f"{label}{more}: the value given is where the search begins; the targets decide it")
-    if project.has_file:  # a drawing alone is proposed as a whole
-        notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
-    if project.drawing is not None or start.data is not None:
-        notes += metres_note(project.output.files, start.units.length)
-    if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
-        notes.append("targets of areas, volumes and lengths are those of the part between the mirror planes")
-    outcome = replace(solved, notes=notes, units=start.units, data=start.data)
-    if outcome.good:
-        return outcome
-    notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
-    report("looking for advice")
-    drawing = "" if project.drawing is None else project.drawing.path.name
-    names = ("rises", "targets", "vary", "method", "options", "units")
-    task = Task(project.plan, project.where_to_type, drawing, *(getattr(project, name) for name in names))
-
-    def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
-        plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())
-        return solve_project(plain, surface)
-
-    return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
-
-
-def _check_wishes(project: Project, surface: Surface) -> None:
-    """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
-    with in_file(project.path):
-        structure, output = project.structure, project.output
-        if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
-            text = "the roof has no mirror planes, so it is the whole already; leave out whole"
-            raise OptionError(f"{text}, or give the plan mirrors", what="whole")
-        if structure is not None and (output.structure is not None or structure.run):
-            structure.check(surface, project.plan, output.whole)
-        if structure is not None and structure.run:
-            expect_program()
-        if project.pattern is not None and (output.pattern or output.report):
-            of_material(project.pattern, structure, surface)
-        if project.margin:
-            from ..accuracy.varied import Varied  # takes long to import
-
-            for what in project.margin:
-                Varied.of(surface, what)
-    pinchable = standing_part(surface).walls.pinchable
-    if imbalance := unbalanced(surface, pinchable):
-        unless = ", unless the junction rests on the plane" if pinchable.any() else ""
-        warnings.warn(f"{imbalance.imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
 
 
 def solve_project(project: Project, surface: Surface, progress: OnStep = ignore) -> Outcome:
@@ -276,6 +56,34 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
             else:
                 outcome = replace(accurate, design=outcome.design)
     return replace(outcome, notes=[note for note in notes if note], **about)
+
+
+def solve_and_swap(project: Project, surface: Surface, report: OnStep) -> tuple[Outcome, bool]:
+    """The same, with other neighbours of the project's films to ``swap``; and whether the surface has these.
+
+    They are swapped on the first mesh and with the first tensions; what else the project asks for follows.
+    """
+    from ..equilibria import swap_neighbours  # takes long to import
+
+    known = {patch.name for patch in surface.patches}
+    for name in project.swap:
+        if name != VANISHED:
+            surface.patch_index(name)  # refuses an unknown one before the work
+    options = {key: value for key, value in project.options.items() if key not in ("order", "levels")}
+    first = replace(project, options=options, targets=(), remeshing=(), wanted=AccuracyWanted())
+    outcome, kept = solve_project(first, surface, report), False
+    surface, note = outcome.surface, "nothing swapped: no film or wall between two junctions has vanished"
+    vanished = vanished_films(surface)
+    if films := [film for name in project.swap for film in ([name] if name in known else vanished)]:
+        report("swapping neighbours")
+        how: dict[str, Any] = {"method": project.method, "callback": reporter(report), **options}
+        swapped = swap_neighbours(surface, list(dict.fromkeys(films)), **how)
+        if swapped.result.status is Status.STOPPED:
+            raise KeyboardInterrupt
+        surface, kept, note = swapped.surface, swapped.kept, swapped.message
+    if kept or outcome.good:
+        outcome = solve_project(project, surface, report)
+    return replace(outcome, notes=[note, *outcome.notes], project=project), kept
 
 
 def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:

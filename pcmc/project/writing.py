@@ -48,8 +48,6 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
     if not output.documents:
         return [job for _, job in made]
     about = outcome.units, output.sheet, outcome.name, outcome.mark
-    if output.report is not None and outcome.wants_mesh_check():
-        outcome.check_mesh(progress)
     progress("drawing, sorting panels, modelling")
     with in_file(project.path):
         if output.drawings:

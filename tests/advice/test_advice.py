@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
+from asking import Client
+from explore_cases import followed
 from nightly import at_night, night_but
+from printed import words_of
 
 from pcmc import cli
 from pcmc.advice.advice import changes
@@ -126,13 +129,35 @@ def test_a_roof_too_steep_at_a_hole_is_advised_to_be_flatter(tmp_path, wish):
     first = outcome_of(tmp_path, STEEP + wish)
     assert first.good
     assert first.check_mesh().verdict.name == "HELD_BY_MESH"
-    heading, line = firmer(first)
+    heading, line = firmer(first).split("\n  ")
     assert heading == "type in roof.toml, which was tried and persists:"
     key, value = wish.split(" = ")
     assert re.fullmatch(rf"\[plan\] {key} = [{WISHES[wish]}](\.\d)?  \(now {value}\)", line)
     flatter = outcome_of(tmp_path, STEEP + line.removeprefix("[plan] ").split("  (")[0])
     assert flatter.good
     assert flatter.check_mesh().persists
+
+
+def test_every_way_to_a_roof_says_what_to_type(tmp_path, capsys):
+    """``pcmc solve`` alone did."""
+    path, pdf = tmp_path / "roof.toml", tmp_path / "roof.pdf"
+    wanted = "type in roof.toml, which was tried and persists: [plan] rise = 2.1 (now 2.5)"
+    path.write_text(f'units = "m"\n{STEEP}rise = 2.5\n[solve]\nmesh_check = true\n')
+    said = {"run": run_project(load(path), use_cache=False).mesh_check.advice}
+    for command in (["certify"], ["report", "-o", str(pdf)]):
+        cli.main([command[0], str(path), *command[1:]])
+        said[command[0]] = capsys.readouterr().out
+    said["pdf"] = " ".join(words_of(pdf))
+    with followed(path) as page:
+        client = Client(page)
+        about, _ = client.ask("api/open")
+        said["page"] = client.ask(f"api/{about['session']}/check")[0]["check"]["detail"]
+        client.ask(f"api/{about['session']}/settle", {"tensions": {"patch 1": 4.0}})
+        moved = client.ask(f"api/{about['session']}/check")[0]["check"]["detail"]
+    assert [way for way, text in said.items() if wanted not in " ".join(text.split())] == []
+    assert moved.endswith(
+        "save the roof shown as a project: pcmc solve looks for a change of it that persists"
+    )
 
 
 CORNERED = """[plan]
@@ -163,7 +188,7 @@ def test_walls_are_advised_to_stay_upright_where_heights_are_missed(tmp_path):
     assert first.certified
     assert first.check_mesh().persists
     assert not first.good
-    heading, line = firmer(first)
+    heading, line = firmer(first).split("\n  ")
     assert heading == "type in roof.toml, which was tried and persists:"
     assert ": upright = true  (now false" in line
     assert outcome_of(tmp_path, typed(HALF, [line])).good

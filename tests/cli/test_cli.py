@@ -18,7 +18,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.units import NO_UNITS
 from pcmc.io import load
-from pcmc.project import solving
+from pcmc.project import designing
 
 COMMANDS = [
     "solve",
@@ -143,10 +143,13 @@ def test_convert_and_plot(solved, capsys):
 def test_tensions_that_cannot_balance_are_told_before_solving(folder, capsys, monkeypatch):
     pcmc.write("two.pcmc", two_squares(4, alpha_aux=1.0))
     said = []
-    solve_project = solving.solve_project
-    monkeypatch.setattr(
-        solving, "solve_project", lambda *given: said.append(capsys.readouterr().err) or solve_project(*given)
-    )
+    solve_project = designing.solve_project
+
+    def hear(*given):
+        said.append(capsys.readouterr().err)
+        return solve_project(*given)
+
+    monkeypatch.setattr(designing, "solve_project", hear)
     assert cli.main(["solve", "two.pcmc", "--tension", "left=4"]) == 1
     assert "note: the tensions at the junction left | right | wall cannot balance: 4 > " in said[0]
     assert "unless the junction rests on the plane; solving anyway" in said[0]

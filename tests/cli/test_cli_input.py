@@ -53,7 +53,7 @@ def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, argument
 def test_an_option_that_counts_for_nothing_is_refused_before_the_work(
     folder, capsys, monkeypatch, arguments, message
 ):
-    for place in ("project.solving.solve_project", "sweep.run", "equilibria.find_equilibria"):
+    for place in ("project.designing.solve_project", "sweep.run", "equilibria.find_equilibria"):
         monkeypatch.setattr(f"pcmc.{place}", None)
     assert cli.main(arguments) == 2
     out, err = capsys.readouterr()
@@ -146,7 +146,7 @@ def test_without_stdout_it_works_all_the_same(folder, monkeypatch, capsys):
 def test_names_of_files_that_the_locale_cannot_read_are_printed_as_they_are(folder, monkeypatch):
     shown, name = io.BytesIO(), "rööf.pcmc".encode().decode("ascii", "surrogateescape")  # so in the locale C
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii", errors="surrogateescape"))
-    monkeypatch.setattr("pcmc.project.solving.write_all", lambda *_: [name])
+    monkeypatch.setattr("pcmc.project.designing.write_all", lambda *_: [name])
     assert cli.main(["solve", "roof.toml", "--no-mesh-check"]) == 0
     sys.stdout.flush()
     assert "written: rööf.pcmc".encode() in shown.getvalue()

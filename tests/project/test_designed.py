@@ -19,7 +19,7 @@ from pcmc.base.units import Units
 from pcmc.certificate.quantities import QUANTITIES, dimension_of
 from pcmc.design.targets import KINDS, MEASURES, SHORT
 from pcmc.explore.page_data import unit_texts
-from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
+from pcmc.project import build, cached_files, clear_cache, designed, designing, load, run
 
 GOAL = """
 [targets]
@@ -45,8 +45,8 @@ def folder(tmp_path, monkeypatch):
 def solves(monkeypatch):
     """The list that every project solved from its start is added to."""
     solved = []
-    solve = solving.solve_project
-    monkeypatch.setattr(solving, "solve_project", lambda *given: solved.append(given) or solve(*given))
+    solve = designing.solve_project
+    monkeypatch.setattr(designing, "solve_project", lambda *given: solved.append(given) or solve(*given))
     return solved
 
 

@@ -149,7 +149,7 @@ MISSED = '[targets]\nmeet = [{quantity = "apex", value = 30.0}]\nvary = ["roof"]
     ],
 )
 def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypatch, text, key):
-    monkeypatch.setattr("pcmc.project.solving.solve_project", None)
+    monkeypatch.setattr("pcmc.project.designing.solve_project", None)
     (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
     with refused(FileError, what=key) as caught:
         project.run(tmp_path / "roof.toml")
@@ -158,7 +158,7 @@ def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypat
 
 
 def test_a_patch_that_is_not_there_is_refused_before_the_roof_is_solved(tmp_path, monkeypatch):
-    monkeypatch.setattr("pcmc.project.solving.solve_project", None)
+    monkeypatch.setattr("pcmc.project.designing.solve_project", None)
     wind = STRUCTURE + "wind = {rof = 1.0}\n"
     (tmp_path / "roof.toml").write_text(UNITS + SMALL + wind + EVERYTHING, encoding="utf-8")
     with refused(pcmc.errors.OptionError, found="rof"):

@@ -98,7 +98,7 @@ def test_output_names_are_checked_before_any_work(tmp_path):
 
 def test_a_folder_that_may_not_be_written_to_is_refused_before_any_work(small, monkeypatch):
     monkeypatch.setattr("os.access", lambda path, mode: False)
-    monkeypatch.setattr("pcmc.project.solving.start_of", None)
+    monkeypatch.setattr("pcmc.project.designing.start_of", None)
     with pytest.raises(FileError, match="is read-only"):
         run(small)
     with pytest.raises(FileError, match="is read-only"):
