@@ -319,7 +319,7 @@ def analyse_step(
     if gas is None:
         return _case_of(model, step.name, run_as_far(model, [form, *before, step], timeout), len(before) + 2)
     standing, outside = model.standing, gas.outside(model.units)
-    first, volume = gas.pressure(standing), gas.first_volume(standing)
+    first, volume = gas.pressure(standing), gas.enclosed(standing)
     filled = first * model.combinations.get(step.name, {}).get(FORM, 1.0)
     wanted = [(other, first) for other in before] + [(step, filled)]
     signs = gas.signs(standing)[standing.patch_of_face]
@@ -354,7 +354,7 @@ def _case_of(
     share, gas, form = found[-1].share if len(found) == wanted else 0.0, model.gas, model.standing
     if gas is None:
         return Case(name, found[-1], share)
-    volume = gas.first_volume(form) + gas.change(form, np.nan_to_num(found[-1].displacements))
+    volume = gas.enclosed(form, np.nan_to_num(found[-1].displacements))
     return Case(name, found[-1], share, gas.pressure(form) if p is None else p, volume)
 
 
