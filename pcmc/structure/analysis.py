@@ -29,6 +29,7 @@ from .member_forces import (
     member_tables,
     members_in,
     sentences,
+    slack_cables,
     supports_with_members,
     weak_members,
 )
@@ -37,7 +38,6 @@ from .results import StepResults
 
 THROUGH = 1e-3  # of the size: a roof that has sunk farther below Π hangs through
 STILL = 1e-9  # of the largest displacement: a smaller deflection is rounding
-LOOSE = 1e-3  # of the largest tension of a cable: a smaller thrust is rounding
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
@@ -205,8 +205,8 @@ class Analysis:
         return depth if depth > THROUGH * surface.size else 0.0
 
     def answers(self, units: Units | None = None) -> list[str]:
-        """A sentence for each case that is not carried, or has slack parts, and what helps; for each cable that
-        gets slack; what cables are made of, where they have no material of their own."""
+        """A sentence for each case that is not carried, or has slack parts, and what helps; for each cable
+        that gets slack; what cables are made of, where they have no material of their own."""
         units, lines, surface = units or self.model.units, [], self.model.surface
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
             at = np.array([row[f"least_{c}"] for c in "xyz"])
@@ -223,13 +223,7 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
-        for name, own in self.cables.groupby("cable", sort=False):
-            pressed = own[1:][own["least"][1:] < -LOOSE * own["largest"].max()]
-            if len(pressed):
-                text = f"{', '.join(pressed['case'])}: {name} is slack, but counts as a strut, pressed with"
-                text += f" {-pressed['least'].min():.3g}{units.behind('force')}: without it the roof moves more;"
-                lines.append(f"{text} give it a larger tension")
-        lines += cable_notes(self.model)
+        lines += [*slack_cables(self.cables, units), *cable_notes(self.model)]
         lines += weak_members(self.model, ((case.name, case.members) for case in self.cases), units)
         if any(case.taut < case.share < 1.0 for case in self.cases):
             lines.append(MESH)
