@@ -97,11 +97,12 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         return plan, [], []
     require("shapely", extra="plan")
     from ..plan.draft import part_count
-    from ..plan.proposal import largest_circle, least_tension, plan_area
+    from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
 
     part_count(plan)  # refuses lines that do not fit together, which have no area
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
+    leasts = least_tensions(plan, least)
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)
     heights = outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
     level, lowest, loads = float(heights.mean()), float(heights.min()), net_pressures(plan)
@@ -124,7 +125,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
             text += f" pressure = ..., or tension = ... instead of {rise.kind}"
             raise OptionError(text, what=rise.kind)
-        plan = _retensioned(plan, rise.patch, least, height - lowest)
+        plan = _retensioned(plan, rise.patch, leasts.get(rise.patch or "", least), height - lowest)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
     if any(divider.wall != BALANCED for divider in plan.dividers):
