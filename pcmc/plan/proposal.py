@@ -87,7 +87,7 @@ def _parts_of_plan(plan: Plan) -> list[Part]:
 
 
 def least_tensions(plan: Plan, whole: float) -> dict[str, float]:
-    """The mean of the least tensions per pressure, over the ``whole`` plan and over the own part of each patch.
+    """The mean of the least tensions per pressure over the ``whole`` plan and over the part of each patch.
 
     A wall that pulls hard makes a roof of each part; one that hardly pulls leaves one roof over the plan. A
     balanced wall is in between, and so is the mean, √(α_part α_whole).
