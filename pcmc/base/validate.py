@@ -192,6 +192,13 @@ def checked_name(
     return str(name)
 
 
+def one_line(name: str, value: object) -> str:
+    """A text in one line, or "": a line break would end the comment or the heading that it stands in."""
+    if not (isinstance(value, str) and value.isprintable()):
+        refuse(name, value, "a text of one line")
+    return value
+
+
 def names_from_file(given: Iterable[str]) -> tuple[dict[str, str], str]:
     """A name that a part may have for each name in a file of another program, and a note on those changed.
 

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
 from ..meshing.films import film_of
+from ..meshing.neighbour_swap import can_vanish
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
@@ -149,6 +150,8 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
 REACH = 1.5  # median edge lengths: the cause is looked for this near to the worst triangle
 LOW = 0.2  # median edge lengths: a held wall this low has no room for triangles
 NARROW = 0.05  # of the smallest area beside it: a film this small between two junctions vanishes
+VANISHED = "vanished"  # all films that have, in place of their names
+SWAP = f"try pcmc solve FILE --swap {VANISHED}, or pcmc.swap_neighbours(surface)"
 KEY = 'in a plan, bottom = "{}"'
 ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 ALIKE = 6  # decimals of a share: symmetric places differ by rounding
@@ -172,7 +175,7 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
         film = film_of(surface, surface.patch_index(films[0]))
         others = f" and {len(films) - 1} more" if len(films) > 1 else ""
         meeting = film.meeting(surface, "then") if film else ""
-        return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; try pcmc.swap_neighbours(surface)"
+        return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; {SWAP}"
     if held_wall_down(surface, pinchable):
         return worst + (
             "; the junction there comes down on the held bottom of its wall, so the wall has no height"
@@ -188,7 +191,7 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
 
 
 def vanished_films(surface: Surface) -> list[str]:
-    """The films between two junctions that have vanished, by name: narrow, and small beside the others."""
+    """The films that have vanished and nothing holds open, by name: narrow, and small beside the others."""
     areas = face_areas(surface.vertices[surface.faces])
     area = np.bincount(surface.patch_of_face, areas, len(surface.patches))
     names = []
@@ -196,7 +199,7 @@ def vanished_films(surface: Surface) -> list[str]:
         film = film_of(surface, int(patch))
         if film and area[patch] < NARROW * area[list(film.sheets)].min() and film.width < 2.0 * film.height:
             names.append(surface.patches[patch].name)
-    return names
+    return [name for name in names if can_vanish(surface, name)]
 
 
 def held_wall_down(surface: Surface, pinchable: Bools) -> bool:

@@ -60,6 +60,10 @@ RISE = "Find the tension with which the whole roof rises so much over its outlin
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
+SWAP = (
+    "Swap the neighbours of a film or wall between two junctions, a T1: it opens the other way; 'vanished':"
+    " of all that have vanished; may be repeated. Undone where nothing comes to rest."
+)
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 Verify = Annotated[bool, switch("--verify", VERIFY)]
@@ -73,6 +77,7 @@ def solve_(
     method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
     target: Annotated[str | None, option("NAME", TARGET)] = None,
     loads: Loads,
+    swap: Annotated[list[str] | None, option("NAME", SWAP)] = None,
     rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
     apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
     span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
@@ -119,6 +124,7 @@ def solve_(
         wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
         mesh_check=project.mesh_check if mesh_check is None else mesh_check,
         verify=verify or project.verify,
+        swap=swap or (),
         output=own,
     )
     if project.specified and not project.has_file:  # a drawing alone

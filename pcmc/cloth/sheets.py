@@ -102,15 +102,22 @@ def _middles(pattern: CuttingPattern) -> list[tuple[Strip, Floats]]:
 
 
 def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
-    """The seams from above, with the numbers of strips, and the places of corners along both axes."""
-    axes, nowhere = pattern.surface.plane.axes[:2], np.zeros(2)
-    lines = [curve._replace(points=curve.points @ axes.T) for curve in _curves(pattern)]
-    texts = [(at @ axes.T, str(strip.number), nowhere) for strip, at in _middles(pattern)]
+    """The seams from above, with the numbers of strips, and the places of corners along both axes; square to
+    a tilted plane Π, in its coordinates, as drawn seams have them."""
+    plane, title = pattern.surface.plane, "Seams on the roof"
+    if tilted := bool((plane.axes != np.eye(3)).any()):
+        title += ", seen square to its tilted plane, places in the axes of that"
+
+    def seen(points: Floats) -> Floats:
+        return np.asarray((plane.to_local(points) if tilted else points)[..., :2])
+
+    lines = [curve._replace(points=seen(curve.points)) for curve in _curves(pattern)]
+    texts = [(seen(at), str(strip.number), np.zeros(2)) for strip, at in _middles(pattern)]
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
     decimals = length_decimals(length, pattern.surface.size)
-    return placed([view], "Seams on the roof", sheet, length_factor(length, "mm"), None, decimals)
+    return placed([view], title, sheet, length_factor(length, "mm"), None, decimals)
 
 
 def _inside(strip: Strip) -> Floats:

@@ -15,6 +15,7 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..base.libraries import require
+from ..base.validate import one_line
 from ..certificate import Certificate
 
 FORMATS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0)}
@@ -225,7 +226,7 @@ def corner() -> Floats:
 
 def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate, mark: str = "") -> None:
     """Give each sheet its frame, its title strip with its number, and the mark of a roof that needs one."""
-    mark = certificate.mark or mark
+    mark = certificate.mark or one_line("mark", mark)
     for number, sheet in enumerate(sheets, start=1):
         width, height = sheet.size
         low, right, top = MARGIN, width - MARGIN, height - MARGIN

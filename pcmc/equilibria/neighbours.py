@@ -99,7 +99,7 @@ def swap_neighbours(
     if result.converged:
         now, then = energy_at_volumes(result.surface), energy_at_volumes(surface)
         sentences.append(f"E = {now:.7g}, {then:.7g} before")
-        return NeighbourSwap(result.surface, True, "; ".join(sentences), result)
+        return NeighbourSwap(result.surface, True, "; ".join(dict.fromkeys(sentences)), result)
     again = [name for name in vanished_films(result.surface) if name in names]
     why = f"patch {again[0]!r} vanishes again" if again else result.message
     return NeighbourSwap(surface, False, f"undone, as nothing comes to rest after the swap: {why}", result)

@@ -22,7 +22,7 @@ from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
-from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
@@ -33,6 +33,8 @@ from .functional import energy, patch_volumes, weighted
 
 SAMPLES = 12  # places along each side of a cell
 MOST_FACES = 4000  # of a room, among which the nearest is sought
+NEAREST = 16  # parts of triangles that are looked at for each place
+MOST_CUTS = 4  # of a triangle
 CLEAR = 0.3  # of a sixth of the cell: how far the places may be off
 
 
@@ -193,17 +195,22 @@ def _whole_sixths(surface: Surface) -> Floats:
     grid = np.stack(np.meshgrid(*[(np.arange(SAMPLES) + 0.37) / SAMPLES] * 3, indexing="ij"), axis=-1)
     places, shifts = grid.reshape(-1, 3) @ T, np.argwhere(np.ones((3, 3, 3))) - 1.0
     reached = surface.room_signs @ patch_volumes(surface)
-    found = np.zeros(len(surface.rooms))
+    found, fine = np.zeros(len(surface.rooms)), float(np.cbrt(6.0 * sixth)) / SAMPLES
     for r, signs in enumerate(surface.room_signs):
         own = np.flatnonzero(signs[surface.patch_of_face])
         own = own[:: 1 + len(own) // MOST_FACES]
+        into = signs[surface.patch_of_face[own]] < 0.0
         corners = surface.vertices[surface.faces[own]]
-        out = area_vectors(corners) * signs[surface.patch_of_face[own], None]
-        middle = corners.mean(axis=1)
+        corners = _finer(np.where(into[:, None, None], corners[:, ::-1], corners), fine)
+        out, middle = area_vectors(corners), corners.mean(axis=1)
         middle -= np.floor(middle @ np.linalg.inv(T)) @ T
         every = (middle + (shifts @ T)[:, None]).reshape(-1, 3)
-        near = cKDTree(every).query(places)[1]
-        inside = np.einsum("ij,ij->i", places - every[near], out[near % len(own)]) < 0.0
+        distance, near = map(np.asarray, cKDTree(every).query(places, NEAREST))
+        out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+        height = np.einsum("ikj,ikj->ik", places[:, None] - every[near], out[near % len(out)])
+        # beyond a sharp edge the sheets at it are as near; the one that it faces most knows the side
+        facing = np.where(distance <= distance[:, :1] + fine, np.abs(height) / distance, 0.0).argmax(axis=1)
+        inside = height[np.arange(len(places)), facing] < 0.0
         found[r] = (inside.mean() * 6.0) - reached[r] / sixth
     unclear = np.flatnonzero(np.abs(found - np.round(found)) > CLEAR)
     if len(unclear):
@@ -211,6 +218,18 @@ def _whole_sixths(surface: Surface) -> Floats:
         text = f"room {name!r}: the mesh is too coarse to tell which side of its patches lies in it; refine"
         raise SurfaceError(f"{text} it, and check their signs", what="rooms", where=name)
     return np.asarray(np.round(found) * sixth)
+
+
+def _finer(corners: Floats, longest: float) -> Floats:
+    """(g,3,3) triangles (f,3,3) cut 1→4 until their sides are at most so long: the middle of a large one says
+    little of what is near to it."""
+    for _ in range(MOST_CUTS):
+        long = np.linalg.norm(edge_vectors(corners), axis=2).max(axis=1) > longest
+        large = corners[long]
+        middle = 0.5 * (large + np.roll(large, -1, axis=1))
+        ends = [np.stack([large[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)]
+        corners = np.concatenate([corners[~long], *ends, middle])
+    return corners
 
 
 def _left_over(surface: Surface, signs: Floats) -> Floats:

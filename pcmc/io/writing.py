@@ -15,7 +15,7 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import as_path, atomic_write, check_name, writing
 from ..base.units import Units, as_units, length_factor
-from ..base.validate import checked_name, choice, refuse
+from ..base.validate import checked_name, choice, one_line, refuse
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .formats import FORMATS, Content, format_of
@@ -78,8 +78,7 @@ def write(
     expect_surface(surface)
     known: Any = getattr(solved, "certificate", None) if certificate is None else certificate
     mark = (known.get("mark") if isinstance(known, Mapping) else getattr(known, "mark", "")) or mark
-    if not (isinstance(mark, str) and mark.isprintable()):
-        refuse("mark", mark, "a text of one line")
+    one_line("mark", mark)
     if form.certificate:
         certificate = known
     if not isinstance(scalars, Mapping | None):

@@ -52,16 +52,7 @@ def swap(surface: Surface, patch: str) -> Surface:
     SurfaceError : the patch is no such film, its junctions end at different fixed places, or a cable ends
         on it.
     """
-    expect_flat(surface.cell, "swap")
-    film = film_of(surface, surface.patch_index(patch))
-    if film is None:
-        text = f"patch {patch!r} is no film between two junctions with two other patches each, four in all;"
-        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=patch)
-    own = surface.faces[surface.patch_of_face == film.patch]
-    if cables := [cable.name for cable in surface.cables if np.isin(cable.edges, own).any()]:
-        text = f"cable {cables[0]!r} runs on or to patch {patch!r}, whose neighbours are to be swapped"
-        raise SurfaceError(f"{text}; leave the cable out", what="cables", where=cables[0])
-    mesh, target = _collapsed(surface, film)
+    film, mesh, target = _collapsed(surface, patch)
     curve = target[film.pairs[:, 0]]
     curve = curve[np.sort(np.unique(curve, return_index=True)[1])]
     edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if film.closed else -1]
@@ -120,8 +111,26 @@ class _Mesh:
         return 1 if corners[corners.index(a) - 2] == b else -1
 
 
-def _collapsed(surface: Surface, film: Film) -> tuple[_Mesh, Ints]:
-    """The mesh once the film has vanished, and the vertex (n,) that each one is then."""
+def can_vanish(surface: Surface, patch: str) -> bool:
+    """Whether ``swap`` takes the patch: a film that nothing holds open."""
+    try:
+        _collapsed(surface, patch)
+    except SurfaceError:
+        return False
+    return True
+
+
+def _collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
+    """The film of this name, the mesh once it has vanished, and the vertex (n,) that each one is then."""
+    expect_flat(surface.cell, "swap")
+    film = film_of(surface, surface.patch_index(patch))
+    if film is None:
+        text = f"patch {patch!r} is no film between two junctions with two other patches each, four in all;"
+        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=patch)
+    own = surface.faces[surface.patch_of_face == film.patch]
+    if cables := [cable.name for cable in surface.cables if np.isin(cable.edges, own).any()]:
+        text = f"cable {cables[0]!r} runs on or to patch {patch!r}, whose neighbours are to be swapped"
+        raise SurfaceError(f"{text}; leave the cable out", what="cables", where=cables[0])
     target, X, supports = surface.original.copy(), surface.vertices.copy(), surface.support_columns.copy()
     lattice, freedom = lattice_of(surface), surface.admissible.freedom
 
@@ -135,21 +144,19 @@ def _collapsed(surface: Surface, film: Film) -> tuple[_Mesh, Ints]:
         most_held = freedom[both] == freedom[both].min()
         steps = near(vertex, both[most_held])
         if freedom[both].min() == 0 and np.ptp(steps, axis=0).max() > ON * surface.size:
-            name = surface.patches[film.patch].name
-            text = f"the junctions of patch {name!r} are held at different places, so it cannot vanish;"
-            raise SurfaceError(f"{text} let their ends slide", what="patch", where=name)
+            text = f"the junctions of patch {patch!r} are held at different places, so it cannot vanish;"
+            raise SurfaceError(f"{text} let their ends slide", what="patch", where=patch)
         X[vertex], supports[vertex] = X[vertex] + steps.mean(axis=0), supports[both].any(axis=0)
         target[both] = vertex
     ends = film.pairs[[0, -1], fewer]
-    own = surface.original[surface.faces[surface.patch_of_face == film.patch]]
-    for vertex in np.setdiff1d(own, film.pairs):  # of its short sides, where a roof goes on
+    for vertex in np.setdiff1d(surface.original[own], film.pairs):  # of its short sides, where a roof goes on
         target[vertex] = ends[np.linalg.norm(near(vertex, ends), axis=1).argmin()]
     target = target[surface.original]
     F, Y = surface.original[surface.faces], surface.vertices
     counts = lattice_steps(lattice, Y[surface.faces] - Y[F]) + lattice_steps(lattice, Y - Y[target])[F]
     V, left = target[F], surface.patch_of_face != film.patch
     left &= (V[:, [1, 2, 0]] != V).all(axis=1)
-    return _Mesh(X, supports, V[left], counts[left], surface.patch_of_face[left]), target
+    return film, _Mesh(X, supports, V[left], counts[left], surface.patch_of_face[left]), target
 
 
 def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats | None:

@@ -33,6 +33,7 @@ PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
 MOST = 100_000  # panels of a sheet; more mean a mistake in the unit
 KINDS = np.array(["inside", "edge", "corner"])  # of nodes
+WARPED = 0.02  # planarity from which sheets of glass or metal are no longer bent into place
 FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
 NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
 
@@ -116,7 +117,7 @@ class PanelNet:
     def write_obj(self, path: str | PathLike[str], mark: str = "") -> None:
         """Write the panels as polygons of a Wavefront .obj, a group per patch; with the mark of the
         certificate, or else ``mark``, as a comment."""
-        mark = self.certificate.mark or mark
+        mark = self.certificate.mark or validate.one_line("mark", mark)
         lines = ["# panels of pcmc", *[f"# {mark}"] * bool(mark)]
         lines += ("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())
         patch = self.panels["patch"].tolist()
@@ -144,6 +145,10 @@ class PanelNet:
         rows["area"] += f" panels {area.min():.3g} to {area.max():.3g}"
         rows["planarity"] = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
         rows["planarity"] += f" (panel {worst['panel']}, {worst['kind']})"
+        if warped := int((table["planarity"] > WARPED).sum()):
+            at = point_text(self.points[self.polygons[int(worst["panel"]) - 1]].mean(axis=0).round(2))
+            text = f"{warped} panels by more than {100.0 * WARPED:g} % of their diagonals, most at {at}:"
+            rows["warped"] = f"{text} build these of triangles, or choose another pattern"
         away = f"nodes {nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
         rows["distance"] = f"from the surface, {away}"
         turns = [f(beams[name]) for name in ("torsion", "torsion_normal") for f in (np.median, np.max)]
@@ -239,9 +244,10 @@ def _sheet_net(
     hexagons = pattern == "hexagons"
     angle = np.radians(direction)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    middle = 0.5 * (surface.vertices.max(axis=0) + surface.vertices.min(axis=0))
+    plan, every = (X @ surface.plane.axes[:2].T for X in (sheet.X, surface.vertices))
+    middle = 0.5 * (every.max(axis=0) + every.min(axis=0))
     steps = size * (np.array([0.5 * np.sqrt(3.0), 1.5]) if hexagons else np.ones(2))
-    grid = (sheet.X - middle)[:, :2] @ turn.T / steps
+    grid = (plan - middle) @ turn.T / steps
     at = np.stack([nudged(grid[:, k], sheet.F) for k in range(2)], axis=2)
     over = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) <= 0.0
     if over.any():

@@ -24,7 +24,7 @@ from .file import Project, load
 from .firmer import Changed, firmer
 from .outcome import EXTENSIVE, OnStep, Outcome, ignore
 from .settings import AccuracyWanted, of_material
-from .solving import solve_project
+from .solving import solve_and_swap, solve_project
 from .start import start_of
 from .writing import check_outputs, project_files, write_all
 
@@ -174,7 +174,7 @@ def run_project(
         jobs = project_files(project, outcome, anyway, progress)
         with output_folder(project.folder or Path()):
             outcome = replace(outcome, files=write_all(jobs, progress))
-    if use_cache and changed is None:
+    if use_cache and changed is None and not project.swap:
         cache.keep(project, outcome)
     if check_after and project.mesh_check:
         firmer(outcome, changed, progress)
@@ -188,7 +188,11 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
     _check_wishes(project, surface)
-    solved = solve_project(project, surface, report)
+    swapped = False
+    if project.swap:
+        solved, swapped = solve_and_swap(project, surface, report)
+    else:
+        solved = solve_project(project, surface, report)
     notes = [*solved.notes]
     starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
     if starts:
@@ -201,7 +205,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas, volumes and lengths are those of the part between the mirror planes")
     outcome = replace(solved, notes=notes, units=start.units, data=start.data)
-    if outcome.good:
+    if outcome.good or swapped:
         return outcome
     notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")

@@ -54,6 +54,7 @@ class Project:
     mesh_check: bool | None = None  # also solve on finer meshes; None if the file does not say
     margin: Sequence[str] = ()  # what margins are wanted of, as in ``pcmc.margin``
     verify: bool = False  # prove that an exact equilibrium is near
+    swap: Sequence[str] = ()  # films and walls to open the other way; those of a command, no key names them
     search: bool = True  # try further starts where the first leads to no equilibrium
     remeshing: Sequence[Remeshing] = ()  # in order
     targets: Sequence[Target] = ()  # those for ``rises`` are the last

@@ -38,6 +38,8 @@ def _found(outcome: Outcome, changed: Changed | None, step: OnStep) -> str:
     check, project, design = outcome.mesh_check, outcome.project, outcome.design
     if check is None or check.advice or outcome.advice or project is None or project.plan is None:
         return ""
+    if project.swap:  # the roof has other neighbours than the plan
+        return ""
     held = check.verdict.name == "HELD_BY_MESH"
     if not held and (design is None or design.met):
         return ""

@@ -9,12 +9,14 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import OptionError
+from ..certificate.diagnosis import VANISHED, vanished_films
 from ..solvers import solve, solve_once
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .checking import in_file
 from .file import Project
 from .outcome import OnStep, Outcome, ignore
+from .settings import AccuracyWanted
 
 if TYPE_CHECKING:
     from ..design import Target
@@ -57,6 +59,34 @@ def solve_project(project: Project, surface: Surface, progress: OnStep = ignore)
             else:
                 outcome = replace(accurate, design=outcome.design)
     return replace(outcome, notes=[note for note in notes if note], **about)
+
+
+def solve_and_swap(project: Project, surface: Surface, report: OnStep) -> tuple[Outcome, bool]:
+    """The same, with other neighbours of the project's films to ``swap``; and whether the surface has these.
+
+    They are swapped on the first mesh and with the first tensions; what else the project asks for follows.
+    """
+    from ..equilibria import swap_neighbours  # takes long to import
+
+    known = {patch.name for patch in surface.patches}
+    for name in project.swap:
+        if name != VANISHED:
+            surface.patch_index(name)  # refuses an unknown one before the work
+    options = {key: value for key, value in project.options.items() if key not in ("order", "levels")}
+    first = replace(project, options=options, targets=(), remeshing=(), wanted=AccuracyWanted())
+    outcome, kept = solve_project(first, surface, report), False
+    surface, note = outcome.surface, "nothing swapped: no film or wall between two junctions has vanished"
+    vanished = vanished_films(surface)
+    if films := [film for name in project.swap for film in ([name] if name in known else vanished)]:
+        report("swapping neighbours")
+        how: dict[str, Any] = {"method": project.method, "callback": reporter(report), **options}
+        swapped = swap_neighbours(surface, list(dict.fromkeys(films)), **how)
+        if swapped.result.status is Status.STOPPED:
+            raise KeyboardInterrupt
+        surface, kept, note = swapped.surface, swapped.kept, swapped.message
+    if kept or outcome.good:
+        outcome = solve_project(project, surface, report)
+    return replace(outcome, notes=[note, *outcome.notes], project=project), kept
 
 
 def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:

@@ -57,7 +57,8 @@ def run_as_far(
 ) -> tuple[StepResults, ...]:
     """The results of these steps of a model, as far as the program finds equilibria; see ``read_steps``.
 
-    CalculixError where it finds none even for the first of them, the form-finding load.
+    CalculixError where it finds none even for the first of them, the form-finding load; OptionError where a
+    material's law does not hold.
     """
     # where beams meet the program compares 1e-5 to terms of 1/length: in mm it misses what it finds in m
     unit = 10.0 ** max(round(math.log10(model.surface.size / USUAL_SIZE)), 0)
@@ -79,6 +80,8 @@ def run_as_far(
             text = f"the members carry only {share:.0f} % of what walls and supports do; "
             text += "; ".join(filter(None, unheld)) or "make them stiffer"
         raise CalculixError(text, what=steps[0].name)
+    for result in found:
+        result.thicknesses  # noqa: B018
     return found
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats, Ints, format_rows
 from ..base.files import as_path, atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
@@ -48,7 +49,7 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel, mark: 
     check_name(path)
     suffix_of(path, (".inp",), "a structural model")
     expect_model(model)
-    text = text_of(model, model.steps, mark=mark)
+    text = text_of(model, model.steps, mark=validate.one_line("mark", mark))
     with writing(path), atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
@@ -68,7 +69,10 @@ def text_of(
     text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]
     text += [f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1)]
     text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes] / unit)]
-    text += chain(_elements(model, unit), _beams(model, unit), _supports(model))
+    number = np.arange(1, surface.n + 1)  # of the nodes of members: their own where they are tied
+    number[model.tied] = model.surface.n + 1 + np.arange(len(model.tied))
+    parts = _elements(model, number, unit), _beams(model, number, unit), _ties(model, number)
+    text += chain(*parts, _supports(model))
     # σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge
     prestress = [(model.faces + 1, model.stresses, POINTS)]
     for cable, area, _, numbers, along in model.cable_edges():
@@ -83,7 +87,7 @@ def text_of(
     return "".join(chain(text, *(_step(model, step, k == 0, every, unit) for k, step in enumerate(steps))))
 
 
-def _elements(model: StructuralModel, unit: float) -> Iterator[str]:
+def _elements(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
     """Elements, node sets, materials and sections by patch and by cable."""
     surface, (name, section, _) = model.standing, KINDS[model.elements]
     patch_of = surface.patch_of_face[model.active]
@@ -104,24 +108,19 @@ def _elements(model: StructuralModel, unit: float) -> Iterator[str]:
             yield f"*{section} SECTION, ELSET={one}, MATERIAL=PATCH_{k}, ORIENTATION={one}\n{thickness}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k + 1},\n" for k in np.unique(patch_of))
     for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
-        yield card(f"ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}", numbers, cable.edges + 1)
+        ends = number[cable.edges] if model.elements == "shell" else cable.edges + 1
+        yield card(f"ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}", numbers, ends)
         yield _material(f"CABLE_{k}", material, unit)
         yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{k}\n{short(area / unit**2)}\n"
     if surface.cables:
         yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(surface.cables)))
 
 
-def _beams(model: StructuralModel, unit: float) -> Iterator[str]:
-    """Members, as rectangles with the stiffness of their profiles, and what holds their ends.
-
-    They have nodes of their own, tied to those of the sheets: where membranes and beams share nodes, the
-    constraints that CalculiX makes for them contradict each other from one increment to the next.
-    """
-    X, up, vertices = model.standing.vertices, np.array(model.surface.plane.normal), model.beam_vertices
-    number = np.zeros(len(X), dtype=np.int64)
-    number[vertices] = model.surface.n + 1 + np.arange(len(vertices))
-    if len(vertices):
-        yield card("NODE, NSET=BEAMS", number[vertices], X[vertices] / unit)
+def _beams(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
+    """Beams, as rectangles with the stiffness of their profiles."""
+    X, up = model.standing.vertices, np.array(model.surface.plane.normal)
+    if len(model.tied):
+        yield card("NODE, NSET=MEMBERS", number[model.tied], X[model.tied] / unit)
     first = model.surface.m + 1 + sum(len(cable.edges) for cable in model.standing.cables)
     for k, line in enumerate(model.beams, 1):
         elements, first = first + np.arange(len(line.pairs)), first + len(line.pairs)
@@ -137,8 +136,16 @@ def _beams(model: StructuralModel, unit: float) -> Iterator[str]:
         m = line.member.material
         m = replace(m, young=factor * m.young, density=factor * m.density)
         yield _material(f"MEMBER_{k}", m, unit)
-    turns = held_turns(model, X)
-    for v, node in zip(vertices.tolist(), number[vertices].tolist(), strict=True):
+
+
+def _ties(model: StructuralModel, number: Ints) -> Iterator[str]:
+    """What ties the nodes of members to those of the sheets, and holds their ends.
+
+    Where membranes and beams, or shells and cables, share nodes, the constraints that CalculiX makes for
+    them contradict each other from one increment to the next, or it stops with "code 255".
+    """
+    turns = held_turns(model, model.standing.vertices)
+    for v, node in zip(model.tied.tolist(), number[model.tied].tolist(), strict=True):
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
         if v in turns or stops not in ("", "123"):
             axes = model.axes[v]
@@ -151,7 +158,7 @@ def _beams(model: StructuralModel, unit: float) -> Iterator[str]:
             yield f"*BOUNDARY\n{node},4,{3 + len(turns[v])}\n"
         for axis in sorted({"1", "2", "3"} - set(stops)):
             yield f"*EQUATION\n2\n{node},{axis},1.,{v + 1},{axis},-1.\n"
-    yield _set("ENDS", number[vertices[model.held[vertices]]] - 1)
+    yield _set("ENDS", number[model.tied[model.held[model.tied]]] - 1)
 
 
 def _material(name: str, material: Material, unit: float) -> str:
@@ -224,7 +231,7 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: flo
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
     printed = {"NODE PRINT, NSET=NALL": "U"}
     printed |= {"NODE PRINT, NSET=HELD": "RF"} if model.held.any() else {}
-    printed |= {"NODE PRINT, NSET=ENDS": "RF"} if model.held[model.beam_vertices].any() else {}
+    printed |= {"NODE PRINT, NSET=ENDS": "RF"} if model.held[model.tied].any() else {}
     printed |= {f"EL PRINT, ELSET={name}": "S" for name in sets}
     for what, quantity in printed.items():
         yield f"*{what}, GLOBAL=YES, FREQUENCY={1 if every else 1000}\n{quantity}\n"

@@ -153,11 +153,6 @@ class Profile:
         q = short / long
         return factor * short**3 * long * (1.0 / 3.0 - 0.21 * q * (1.0 - q**4 / 12.0))
 
-    def scaled(self, factor: float) -> Profile:
-        """The profile with ``factor`` times the area and the second moments."""
-        up, side = self.moments
-        return Profile(factor * self.area, factor * up, factor * side)
-
 
 def _size(name: str, value: object) -> float:
     return validate.number(f"Profile.{name}", value, least=SMALLEST, most=LARGEST)

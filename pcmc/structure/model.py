@@ -109,6 +109,9 @@ class StructuralModel:
                 validate.refuse("material", material, "a Material", where, hint)
         thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
+        if self.elements == "shell" and any(plane.mirror for plane, _ in surface.on_planes):
+            text = "elements: shells would be hinged in a mirror; take the whole roof, pcmc.mirrored(surface)"
+            raise OptionError(text, what="elements", found="shell")
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
         if self.cable_material is None and surface.cables and isinstance(self.material, Mapping):
@@ -219,8 +222,15 @@ class StructuralModel:
 
     @cached_array
     def beam_vertices(self) -> Ints:
-        """The vertices of beams; their nodes come after the vertices' numbers."""
+        """The vertices of beams."""
         return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
+
+    @cached_array
+    def tied(self) -> Ints:
+        """The vertices where beams, and the cables of shells, have nodes of their own, tied to those of the
+        sheets. Their numbers come after the vertices'."""
+        cables = self.standing.cables if self.elements == "shell" else ()
+        return np.unique(np.concatenate([self.beam_vertices, *(cable.edges.ravel() for cable in cables)]))
 
     @cached_property
     def lines(self) -> tuple[PlacedMember, ...]:

@@ -15,13 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, cached_array
-from ..base.errors import FileError
+from ..base.errors import FileError, OptionError
 from ..base.files import check_regular, suffix_of, system_error
 from ..forces.cables import directions
 from ..surface.geometry import area_vectors, segment_lengths, unit_vectors
 from .loads import Step, nothing
 from .model import StructuralModel, expect_model
 
+LEFT = 0.01  # of a squared thickness: a law of constant E and ν holds for no strain that leaves less
 WHOLE = 1e-6  # of a step: a time so near to its end is the end
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
@@ -69,6 +70,7 @@ class StepResults:
         """(m,) thickness of each face under the loads, t √(1 - ν (tr C - 2) / (1 - ν)), length.
 
         C is the right Cauchy-Green tensor in its plane: stretched sheets are drawn in. Cloth keeps its t.
+        OptionError for a strain at which the material's law has almost no thickness left.
         """
         model, standing = self.model, self.model.standing
         faces, patch = standing.faces[model.active], standing.patch_of_face[model.active]
@@ -76,8 +78,9 @@ class StepResults:
         metric, stretched = before @ before.swapaxes(1, 2), after @ after.swapaxes(1, 2)
         thinner = [0.0 if of.cloth else of.poisson / (1.0 - of.poisson) for of in model.materials]
         growth = np.trace(np.linalg.solve(metric, stretched), axis1=1, axis2=2) - 2.0
-        values = model.thicknesses[model.surface.patch_of_face]
-        values[model.faces] *= np.sqrt(1.0 - np.array(thinner)[patch] * growth)
+        values, left = model.thicknesses[model.surface.patch_of_face], 1.0 - np.array(thinner)[patch] * growth
+        _check_strain(self.step, f"patch {model.surface.patches[patch[left.argmin()]].name!r}", left)
+        values[model.faces] *= np.sqrt(left)
         return values
 
     @cached_array
@@ -163,8 +166,8 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
     displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values
     if "forces" in blocks:
         reactions[blocks["forces"].ids - 1] = blocks["forces"].values
-        if "ends" in blocks:  # of beams, at nodes of their own
-            reactions[model.beam_vertices[blocks["ends"].ids - 1 - surface.n]] += blocks["ends"].values
+        if "ends" in blocks:  # of members, at nodes of their own
+            reactions[model.tied[blocks["ends"].ids - 1 - surface.n]] += blocks["ends"].values
         reactions -= model.nodal_loads(step, np.nan_to_num(displacements))
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
@@ -174,11 +177,19 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
     for cable, area, of, numbers, _ in model.cable_edges() if "cables" in blocks else ():
         mine, along = blocks["cables"].means(numbers)[:, TENSOR], directions(moved, cable.edges)[0]
         stretch = segment_lengths(moved, cable.edges) / segment_lengths(surface.vertices, cable.edges)
-        section = area * (1.0 - of.poisson * (stretch**2 - 1.0))  # as far as it is drawn in
-        tensions[cable.name] = section * np.einsum("ki,kij,kj->k", along, mine, along)
+        left = 1.0 - of.poisson * (stretch**2 - 1.0)  # of its section, as far as it is drawn in
+        _check_strain(step, f"cable {cable.name!r}", left)
+        tensions[cable.name] = area * left * np.einsum("ki,kij,kj->k", along, mine, along)
     done = 1.0 if share >= 1.0 - WHOLE else share
     taut = min(_taut(model, k, tables), done)
     return StepResults(step.name, model, displacements, reactions, stresses, tensions, step, done, taut)
+
+
+def _check_strain(step: Step, what: str, left: Floats) -> None:
+    """Refuse a sheet or cable of which, squared thickness or section, the strain leaves next to nothing."""
+    if left.min() < LEFT:
+        text = f"{step.name}: {what} stretches so far that the material's law leaves it no thickness"
+        raise OptionError(f"{text}; give it a larger young or thickness, or less load", what="Material.young")
 
 
 def _taut(model: StructuralModel, k: int, tables: list[Tables]) -> float:

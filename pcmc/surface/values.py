@@ -20,6 +20,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON, SAME_PRESSURE
+from .images import check_weights
 
 TRIED = 1000  # triangles of a patch that are looked at for others above them
 
@@ -86,6 +87,8 @@ def with_values(
     of_patches["pressure"] = of_both_sheets(surface, of_patches.get("pressure", {}))
     of_patches["tension"] = with_sheets_below(surface, of_patches.get("tension", {}))
     changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
+    heavy = (*changed["patches"], *changed["cables"])
+    check_weights(heavy, surface.plane, surface.on_planes, surface.vertices, surface.images)
     following: dict[str, dict[str, Any]] = {}
     for field in ("pressure", "snow"):
         old, new = (
@@ -190,7 +193,8 @@ def wall_patches(surface: Any) -> Bools:
     prescribed volume or hang below a junction of the roof. A patch hangs below a junction where it goes down
     to Π more steeply than two others do, along most of its edges at junctions with a patch that carries
     pressure or weight. Any other patch without pressure is a sail: part of the roof. If no patch carries
-    anything, as with soap films, only declared walls are walls.
+    anything, as with soap films, or if the surface goes on above itself, as a foam does, only declared walls
+    are walls.
 
     >>> from . import Patch, Surface
     >>> X = [[0, 0, 2], [0, 4, 2], [0, 2, 0], [3, 2, 3], [-3, 2, 3]]
@@ -202,7 +206,10 @@ def wall_patches(surface: Any) -> Bools:
     declared = np.array([patch.wall for patch in surface.patches])
     open_ones = surface.auxiliary & ~declared
     carrying = ~surface.auxiliary | (surface.weights != 0.0) & ~declared
-    if not open_ones.any() or not carrying.any():
+    image, vertex = surface.images.T
+    shift = (surface.vertices[image] - surface.vertices[vertex]) @ np.array(surface.plane.normal)
+    above = (np.abs(shift) > ON * surface.size).any()
+    if above or not open_ones.any() or not carrying.any():
         return declared
     signs = surface.room_signs
     between = (signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0)

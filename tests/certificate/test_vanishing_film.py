@@ -5,7 +5,7 @@ import pytest
 from periodic_cases import steiner_films
 
 import pcmc
-from pcmc.certificate.diagnosis import where_collapsed
+from pcmc.certificate.diagnosis import SWAP, vanished_films, where_collapsed
 
 
 def test_a_vanishing_film_is_named_with_those_that_then_meet() -> None:
@@ -13,10 +13,16 @@ def test_a_vanishing_film_is_named_with_those_that_then_meet() -> None:
     result = pcmc.solve(steiner_films(0.56, 1.0))
     assert result.certificate.verdict is pcmc.Verdict.DEGENERATE
     first, second = "'south-west' and 'south-east'", "'north-west' and 'north-east'"
-    sentence = (
-        f"patch 'middle' may vanish: {first} then meet, and {second}; try pcmc.swap_neighbours(surface)"
-    )
+    sentence = f"patch 'middle' may vanish: {first} then meet, and {second}; {SWAP}"
     assert sentence in result.certificate.detail
+    assert vanished_films(result.surface) == ["middle"]
+
+
+def test_a_narrow_film_whose_junctions_are_held_apart_is_not_offered() -> None:
+    films = pcmc.solve(steiner_films(0.56, 1.0)).surface
+    held = films.rebuilt(fixed=films.fixed | films.topology.on_junction[films.original])
+    assert vanished_films(held) == []
+    assert "vanish" not in where_collapsed(held, np.zeros(len(held.patches), dtype=bool))
 
 
 def test_where_they_meet_the_other_tree_is_at_rest_and_has_less_energy() -> None:

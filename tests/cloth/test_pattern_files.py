@@ -10,7 +10,7 @@ from printed import words_of
 from shapely import Point, Polygon
 
 from generators import joined_caps
-from pcmc import cutting_pattern, project, solve, write
+from pcmc import Plane, Surface, cutting_pattern, project, solve, write
 from pcmc.base.errors import MissingExtra, OptionError, PcmcError
 from pcmc.cli import main
 from pcmc.cloth import pattern_drawings
@@ -281,6 +281,23 @@ def test_units_and_the_library_are_asked_for(pattern, monkeypatch):
     monkeypatch.setattr(libraries, "import_module", missing)
     with pytest.raises(MissingExtra, match=r"potpourri3d is not installed; .*pcmc-surfaces\[cloth\]"):
         cutting_pattern(pattern.surface, 3.0, certificate=pattern.certificate)
+
+
+def test_seams_on_a_tilted_plane_are_drawn_square_to_it_and_say_so(pattern):
+    """The plan from above has other places: these are those of drawn seams."""
+    sheets = []
+    for plane in (Plane(), Plane((1.0, 2.0, 3.0), (0.6, 0.0, 0.8))):
+        s = pattern.surface
+        X = s.vertices @ plane.axes + plane.point
+        turned = Surface(X, s.faces, s.patch_of_face, s.patches, fixed=s.held, plane=plane)
+        sheets.append(pattern_drawings(cutting_pattern(turned, 3.0, anyway=True), "m").sheets[0])
+    level, tilted = ([line.points for line in sheet.lines if line.layer == "PCMC-RIM"] for sheet in sheets)
+    for one, other in zip(level, tilted, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-3)
+    titles = [sheet.title for sheet in sheets]
+    assert titles[1] == f"{titles[0]}, seen square to its tilted plane, places in the axes of that"
+    places = [{text.text for text in sheet.texts} for sheet in sheets]
+    assert len(places[0] ^ places[1]) <= 2
 
 
 def test_a_roof_that_is_not_certified_is_marked(pattern):

@@ -113,6 +113,20 @@ def test_a_roof_that_cuts_itself_and_one_that_misses_its_targets_are_marked(squa
     assert marks_of(drawing_set(squares, "m", mark="TARGETS NOT MET")) == {"TARGETS NOT MET"}
 
 
+def test_a_mark_of_several_lines_is_refused_before_a_file_is_written(tmp_path, squares):
+    """The second line would be a line of the file."""
+    model, net = pcmc.StructuralModel(squares, pcmc.Material(1e6), 0.001), pcmc.panel_net(squares, 0.3)
+    for write in (
+        lambda mark: drawing_set(squares, "m", mark=mark),
+        lambda mark: pcmc.write(tmp_path / "roof.obj", squares, mark=mark),
+        lambda mark: pcmc.write_structure(tmp_path / "roof.inp", model, mark=mark),
+        lambda mark: net.write_obj(tmp_path / "net.obj", mark=mark),
+    ):
+        with refused(OptionError, what="mark"):
+            write("TARGETS\nNOT MET")
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, drawings):
     def computed(*_, **__):
         raise AssertionError

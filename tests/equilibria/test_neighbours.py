@@ -6,6 +6,7 @@ from periodic_cases import honeycomb, honeycomb_energy, scattered, steiner_films
 
 import pcmc
 from generators.cells import _foam
+from pcmc.certificate.diagnosis import SWAP
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.elevation import elevate
 from pcmc.meshing.local_refinement import refine_faces
@@ -118,11 +119,13 @@ def test_a_film_with_a_high_tension_does_not_open(tension: float, gone: bool) ->
 @pytest.mark.parametrize("shear", [1.1, 1.3])
 def test_a_honeycomb_sheared_on_becomes_that_of_the_next_lattice(shear: float) -> None:
     u, v = np.array([1.0, 0.0]), np.array([0.5 + shear * 0.75**0.5, 0.75**0.5])
-    foam = pcmc.solve(honeycomb(u, v)).surface
-    swapped = pcmc.swap_neighbours(foam, ["b00", "b01", "b10", "b11"])
+    stopped = pcmc.solve(honeycomb(u, v))
+    swapped = pcmc.swap_neighbours(stopped.surface, ["b00", "b01", "b10", "b11"])
     assert swapped.kept
     assert swapped.result.energy == pytest.approx(4.0 * honeycomb_energy(u, v - u), rel=1e-12)
     assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.75**0.5, rel=1e-9)
+    assert stopped.certificate.verdict.name == ("NEUTRAL" if stopped.converged else "DEGENERATE")
+    assert pcmc.room_volumes(stopped.surface) == pytest.approx(0.75**0.5, rel=1e-6)
 
 
 def test_energies_are_told_at_the_volumes_and_without_the_work_of_pressures() -> None:
@@ -145,6 +148,10 @@ def test_kelvins_foam_stretched_until_its_squares_vanish() -> None:
     assert swapped.result.certificate.index == 0
     assert swapped.result.energy < vanished.energy - 0.005
     assert pcmc.room_volumes(swapped.surface) == pytest.approx(0.5, rel=1e-9)
+    assert not swapped.surface.walls.any()  # whatever rounding makes of pressures that are 0
+    assert not len(swapped.result.certificate.leaning)
+    sentences = str(swapped).split("; ")
+    assert len(set(sentences)) == len(sentences)
 
 
 def roof(width: float, depth: float, **pressures: float) -> pcmc.Surface:
@@ -175,9 +182,7 @@ def test_below_a_roof_two_rooms_become_neighbours() -> None:
     start = roof(3.2, 6.0)
     west, east = name_at(start, -1.2, 0.0), name_at(start, 1.2, 0.0)
     vanished = solve_once(start)
-    sentence = (
-        f"patch 'middle' may vanish: '{west}' and '{east}' then meet; try pcmc.swap_neighbours(surface)"
-    )
+    sentence = f"patch 'middle' may vanish: '{west}' and '{east}' then meet; {SWAP}"
     assert sentence in vanished.certificate.detail
     swapped = pcmc.swap_neighbours(vanished.surface)
     assert swapped.kept

@@ -13,6 +13,7 @@ from structures import FABRIC, model_of, pyramid, results_of, square
 import pcmc
 from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, Wind
 from pcmc.certificate.forces import support_forces, total_load
+from pcmc.plan import Plan
 from pcmc.structure import analyse, calculix
 from pcmc.structure.calculix import CalculixError
 from pcmc.surface.geometry import face_areas
@@ -233,6 +234,23 @@ def test_a_sail_between_edge_cables_is_at_rest_there():
 
 
 ROPE = {"cable_area": 0.025**2, "cable_material": Material(young=1.6e8)}  # steel, as a beam 0.5 stiff
+
+
+def test_shells_and_a_cable_across_them_stay_where_they_are():
+    """Their nodes are tied: with shared ones CalculiX stopped with "code 255"."""
+    line = {"curve": [[2, 0], [2, 4]], "cable": 3.0, "wall": False}
+    plan = Plan([[0, 0], [4, 0], [4, 4], [0, 4]], [line], edge_length=0.7, tension=1.5, pressure=0.2)
+    surface, snow = pcmc.solve(plan.surface()).surface, 0.05
+    shells, films = (
+        results_of(model_of(surface, loads=[Snow(snow)], elements=elements, cable_area=1e-4))
+        for elements in ("shell", "membrane")
+    )
+    assert shells[0].largest_displacement < 1e-4
+    for shell, film in zip(shells, films, strict=True):
+        np.testing.assert_allclose(shell.cable_tensions["cable 1"], film.cable_tensions["cable 1"], rtol=0.02)
+        np.testing.assert_allclose(shell.reactions.sum(axis=0), film.reactions.sum(axis=0), atol=1e-3)
+        total = shell.model.nodal_loads(shell.step, shell.displacements).sum(axis=0)
+        np.testing.assert_allclose(shell.reactions.sum(axis=0), -total, atol=1e-3)
 
 
 def test_a_film_with_a_rope_across_follows_poisson():

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import pcmc
 from pcmc import Cable, Material, Plane, Snow, StructuralModel
@@ -48,6 +49,15 @@ def test_half_with_a_cable_in_its_mirror_carries_what_the_whole_does():
         table = one.supports.query("case == 'snow' and kind == 'cable end'")
         ends = np.linalg.norm(table[["force_x", "force_y", "force_z"]], axis=1)
         assert [np.abs(np.abs(pull) - end).min() < 1e-6 for end in ends] == [True, True]
+
+
+def test_half_of_shells_is_refused():
+    """A mirror held no turns: a thin half deflected 3 % more than its whole, a thick one too."""
+    half, whole = halves()
+    given = {"elements": "shell", "cable_area": 1e-4, "anyway": True}
+    with refused(OptionError, what="elements"):
+        StructuralModel(half, Material(5e5), 1e-3, **given)
+    StructuralModel(whole, Material(5e5), 1e-3, **given)
 
 
 def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hall_with_members import STEEL, TUBE, hall_with
 from starts import spherical_cap
-from structures import model_of, square
+from structures import model_of, scaled, square
 
 import pcmc
 from pcmc import Circle, Material, SelfWeight, Snow
@@ -58,7 +58,7 @@ def test_beams_have_nodes_of_their_own_tied_to_the_vertices_where_these_are(tmp_
     pcmc.write_structure(tmp_path / "hall.inp", model)
     text = (tmp_path / "hall.inp").read_text()
     [line] = model.beams
-    part = re.search(r"^\*NODE, NSET=BEAMS\n(.*?)^\*", text, re.M | re.S)[1]
+    part = re.search(r"^\*NODE, NSET=MEMBERS\n(.*?)^\*", text, re.M | re.S)[1]
     nodes = {int(row[0]): row[1:] for row in np.loadtxt(part.splitlines(), delimiter=",").tolist()}
     assert len(nodes) == len(np.unique(line.pairs))
     blocks = re.findall(r"^\*ELEMENT.*\n([^*]*)", text, re.M)
@@ -125,7 +125,7 @@ def test_a_member_that_buckles_is_told_with_what_would_hold_it():
     assert line.startswith("rest: rim buckles at ")
     factor = float(line.split("; ")[1].split(" times")[0])
     assert factor == pytest.approx(1.0 / table["buckling"][0], rel=0.05)
-    stiff = replace(rim, profile=wire.scaled(1.01 * factor))
+    stiff = replace(rim, profile=scaled(wire, 1.01 * factor))
     assert 1.0 < members_at_rest(model_of(cap, members=[stiff], anyway=True))[0].buckling < 1.1
 
 

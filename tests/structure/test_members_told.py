@@ -7,7 +7,7 @@ import pytest
 from hall_with_members import STEEL, TUBE, hall, hall_under_load, hall_with
 from refusals import refused
 from starts import spherical_cap
-from structures import FABRIC, model_of, square
+from structures import FABRIC, model_of, scaled, square
 
 from pcmc import Material, StructuralModel
 from pcmc.base.errors import OptionError
@@ -139,12 +139,12 @@ def test_a_member_that_is_too_weak_is_told_with_the_stiffness_that_is_enough():
     [rest] = members_at_rest(hall_with(arch))
     assert told.startswith("wall 1 is too weak: under form pressure it moves 0.0")
     assert factor(told) == pytest.approx(300.0 * rest.deflection / rest.span, rel=0.01)
-    assert weak(analyse(hall_with(replace(arch, profile=arch.profile.scaled(factor(told)))))) == []
+    assert weak(analyse(hall_with(replace(arch, profile=scaled(arch.profile, factor(told)))))) == []
 
     edge = Member(polyline([[0, 1], [1, 1]]), Profile.tube(0.06, 0.005), Material(2.1e6), name="edge")
     [told] = weak(analyse(model_of(square(8, tension=2.0), members=[edge], anyway=True)))
     assert int(told.split("the sheets carry ")[1].split(" %")[0]) > 50
-    stiff = replace(edge, profile=edge.profile.scaled(factor(told)))
+    stiff = replace(edge, profile=scaled(edge.profile, factor(told)))
     assert weak(analyse(model_of(square(8, tension=2.0), members=[stiff], anyway=True))) == []
 
 
@@ -190,7 +190,7 @@ def test_a_ring_that_only_sheets_hold_upright_wants_props_and_no_stiffness():
     """The sheets of a cap pull its rim down with the load on the disc, however stiff the rim is."""
     cap = spherical_cap(0.4, alpha=0.6, exact=True)
     for propped in (False, True):
-        for profile in (TUBE, TUBE.scaled(1e3)):
+        for profile in (TUBE, scaled(TUBE, 1e3)):
             rim = Member(circle([0, 0], 1.0), profile, STEEL, propped=propped, name="rim")
             model = model_of(cap, members=[rim], anyway=True)
             [text] = sentences(model, Units("m", "kN"))

@@ -5,7 +5,7 @@ from refusals import refused
 from structures import LOADS, dat_text, model_of, pyramid, square
 
 import pcmc
-from pcmc.base.errors import FileError
+from pcmc.base.errors import FileError, OptionError
 from pcmc.certificate.forces import support_forces
 
 
@@ -39,6 +39,23 @@ def test_principal_stresses_lie_in_the_faces():
         "form", model, np.zeros((5, 3)), np.zeros((5, 3)), stresses, {}, model.steps[0]
     )
     np.testing.assert_allclose(result.principal_stresses, 7.0)
+
+
+def test_strains_that_leave_no_thickness_are_refused():
+    """All alike in the plane: t √(1 - 2 ν/(1 - ν) (λ² - 1)) is none at λ² = 1.611 for ν = 0.45."""
+    model = model_of(pyramid(), material=pcmc.Material(1e6, 0.45))
+    X, stresses = model.surface.vertices, np.zeros((4, 3, 3))
+    for stretch, left in ((1.2, (1.0 - 0.88 * 0.45 / 0.55) ** 0.5), (1.268, None), (1.3, None)):
+        moved = (stretch - 1.0) * X
+        found = pcmc.structure.StepResults(
+            "form", model, moved, np.zeros((5, 3)), stresses, {}, model.steps[0]
+        )
+        if left is not None:
+            np.testing.assert_allclose(found.thicknesses, 1e-3 * left)
+            continue
+        with refused(OptionError, what="Material.young") as caught:
+            found.thicknesses  # noqa: B018
+        assert "\n" not in str(caught.value)
 
 
 def test_damaged_results_are_refused_in_one_line(tmp_path):

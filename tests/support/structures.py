@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pcmc import Cable, Material, Patch, SelfWeight, Snow, Surface, Wind
+from pcmc import Cable, Material, Patch, Profile, SelfWeight, Snow, Surface, Wind
 from pcmc.structure import StepResults, StructuralModel, analyse
 
 FABRIC = Material(young=1e6, poisson=0.3, density=0.1)
@@ -40,6 +40,11 @@ def pyramid() -> Surface:
 def model_of(surface: Surface, **more: object) -> StructuralModel:
     """The model of a surface in FABRIC, a thousandth thick."""
     return StructuralModel(surface, **{"material": FABRIC, "thickness": 1e-3, **more})
+
+
+def scaled(profile: Profile, factor: float) -> Profile:
+    """The profile with ``factor`` times the area and the second moments."""
+    return Profile(factor * profile.area, *(factor * moment for moment in profile.moments))
 
 
 def results_of(model: StructuralModel) -> list[StepResults]:
