@@ -225,6 +225,20 @@ def test_materials_by_patch_have_their_own_weight_and_stiffness(tmp_path):
 
 
 @needs_ccx
+def test_a_cable_that_would_be_pressed_is_told():
+    """CalculiX lets it press as a strut, and the case counted as carried without a word."""
+    line = {"curve": [[3, 0], [3, 4]], "cable": 1.0, "wall": False}
+    plan = Plan([[0, 0], [6, 0], [6, 4], [0, 4]], [line], edge_length=0.8, tension=1.5, pressure=0.5)
+    loads, rope = [Snow(0.05, name="light"), Snow(0.3, name="heavy")], Material(1e8)
+    about = {"cable_area": 1e-4, "cable_material": rope, "loads": loads, "material": Material(5e5)}
+    found = analyse(model_of(pcmc.solve(plan.surface()).surface, **about), remedy=False)
+    assert found.carried
+    [told] = [line for line in found.answers() if "strut" in line]
+    assert told.startswith("heavy: cable 1 is slack")
+    assert f"{-found.cables['least'].min():.3g}" in told
+
+
+@needs_ccx
 @pytest.mark.parametrize("poisson", [0.0, 0.3])
 def test_the_tension_of_a_cable_is_along_it_as_it_hangs(poisson):
     """Two edges with N = λ (τ + E a (λ² - 1)/2), and snow q at the vertex between them: 2 N sin θ = q. The
