@@ -167,20 +167,21 @@ def load_steps(
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
     form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
-    steps, added, always = [form], {FORM: (form, nothing(form))}, {FORM: 1.0}
+    steps, added, weights = [form], {FORM: (form, nothing(form))}, dict[str, float]()
     for together in map(acting_together, loads):
         step = replace(permanent, name=step_name(together))
         for load in together:
             step = load.added_to(step, surface, gravity)
         steps.append(step)
         added[step.name] = step, permanent
-        always |= {step.name: 1.0} if all(isinstance(load, SelfWeight) for load in together) else {}
+        weights[step.name] = step.gravity - permanent.gravity
         permanent = replace(permanent, gravity=step.gravity)
     for name, factors in (combinations or {}).items():
         sum_ = replace(nothing(form), name=name)
-        for case, factor in (always | dict(factors)).items():
+        for case, factor in ({FORM: 1.0} | dict(factors)).items():
             sum_ = sum_.plus(*added[case], factor)
-        steps.append(sum_)
+        others = sum(weight for case, weight in weights.items() if case not in factors)
+        steps.append(replace(sum_, gravity=sum_.gravity + others))
     return tuple(steps)
 
 
