@@ -247,7 +247,7 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats, more
     nearest, advice, ending = np.inf, "", ""
     reason += f" near {point_text(place, surface.size)}{more}"
     for curve in surface.topology.junctions:
-        ends = [end for end, _ in curve.ends if surface.fixed[end]]
+        ends = [end for end, _ in curve.ends if surface.pinned[end]]
         if not ends or not sliding[list(curve.sheets)].any():
             continue
         length = segment_lengths(X, curve.pairs).sum()
