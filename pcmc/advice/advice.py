@@ -156,6 +156,8 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
     if not (lines or mended.rings):
         return []
     tried = "which was tried and comes to rest" if mended.rests else "as a first step"
+    if mended.rings:
+        tried += ", on finer meshes, too"
     if met:
         tried = "which was tried, comes to rest and meets the targets"
     elif mended.rests and targets:
@@ -170,15 +172,18 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
 def _mended(task: Task, plan: Plan, result: Result) -> Mended:
     """The plan with other supports if these alone bring it to rest; else with other tensions and walls.
 
-    Free edges get cables and single points the smallest rings that do.
+    Free edges get cables; single points get rings, from the size for their heights on, which finer meshes
+    hold, too.
     """
     sail, masts = as_sail(plan, task.rises), point_masts(plan)
     base = plan if sail is None else sail
     fit = all(mast.has_room and not mast.in_mirror for mast in masts)
-    for share in SHARES if masts and fit else () if masts or sail is None else (0.0,):
+    least = max((mast.share for mast in masts), default=0.0)
+    shares = [share for share in SHARES if share >= least] if masts and fit else []
+    for share in shares if masts or sail is None else (0.0,):
         changed = with_rings(base, masts, share) if masts else base
         other = _tried(task, changed, result)
-        if other is not None and other.certificate.certified:
+        if other is not None and other.certificate.certified and (not masts or _persists(other)):
             rings = ring_lines(masts, share, drawn=bool(task.drawing))
             return Mended(changed, other, True, sail is not None, rings)
     better, last = plan, result
@@ -201,6 +206,15 @@ def _tried(task: Task, plan: Plan, result: Result) -> Result | None:
         return solve(coarse(plan, result.surface).surface(), task.method, **task.options)
     except PcmcError:
         return None
+
+
+def _persists(result: Result) -> bool:
+    from ..accuracy import check_mesh  # takes long to import
+
+    try:
+        return check_mesh(result).persists
+    except PcmcError:
+        return False
 
 
 def coarse(plan: Plan, surface: Surface) -> Plan:

@@ -1,11 +1,13 @@
 """First tensions for rises, and what holds a roof badly: rings for single points, cables for free edges.
 
 A membrane held at one point has a peak there that is as thin as its triangles: how high the forces are
-depends on the mesh, and on some meshes it comes to rest, on others not. A ring carries it on any mesh.
+depends on the mesh, and on some meshes it comes to rest, on others not. A ring that is large enough for its
+height carries it on any mesh.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -97,13 +99,13 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         return plan, [], []
     require("shapely", extra="plan")
     from ..plan.draft import part_count
-    from ..plan.proposal import largest_circle, least_tension, plan_area
+    from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
 
     part_count(plan)  # refuses lines that do not fit together, which have no area
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
-    outline = plan.outline.local(plan.plane).at(plan.outline.dense)
-    heights = outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
+    leasts = least_tensions(plan, least)
+    heights = _outline_heights(plan)
     level, lowest, loads = float(heights.mean()), float(heights.min()), net_pressures(plan)
     targets, vary = [], []
     for rise in rises:
@@ -124,12 +126,18 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
             text += f" pressure = ..., or tension = ... instead of {rise.kind}"
             raise OptionError(text, what=rise.kind)
-        plan = _retensioned(plan, rise.patch, least, height - lowest)
+        plan = _retensioned(plan, rise.patch, leasts.get(rise.patch or "", least), height - lowest)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
     if any(divider.wall != BALANCED for divider in plan.dividers):
         plan = _levelled(plan, {rise.patch for rise in rises})
     return plan, targets, vary
+
+
+def _outline_heights(plan: Plan) -> Floats:
+    """(k,) heights over Π of points of the outline."""
+    outline = plan.outline.local(plan.plane).at(plan.outline.dense)
+    return outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
 
 
 def _levelled(plan: Plan, names: Container[str | None]) -> Plan:
@@ -168,7 +176,7 @@ def first_tension(least: float, pressure: float, rise: float) -> float:
     return float(f"{max(cap, LEAST * least * strength):.3g}")
 
 
-SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried
+SHARES = (0.12, 0.25, 0.4, 0.55)  # radii of rings, of the way from a point to the nearest line
 LEAST_RING = 0.25  # smallest radius of a ring over the length of edges
 
 
@@ -179,6 +187,7 @@ class Mast:
     number: int  # its place among the plan's supports
     point: Floats  # (3,) in the coordinates of Π
     clearance: float  # distance in plan to the nearest line or other point that is held
+    height: float  # over the roof without it, about; below 0 under it
     least: float  # the smallest radius of a ring that the triangles beside it can follow
     in_mirror: bool  # whether it is inside of the whole roof alone
 
@@ -191,6 +200,16 @@ class Mast:
     def has_room(self) -> bool:
         """Whether a ring fits between it and what is next to it."""
         return self.clearance > 2.0 * self.least
+
+    @property
+    def share(self) -> float:
+        """The smallest share s of the clearance R at which a ring can be so high over a round plan of it.
+
+        Between rings of radii s R and R at the height h a catenoid that is steep at the inner one ends:
+        h = s R arcosh(1 / s).
+        """
+        steep = abs(self.height) / self.clearance
+        return next((share for share in SHARES if share * math.acosh(1.0 / share) >= steep), SHARES[-1])
 
     def radius(self, share: float) -> float:
         """The radius of a ring around it."""
@@ -228,9 +247,23 @@ def point_masts(plan: Plan) -> list[Mast]:
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))
-    found = zip(given, points, away.tolist(), in_mirror.tolist(), inside, strict=True)
-    least = LEAST_RING * plan.edge_length
-    return [Mast(number, point, far, least, cut) for number, point, far, cut, free in found if free]
+    least, heights = LEAST_RING * plan.edge_length, points[:, 2] - _outline_heights(plan).mean() - _dome(plan)
+    found = zip(given, points, away.tolist(), heights.tolist(), in_mirror.tolist(), inside, strict=True)
+    return [Mast(k, point, far, high, least, cut) for k, point, far, high, cut, free in found if free]
+
+
+def _dome(plan: Plan) -> float:
+    """The height to which pressure lifts the middle of a plan, about: of the flattest cap over its circle."""
+    from ..plan.proposal import least_tension, plan_area
+
+    loads = net_pressures(plan)
+    values = [(area.tension, loads[area.name]) for area in plan.patches]
+    values = values or [(plan.tension or 1.0, plan.pressure - plan.snow)]
+    if not all(pressure > 0.0 for _, pressure in values):
+        return 0.0
+    rim, curved = 2.0 * least_tension(plan_area(plan)), max(2.0 * alpha / p for alpha, p in values)
+    curved = max(curved, rim)
+    return curved - math.sqrt(curved**2 - rim**2)
 
 
 def with_rings(plan: Plan, masts: Sequence[Mast], share: float) -> Plan:
@@ -264,10 +297,10 @@ def mast_note(plan: Plan) -> str:
     if not masts:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
-    curve = ring_lines(masts[:1], SHARES[-1], drawn=False)[2]
+    curve = ring_lines(masts[:1], max(mast.share for mast in masts), drawn=False)[2]
     change = f"hold it on a ring, in [[plan.holes]], instead: {curve}"
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
-        radius = f"of radius {cut[0].radius(SHARES[1]):g} around {cut[0].text}"
+        radius = f"of radius {cut[0].radius(cut[0].share):g} around {cut[0].text}"
         change = f"hold it on a ring instead: lead the outline around it on an arc {radius},"
         change += " from mirror to mirror, and give that arc, with its height, in supports"
     if tight := [mast for mast in masts if not mast.has_room]:

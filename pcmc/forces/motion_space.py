@@ -76,7 +76,7 @@ class VertexClasses:
 
     def mesh(self, surface: Surface) -> Mesh:
         """The active elements, with the tensions and pressures of a surface of these classes."""
-        patch = np.ascontiguousarray(self.patch_of_face[:: surface.order**2])
+        patch = read_only(np.ascontiguousarray(self.patch_of_face[:: surface.order**2]))
         return energy_mesh(surface)._replace(faces=self.nodes, rows=self.rows, patch=patch)
 
     @property

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, read_only
 from ..base.compiled import compiled, inlined, sum_blocks
 from ..surface import Surface, expect_surface
 from ..surface.geometry import (
@@ -76,7 +76,7 @@ def assemble(
 
     def work(first: int, last: int, data: Floats) -> None:
         some = pattern._replace(offset=pattern.offset[first:last])
-        fill(mesh.part(first, last), X, space, some, hessian, stiffness, data)
+        fill(mesh.part(first, last), read_only(X.view()), space, some, hessian, stiffness, data)
 
     data: Floats = sum_blocks(work, len(mesh.faces), pattern.indices.shape)
     add_blocks(elements(surface, X), space, pattern, hessian, stiffness, data)
@@ -218,7 +218,7 @@ def add_blocks(
     for force in forces:
         if not hessian and force.stiffness is None:
             continue
-        blocks = hessian * force.hessian()
+        blocks = np.ascontiguousarray(hessian * force.hessian())
         if stiffness and force.stiffness is not None:
             blocks += stiffness * force.stiffness()[..., None, None] * np.eye(3)
         _assemble_blocks(np.array(force.vertices, dtype=np.int64), blocks, space, pattern, data)

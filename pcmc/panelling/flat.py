@@ -81,7 +81,7 @@ def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple
     [(0, [0.0, -10.0]), (0, [16.0, 0.0]), (1, [0.0, -10.0])]
     """
     page, y, depth = 0, 0.0, 0.0  # of the row that is filled: its top below the page's, and its height
-    row: list[Floats] = []
+    row: list[tuple[float, Floats]] = []  # how far to the right each reaches, and where it is
     for panel in panels:
         size, placed = np.ptp(panel, axis=0), _beside(row, panel)
         if placed[:, 0].max() > wide + ROUNDING or y + size[1] > high + ROUNDING:
@@ -89,13 +89,13 @@ def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple
             if y + size[1] > high + ROUNDING:
                 page, y = page + 1, 0.0
             placed = _beside(row, panel)
-        row.append(placed)
+        row.append((float(placed[:, 0].max()), placed))
         depth = max(depth, float(size[1]))
         yield page, placed - [0.0, y]
 
 
-def _beside(row: list[Floats], panel: Floats) -> Floats:
-    """The panel (3,2) to the right of those of a row, one side up or the other, as far left as possible.
+def _beside(row: list[tuple[float, Floats]], panel: Floats) -> Floats:
+    """The panel (k,2) to the right of those of a row, one side up or the other, as far left as possible.
 
     Its highest point has y = 0, at the left end of a row its leftmost one x = 0.
     """
@@ -103,7 +103,9 @@ def _beside(row: list[Floats], panel: Floats) -> Floats:
     for turned in (panel, -panel):
         at = turned - np.array([turned[:, 0].min(), turned[:, 1].max()])
         shift = 0.0
-        for other in row[-3:]:  # until it only touches: both are convex, so a corner of one of the two does
+        for right, other in reversed(row):  # until it only touches, at a corner of one of the two
+            if right + SPACE <= shift:
+                continue
             low, high = max(other[:, 1].min(), at[:, 1].min()), min(other[:, 1].max(), at[:, 1].max())
             levels = np.clip(np.append(other[:, 1], at[:, 1]), low, high)
             gap = float((_reach(other, levels).max(axis=0) - _reach(at, levels).min(axis=0)).max())

@@ -33,6 +33,7 @@ PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
 MOST = 100_000  # panels of a sheet; more mean a mistake in the unit
 KINDS = np.array(["inside", "edge", "corner"])  # of nodes
+WARPED = 0.02  # planarity from which sheets of glass or metal are no longer bent into place
 FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
 NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
 
@@ -144,6 +145,10 @@ class PanelNet:
         rows["area"] += f" panels {area.min():.3g} to {area.max():.3g}"
         rows["planarity"] = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
         rows["planarity"] += f" (panel {worst['panel']}, {worst['kind']})"
+        if warped := int((table["planarity"] > WARPED).sum()):
+            at = point_text(self.points[self.polygons[int(worst["panel"]) - 1]].mean(axis=0).round(2))
+            text = f"{warped} panels by more than {100.0 * WARPED:g} % of their diagonals, most at {at}:"
+            rows["warped"] = f"{text} build these of triangles, or choose another pattern"
         away = f"nodes {nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
         rows["distance"] = f"from the surface, {away}"
         turns = [f(beams[name]) for name in ("torsion", "torsion_normal") for f in (np.median, np.max)]

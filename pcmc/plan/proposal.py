@@ -75,11 +75,37 @@ def edge_length_for(plan: Plan) -> float:
     >>> edge_length_for(Plan([[0, 0], [6000, 0], [6000, 4000], [0, 4000]], tension=3000.0))
     190.0
     """
-    outline = plan.outline.local(plan.plane)
-    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
-    dividers = [divider.curve.local(plan.plane) for divider in plan.dividers]
-    parts = parts_of(outline, holes, dividers, NEAR * outline.length)
+    parts = _parts_of_plan(plan)
+    holes = [hole.curve for hole in plan.holes]
     return first_edge_length(parts, holes) if parts else plan.edge_length
+
+
+def _parts_of_plan(plan: Plan) -> list[Part]:
+    outline = plan.outline.local(plan.plane)
+    holes, dividers = ([p.curve.local(plan.plane) for p in some] for some in (plan.holes, plan.dividers))
+    return parts_of(outline, holes, dividers, NEAR * outline.length)
+
+
+def least_tensions(plan: Plan, whole: float) -> dict[str, float]:
+    """The mean of the least tensions per pressure over the ``whole`` plan and over the part of each patch.
+
+    A wall that pulls hard makes a roof of each part; one that hardly pulls leaves one roof over the plan. A
+    balanced wall is in between, and so is the mean, √(α_part α_whole).
+
+    >>> from .plan import Plan
+    >>> line, patches = [[4, 0], [4, 8]], {"west": {"tension": 1}, "east": {"tension": 1}}
+    >>> plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [line], patches=patches)
+    >>> {name: round(least, 2) for name, least in least_tensions(plan, 3.0).items()}
+    {'west': 2.05, 'east': 2.52}
+    """
+    parts, mirrors = _parts_of_plan(plan), [mirror.local(plan.plane) for mirror in plan.mirrors]
+    means = {}
+    for number, patch in enumerate(plan.patches):
+        owned = parts[number : number + 1] if patch.at is None else _parts_at(parts, patch.at)
+        areas = [_unfolded(part.area, mirrors) for part in owned]
+        pieces = [one for area in areas for one in shapely.get_parts(area)]  # an image apart is as large
+        means[patch.name] = math.sqrt(whole * max(map(least_tension, pieces), default=whole))
+    return means
 
 
 def plan_area(plan: Plan) -> Any:
@@ -249,9 +275,8 @@ def _patches(
         if attributes.get("at") is None:
             chosen = [spec for spec in specs if spec["name"] == name]
         else:
-            points = _as_points(attributes["at"])
-            at = [any(shapely.contains_xy(part.area, *point) for point in points) for part in parts]
-            chosen = list(compress(specs, at))
+            at = _parts_at(parts, attributes["at"])
+            chosen = [spec for part, spec in zip(parts, specs, strict=True) if part in at]
         if not chosen:
             known = dict.fromkeys(str(spec["name"]) for spec in specs)
             problem = unknown("patch of the drawing", name, known)
@@ -272,6 +297,12 @@ def _rounded(value: float, radius: float) -> float:
 
 def _as_points(at: Any) -> list[Any]:
     return list(at) if isinstance(at[0], list | tuple) else [at]
+
+
+def _parts_at(parts: Sequence[Part], at: Any) -> list[Part]:
+    """The parts that have one of the points of a patch."""
+    inside = [shapely.contains_xy(part.area, *np.transpose(_as_points(at))).any() for part in parts]
+    return list(compress(parts, inside))
 
 
 def _labels(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:

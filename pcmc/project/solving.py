@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,8 @@ from .settings import AccuracyWanted
 
 if TYPE_CHECKING:
     from ..design import Target
+
+FLATTER = 2.0  # times the first tensions for heights, where these are too low
 
 
 def solve_project(project: Project, surface: Surface, progress: OnStep = ignore) -> Outcome:
@@ -112,19 +115,25 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
 def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     """Solve the surface, or meet its targets, and certify it.
 
-    If the search finds no start, it starts again from the roof without targets, if that is certified.
+    If the search finds no start, it starts again: from a flatter roof where heights are wanted, whose walls
+    balance as its tensions are equal; then from the roof without targets, if that is certified.
     """
     if not project.targets:
         return _solve(project, surface, report)
     from ..design import NoStart  # needed by projects with targets only
 
-    try:
-        return _meet(project, surface, report)
-    except NoStart:
-        outcome = _solve(project, surface, report)
-        if not outcome.good:
-            return replace(outcome, notes=["targets not tried: without them there is no stable roof, either"])
-        return _meet(project, outcome.surface, report)
+    starts = [surface]
+    if project.rises:
+        names = [name for parameter in project.vary[-len(project.rises) :] for name in parameter.names]
+        most = max(surface.patches[surface.patch_index(name)].tension for name in names)
+        starts.append(surface.retensioned(dict.fromkeys(names, FLATTER * most)))
+    for start in starts:
+        with suppress(NoStart):
+            return _meet(project, start, report)
+    outcome = _solve(project, surface, report)
+    if not outcome.good:
+        return replace(outcome, notes=["targets not tried: without them there is no stable roof, either"])
+    return _meet(project, outcome.surface, report)
 
 
 def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:

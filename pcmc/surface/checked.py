@@ -11,7 +11,7 @@ from ..base.errors import SurfaceError
 from . import checks
 from .guides import Plane
 from .held_curve import checked_curves
-from .images import checked_images, glued, originals
+from .images import check_weights, checked_images, glued, originals
 from .lagrange import checked_order, element_nodes, sides_along
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes
@@ -40,12 +40,12 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     patch = read_only(checks.patch_array(given["patch_of_face"], len(F), names))
     fixed, lines = checks.mask(given["fixed"], n, "fixed"), checked_lines(given["on_line"], X)
     supports = Supports(fixed, checks.mask(given["on_plane"], n, "on_plane"), lines)
-    heavy = any(patch.weight for patch in patches)
-    images = checked_images(given["images"], X, F, fixed, supports.on_plane, plane, heavy)
+    images = checked_images(given["images"], X, F, fixed, supports.on_plane)
     topo = glued(F, patch, originals(images, n)) if len(images) else topology(F, patch, n)
     planes = checked_planes(given["on_planes"], X, F, patch, names, topo, fixed)
     resolved = supports.resolved(plane, planes)
     cables, rooms = checked_cables(given["cables"], topo), checked_rooms(given["rooms"], names)
+    check_weights([*patches, *cables], plane, planes, X, images)
     # a vertex that slides on another plane alone may come down to Π like a free one
     bound = fixed | supports.on_plane | supports.guided
     checks.mesh(X, F, patch, topo, patches, bound, plane.height(X))

@@ -7,7 +7,7 @@ positions are those of the mesh as it is drawn, so areas and pictures need to kn
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from ..base.arrays import Bools, Floats, Ints, cached_array, kept_with_owner, read_only
 from ..base.errors import SurfaceError
-from ..base.tolerances import ON
+from ..base.tolerances import ON, PARALLEL
 from . import checks
 from .geometry import bounding_size
 from .guides import Plane
@@ -183,12 +183,30 @@ def lattice_of(surface: Any) -> Floats:
     return read_only(basis)
 
 
-def checked_images(
-    given: Any, X: Floats, F: Ints, fixed: Bools, on_plane: Bools, plane: Plane, heavy: bool
-) -> Ints:
+def check_weights(
+    parts: Iterable[Any], plane: Plane, on_planes: Iterable[tuple[Plane, Bools]], X: Floats, pairs: Ints
+) -> None:
+    """Refuse weights where the surface goes on at other heights over Π: there its copy would weigh otherwise.
+
+    So it does behind a mirror plane that leans over Π, and at images whose translation leads away from it.
+    """
+    if not any(part.weight for part in parts):
+        return
+    t, up = X[pairs[:, 0]] - X[pairs[:, 1]], np.array(plane.normal)
+    found = [f"the {p} leans over" for p, _ in on_planes if p.mirror and abs(float(up @ p.normal)) > PARALLEL]
+    if (np.abs(t @ up) > ON * np.linalg.norm(t, axis=1)).any():
+        found.append("a translation of images leads away from")
+    if found:
+        text = (
+            f"weights: {found[0]} the plane Π, and what goes on there would weigh otherwise; take the weights"
+        )
+        raise SurfaceError(f"{text} out, or give the plane= that is level", what="weights", found=found)
+
+
+def checked_images(given: Any, X: Floats, F: Ints, fixed: Bools, on_plane: Bools) -> Ints:
     """The pairs (k,2) of images and their vertices, by image; SurfaceError where they make no periodic mesh.
 
-    Both must be held alike, and with weights translations must lead along Π.
+    Both must be held alike.
     """
     pairs = checks.pair_array(given, len(X))
     if not len(pairs):
@@ -203,11 +221,6 @@ def checked_images(
         (np.linalg.norm(t, axis=1) <= near, "has both at one place", "merge them"),
         (fixed[image] != fixed[vertex], "has only one of them fixed", "hold both or none"),
         (on_plane[image] != on_plane[vertex], "has only one of them on the plane", "hold both or none"),
-        (
-            heavy & (np.abs(t @ np.array(plane.normal)) > near),
-            "leads away from the plane, and weights change with the height over it",
-            "take the weights out",
-        ),
     )
     for bad, fault, hint in tests:
         checks.refuse_rows("images", pairs, bad, fault, hint)

@@ -20,6 +20,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON, SAME_PRESSURE
+from .images import check_weights
 
 TRIED = 1000  # triangles of a patch that are looked at for others above them
 
@@ -86,6 +87,8 @@ def with_values(
     of_patches["pressure"] = of_both_sheets(surface, of_patches.get("pressure", {}))
     of_patches["tension"] = with_sheets_below(surface, of_patches.get("tension", {}))
     changed = {parts: _replaced(getattr(surface, parts), PARTS[parts], own) for parts, own in changes.items()}
+    heavy = (*changed["patches"], *changed["cables"])
+    check_weights(heavy, surface.plane, surface.on_planes, surface.vertices, surface.images)
     following: dict[str, dict[str, Any]] = {}
     for field in ("pressure", "snow"):
         old, new = (

@@ -14,6 +14,7 @@ import pcmc
 from pcmc.drawings import drawing_set
 from pcmc.drawings.panel_sheets import panel_sheets, triangles_at_true_size
 from pcmc.drawings.sheet import corner, drawing_area
+from pcmc.panelling.flat import packed
 from pcmc.surface.geometry import cross_2d, edge_vectors
 
 
@@ -60,6 +61,18 @@ def test_labels_of_neighbours_name_each_other_and_the_same_edge(squares):
                 assert f"{panel} / e{edge}" in labels[int(others)]
                 seen += 1
     assert seen == 2 * int((schedule.edges["neighbour"] > 0).sum())
+
+
+def test_panels_of_very_different_sizes_do_not_lie_on_each_other():
+    """A large one reached below several small ones, and the next large one on it."""
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        panels = [rng.random((3, 2)) * rng.choice([10.0, 40.0, 150.0]) for _ in range(12)]
+        pages: dict[int, list[Polygon]] = {}
+        for page, corners in packed(panels, 400.0, 200.0):
+            pages.setdefault(page, []).append(Polygon(corners))
+        for placed in pages.values():
+            assert all(one.distance(other) > 0.0 for one, other in combinations(placed, 2))
 
 
 def test_panels_larger_than_the_sheet_are_flat_at_true_size_in_model_space(tmp_path, squares):

@@ -1,5 +1,6 @@
 """Self-weight and snow: closed forms, the local target of curvature, verdicts."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,7 @@ from refusals import refused
 import pcmc
 from generators import barrel, catenary, hypar_roof, spherical_cap
 from generators.grid import grid_faces
-from pcmc import Direction, Patch, Surface, Target, Verdict, solve
+from pcmc import Cable, Direction, Patch, Plane, Surface, Target, Verdict, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.design.targets import measure
 
@@ -98,3 +99,22 @@ def test_snow_on_a_free_edge_is_refused():
 def test_a_weight_without_tension_is_refused():
     with refused(SurfaceError, what="tension", where="a"):
         Patch("a", 0.0, 0.0, weight=1.0)
+
+
+@pytest.mark.parametrize("heavy", ["film", "rope"])
+def test_behind_a_level_mirror_plane_a_weight_would_pull_up(heavy):
+    """Half of a film in an upright frame came to rest, and the whole that it stood for was not at rest."""
+    x, z = np.meshgrid(np.linspace(-2.0, 2.0, 5), np.linspace(0.0, 2.0, 3), indexing="ij")
+    X = np.stack([x.ravel(), 0.0 * x.ravel(), z.ravel()], axis=1)
+    patches = [Patch("film", 1.0, 0.3, weight=0.2 * (heavy == "film"))]
+    rope = replace(Cable.along("rope", 1.0, [6, 7, 8]), weight=0.2 * (heavy == "rope"))
+    middle = Plane(normal=(0, 0, 1), name="middle", mirror=True)
+    faces, rim = grid_faces(4, 2), (np.abs(X[:, 0]) == 2.0) | (X[:, 2] == 2.0)
+    parts = {"fixed": rim, "on_planes": {middle: X[:, 2] == 0.0}, "plane": Plane((0, 0, -1))}
+    with refused(SurfaceError, what="weights"):
+        Surface(X, faces, np.zeros(16, int), patches, cables=[rope], **parts)
+    light = [replace(rope, weight=0.0)]
+    half = Surface(X, faces, np.zeros(16, int), [Patch("film", 1.0, 0.3)], cables=light, **parts)
+    kind = "weights" if heavy == "film" else "cable_weights"
+    with refused(SurfaceError, what="weights"):
+        half.retensioned(**{kind: {heavy: 0.2}})

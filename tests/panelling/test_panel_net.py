@@ -192,6 +192,17 @@ def test_quads_of_a_grid_stay_on_the_surface_and_are_worse_planar(rectangle):
     assert abs(grid.panels["area"].sum() / sum(pcmc.certify(rectangle).patches["area"]) - 1.0) < 0.02
 
 
+def test_warped_panels_are_told_with_what_to_build():
+    """Around the corner of a raised hole quads with a corner cut out are warped by a fifth."""
+    raised = [[4, 4, 2], [6, 4, 2], [6, 6, 2], [4, 6, 2]]
+    square = [[0, 0], [10, 0], [10, 10], [0, 10]]
+    plan = Plan(square, holes=[raised], edge_length=0.8, tension=8.0, pressure=0.2)
+    roof = pcmc.solve(plan.surface()).surface
+    [line] = [line for line in str(panel_net(roof, 0.8, pattern="quads")).splitlines() if "warped" in line]
+    assert "build these of triangles" in line
+    assert "warped" not in str(panel_net(roof, 0.8, pattern="planar-quads"))
+
+
 @pytest.mark.parametrize("pattern", ["quads", "hexagons"])
 def test_a_grid_in_plan_is_one_on_a_tilted_plane(rectangle, pattern):
     """Before, it was one along x and y of space: fewer panels, and none on an upright plane."""

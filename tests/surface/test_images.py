@@ -149,8 +149,11 @@ def test_curved_elements_are_refused():
 def test_weights_need_translations_along_the_plane():
     heavy = [Patch("strip", 1.0, weight=0.1)]
     assert strip(patches=heavy).periodic
-    with refused(SurfaceError, what="images", where=0):
-        strip(patches=heavy, plane=Plane((0, 0, 0), (1, 0, 0)))
+    upright = Plane((0, 0, 0), (1, 0, 0))
+    with refused(SurfaceError, what="weights", found=["a translation of images leads away from"]):
+        strip(patches=heavy, plane=upright)
+    with refused(SurfaceError, what="weights"):
+        strip(plane=upright).retensioned(weights={"strip": 0.1})
 
 
 def test_pressure_at_a_free_edge_is_refused():
