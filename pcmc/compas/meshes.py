@@ -86,9 +86,9 @@ def to_meshes(surface: Surface) -> list[Any]:
             for mesh in (mesh for mesh in meshes if mesh.has_edge(edge)):
                 mesh.edge_attributes(edge, [CABLE, TENSION], [cable.name, cable.tension])
     meshes[0].attributes[KEY] = {
-        "plane": _plain(surface.plane),
-        "guides": [_plain(guide) for guide, _ in surface.given_supports.on_line],
-        "planes": [_plain(plane) for plane, _ in surface.on_planes],
+        "plane": plain(asdict(surface.plane)),
+        "guides": [plain(asdict(guide)) for guide, _ in surface.given_supports.on_line],
+        "planes": [plain(asdict(plane)) for plane, _ in surface.on_planes],
         "rooms": [{**asdict(room), "patches": dict(room.patches)} for room in surface.rooms],
         "cables": [cable.name for cable in surface.cables],
         "curves": [curve.plain() for curve in surface.held_curves],
@@ -197,11 +197,6 @@ def _surface(
         return surface, (*notes, f"{lost} and were left out")
 
 
-def _plain(value: Any) -> dict[str, Any]:
-    """The fields of a plane, line or circle, with lists for vectors."""
-    return {key: list(one) if isinstance(one, tuple) else one for key, one in asdict(value).items()}
-
-
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
     support, acting = support_of(surface, planes=True), Forces.of(surface)
@@ -209,14 +204,14 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     for number, (_, along) in enumerate(surface.given_supports.on_line):
         guide[along] = number
     on_planes = np.array([mask for _, mask in surface.on_planes]).reshape(-1, surface.n)
-    curvature = mean_curvature(acting.standing, "variational").tolist()
+    curvature = mean_curvature(acting.standing, "variational")
     columns: dict[str, list[Any]] = {
         **dict(zip("xyz", surface.vertices.T.tolist(), strict=True)),
         "is_support": (support == FIXED).tolist(),
         SLIDES: (support == SLIDING).tolist(),
         GUIDE: guide.tolist(),
         PLANES: [np.flatnonzero(column).tolist() for column in on_planes.T],
-        "mean_curvature": [H if H == H else None for H in curvature],  # JSON has no NaN
+        "mean_curvature": plain(curvature),  # JSON has no NaN
         **dict(zip(("rx", "ry", "rz"), acting.reactions.T.tolist(), strict=True)),
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

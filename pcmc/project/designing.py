@@ -19,6 +19,7 @@ from ..io import metres_note
 from ..plan import Plan
 from ..structure.calculix import expect_program
 from ..surface import Surface
+from ..surface.lagrange import expect_flat
 from . import cache
 from .checking import in_file
 from .file import Project, load
@@ -234,6 +235,8 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
             expect_program()
         if project.pattern is not None and (output.pattern or output.report):
             of_material(project.pattern, structure, surface)
+        if project.verify:
+            expect_flat(surface, "verify")
         if project.margin:
             from ..accuracy.varied import Varied  # takes long to import
 

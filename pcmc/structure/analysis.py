@@ -29,6 +29,7 @@ from .member_forces import (
     member_tables,
     members_in,
     sentences,
+    slack_cables,
     supports_with_members,
     weak_members,
 )
@@ -163,7 +164,7 @@ class Analysis:
     @cached_property
     def cables(self) -> pd.DataFrame:
         """A row per case and cable: the ``least`` and ``largest`` tension along it, force; below 0 it is
-        slack."""
+        slack, and counts as a strut."""
         pulls = [(case.name, *pull) for case in self.cases for pull in case.results.cable_tensions.items()]
         rows = [[case, cable, along.min(), along.max()] for case, cable, along in pulls]
         return pd.DataFrame(rows, columns=["case", "cable", "least", "largest"])
@@ -204,8 +205,8 @@ class Analysis:
         return depth if depth > THROUGH * surface.size else 0.0
 
     def answers(self, units: Units | None = None) -> list[str]:
-        """A sentence for each case that is not carried, or has slack parts, and what helps; what cables are
-        made of, where they have no material of their own."""
+        """A sentence for each case that is not carried, or has slack parts, and what helps; for each cable
+        that gets slack; what cables are made of, where they have no material of their own."""
         units, lines, surface = units or self.model.units, [], self.model.surface
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
             at = np.array([row[f"least_{c}"] for c in "xyz"])
@@ -222,7 +223,7 @@ class Analysis:
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
                 lines.append(f"{case.name}: {below}, as a bag that gathers water")
-        lines += cable_notes(self.model)
+        lines += [*slack_cables(self.cables, units), *cable_notes(self.model)]
         lines += weak_members(self.model, ((case.name, case.members) for case in self.cases), units)
         if any(case.taut < case.share < 1.0 for case in self.cases):
             lines.append(MESH)
@@ -319,7 +320,7 @@ def analyse_step(
     if gas is None:
         return _case_of(model, step.name, run_as_far(model, [form, *before, step], timeout), len(before) + 2)
     standing, outside = model.standing, gas.outside(model.units)
-    first, volume = gas.pressure(standing), gas.first_volume(standing)
+    first, volume = gas.pressure(standing), gas.enclosed(standing)
     filled = first * model.combinations.get(step.name, {}).get(FORM, 1.0)
     wanted = [(other, first) for other in before] + [(step, filled)]
     signs = gas.signs(standing)[standing.patch_of_face]
@@ -354,7 +355,7 @@ def _case_of(
     share, gas, form = found[-1].share if len(found) == wanted else 0.0, model.gas, model.standing
     if gas is None:
         return Case(name, found[-1], share)
-    volume = gas.first_volume(form) + gas.change(form, np.nan_to_num(found[-1].displacements))
+    volume = gas.enclosed(form, np.nan_to_num(found[-1].displacements))
     return Case(name, found[-1], share, gas.pressure(form) if p is None else p, volume)
 
 

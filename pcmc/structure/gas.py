@@ -57,9 +57,9 @@ class Gas:
         """Refuse patches that are not there or under several pressures, and a roof in unknown units."""
         self.signs(surface)
         self.outside(units)
-        if self.first_volume(surface) <= 0.0:
+        if (volume := self.enclosed(surface)) <= 0.0:
             text = "gas: the patches enclose no volume above Π; give Gas.volume, or name those that do"
-            raise OptionError(text, what="Gas.volume", found=self.first_volume(surface))
+            raise OptionError(text, what="Gas.volume", found=volume)
 
     def outside(self, units: Units) -> float:
         """The pressure of the air outside, p_a."""
@@ -90,20 +90,15 @@ class Gas:
         """p of the form, against the air outside."""
         return float(np.abs(surface.pressures[self.signs(surface) != 0.0]).max())
 
-    def enclosed(self, surface: Surface, displacements: Floats) -> float:
-        """The volume between the patches and Π, length³, of a surface with displacements (n,3)."""
-        P = (surface.vertices + displacements)[surface.faces]
-        height = surface.plane.height(P).mean(axis=1)
-        prisms = height * (area_vectors(P) @ np.array(surface.plane.normal))
-        return float(self.signs(surface)[surface.patch_of_face] @ prisms)
-
-    def first_volume(self, surface: Surface) -> float:
-        """V of the form."""
-        return self.enclosed(surface, np.zeros_like(surface.vertices)) if self.volume is None else self.volume
-
-    def change(self, surface: Surface, displacements: Floats) -> float:
-        """How much larger the volume is than the form's."""
-        return self.enclosed(surface, displacements) - self.enclosed(surface, 0.0 * displacements)
+    def enclosed(self, surface: Surface, displacements: Floats | float = 0.0) -> float:
+        """The volume, length³, of a surface with displacements (n,3): that between the patches and Π, and
+        what ``volume`` has more than this in the form."""
+        signs, up = self.signs(surface)[surface.patch_of_face], np.array(surface.plane.normal)
+        volumes = []
+        for moved in (displacements, 0.0):
+            P = (surface.vertices + moved)[surface.faces]
+            volumes.append(float(signs @ (surface.plane.height(P).mean(axis=1) * (area_vectors(P) @ up))))
+        return volumes[0] if self.volume is None else self.volume + volumes[0] - volumes[1]
 
 
 def balanced_pressure(

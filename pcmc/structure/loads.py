@@ -167,20 +167,21 @@ def load_steps(
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
     form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
-    steps, added, always = [form], {FORM: (form, nothing(form))}, {FORM: 1.0}
+    steps, added, weights = [form], {FORM: (form, nothing(form))}, dict[str, float]()
     for together in map(acting_together, loads):
         step = replace(permanent, name=step_name(together))
         for load in together:
             step = load.added_to(step, surface, gravity)
         steps.append(step)
         added[step.name] = step, permanent
-        always |= {step.name: 1.0} if all(isinstance(load, SelfWeight) for load in together) else {}
+        weights[step.name] = step.gravity - permanent.gravity
         permanent = replace(permanent, gravity=step.gravity)
     for name, factors in (combinations or {}).items():
         sum_ = replace(nothing(form), name=name)
-        for case, factor in (always | dict(factors)).items():
+        for case, factor in ({FORM: 1.0} | dict(factors)).items():
             sum_ = sum_.plus(*added[case], factor)
-        steps.append(sum_)
+        others = sum(weight for case, weight in weights.items() if case not in factors)
+        steps.append(replace(sum_, gravity=sum_.gravity + others))
     return tuple(steps)
 
 
@@ -199,8 +200,10 @@ def step_name(together: Sequence[Load]) -> str:
     return " and ".join(dict.fromkeys(load.name for load in together))
 
 
-def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
-    """Loads, or tuples of them, whose patches are there."""
+def check_loads(
+    loads: object, surface: Surface, replaced: Sequence[str] = ()
+) -> tuple[Load | tuple[Load, ...], ...]:
+    """Loads, or tuples of them, whose patches are there; no wind on walls ``replaced`` by members."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
@@ -210,6 +213,9 @@ def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...
                 validate.refuse("loads", load, expected)
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
+                if name in replaced and isinstance(load, Wind):
+                    text = f"Wind.pressures: a member stands in the place of {name!r}, so no wind acts on it"
+                    raise OptionError(f"{text}; leave it out", what="Wind.pressures", where=name)
     return tuple(loads)
 
 

@@ -29,6 +29,7 @@ ROUNDING = 1e-12  # of the largest force in a member: less of another is none
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
 STRAIGHT = 0.01  # share of a member's pull that bends it: below it needs no other line
+LOOSE = 1e-3  # of the largest tension of a cable: a smaller thrust is rounding
 HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of one that is too weak alone
 
 
@@ -271,6 +272,18 @@ def floating(model: StructuralModel, beam: MemberForces, units: Units) -> str:
         return ""
     text = f"nothing but the sheets holds {line.name} upright, and at rest they pull it up or down with"
     return f"{text} {pull:.3g}{units.behind('force')}: add propped = true to it, for columns or a wall below"
+
+
+def slack_cables(table: pd.DataFrame, units: Units) -> list[str]:
+    """A line for each cable that is pressed in cases, of the table ``Analysis.cables``."""
+    lines = list[str]()
+    for name, own in table.groupby("cable", sort=False):
+        pressed = own[1:][own["least"][1:] < -LOOSE * own["largest"].max()]
+        if len(pressed):
+            text = f"{', '.join(pressed['case'])}: {name} is slack, but counts as a strut, pressed with"
+            text += f" {-pressed['least'].min():.3g}{units.behind('force')}: without it the roof moves more"
+            lines.append(f"{text}; give it a larger tension")
+    return lines
 
 
 def cable_notes(model: StructuralModel) -> list[str]:

@@ -27,6 +27,7 @@ WHOLE = 1e-6  # of a step: a time so near to its end is the end
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 DAT_HEAD = re.compile(r"^ *([a-z]+) \((.*)\) for set (\S+) and time +(\S+)[^\S\n]*$", re.M)
 KEYS = {"displacements": 1, "forces": 1, "stresses": 2}  # numbers before the 3, 3 or 6 values of a row
+POWERS = {"displacements": 1, "forces": 0, "stresses": -2}  # of the unit of length
 SETS = {"CABLES": "cables", "ENDS": "ends"}  # sets of elements and nodes with tables of their own
 OWNERS = {"stresses": "elements", "cables": "cable elements", "forces": "held nodes"}  # of others nodes
 TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
@@ -130,7 +131,7 @@ def read_steps(
     check_regular(path)
     suffix_of(path, (".dat",), "a result of CalculiX")
     try:
-        tables = _in_model_units(read_tables(path.read_text(encoding="ascii")), unit)
+        tables = read_tables(path.read_text(encoding="ascii"), unit)
         _check(tables, model, steps)
     except OSError as error:
         raise system_error(path, "read", error) from None
@@ -140,18 +141,6 @@ def read_steps(
     except FileError as error:
         raise error.in_file(path, what=str(path)) from None
     return tuple(_results(model, steps, k, tables) for k in range(len(tables)))
-
-
-def _in_model_units(tables: list[Tables], unit: float) -> list[Tables]:
-    """Tables of a file in which a length of 1 is ``unit``; forces are the same."""
-    factors = {"displacements": unit, "stresses": unit**-2, "cables": unit**-2}
-    return [
-        {
-            kind: [block._replace(values=factors.get(kind, 1.0) * block.values) for block in blocks]
-            for kind, blocks in table.items()
-        }
-        for table in tables
-    ]
 
 
 def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list[Tables]) -> StepResults:
@@ -264,9 +253,9 @@ Tables = dict[str, list[ResultBlock]]
 of beams; at each of its increments that was printed."""
 
 
-def read_tables(text: str) -> list[Tables]:
+def read_tables(text: str, unit: float = 1.0) -> list[Tables]:
     """The tables of each step, which end at the times 1, 2, ...: the last block of an analysis that stopped
-    has what it reached.
+    has what it reached. A length of 1 in the file is ``unit`` in the tables; forces are the same.
 
     >>> text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\\n\\n 2 0.5 0. -1.E-3\\n"
     >>> read_tables(text)[0]["displacements"][-1].values.tolist()
@@ -284,7 +273,8 @@ def read_tables(text: str) -> list[Tables]:
             time = float(_numbers([head[4]], 1, "time", line)[0, 0])
             number = max(math.ceil(time - WHOLE), 1)
             steps += [{} for _ in range(number - len(steps))]
-            block = ResultBlock(time, rows[:, 0].astype(int), rows[:, KEYS[kind] :])
+            values = unit ** POWERS[kind] * rows[:, KEYS[kind] :]
+            block = ResultBlock(time, rows[:, 0].astype(int), values)
             steps[number - 1].setdefault(SETS.get(head[3], kind), []).append(block)
     return steps
 

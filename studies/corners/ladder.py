@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import curve_fit
-from scipy.stats import linregress, t
 
 from pcmc import Certificate, Circle, Line, Surface
 from pcmc.base.arrays import Floats, Ints
@@ -298,6 +297,8 @@ def loss(rows: Sequence[Mapping[Any, Any]], rest: float = 0.0) -> dict[str, floa
     ``shift`` ℓ, from the levels on which nothing rests on Π but the first two, ``fitted`` many; NaN where
     these are fewer than five. ``rest`` is the distance from the end at which the junction comes to rest.
     """
+    from scipy.stats import t  # here, as it takes a third of a second that few runs need
+
     last = -math.log(rest) if rest > 0.0 else math.inf
     free = [row for row in rows if row["status"] == "converged" and row["pinched"] == 0][2:]
     free = [row for row in free if -math.log(row["edge_length"]) < last - NEAR_REST]
@@ -337,6 +338,8 @@ def fit(x: Floats, y: Floats) -> tuple[float, float]:
     >>> fit(np.arange(4.0), 2.0 * np.arange(4.0))
     (2.0, 0.0)
     """
+    from scipy.stats import linregress, t
+
     line = linregress(x, y)
     return float(line.slope), float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(x) - 2) * line.stderr)
 

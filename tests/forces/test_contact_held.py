@@ -246,7 +246,7 @@ def test_a_move_past_the_bottom_comes_down_on_it():
         assert down.sum() == down[top] == expected
 
 
-@pytest.mark.parametrize(("n", "alpha_aux", "count"), [(8, 3.0, 7), (16, 2.0, 2)])
+@pytest.mark.parametrize(("n", "alpha_aux", "count"), [(8, 3.0, 7), *at_night((16, 2.0, 2))])
 def test_by_symmetry_it_rests_as_where_the_bottom_slides(n, alpha_aux, count):
     result = solve(example(n, alpha_aux))
     assert result.converged

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from nightly import at_night
 from scipy.integrate import quad
 from scipy.optimize import brentq, fsolve
 
@@ -32,7 +33,8 @@ def test_in_a_half_it_rests_as_in_the_whole(oblique, tension, at_mirror):
 
 
 @pytest.mark.parametrize(
-    ("upright", "most"), [(True, 6.0), (False, np.hypot(6.0, np.sqrt(27.0) - np.sqrt(7.0)))]
+    ("upright", "most"),
+    [*at_night((True, 6.0)), (False, np.hypot(6.0, np.sqrt(27.0) - np.sqrt(7.0)))],
 )
 def test_between_two_mirrors_it_rests_as_in_a_long_roof(upright, most):
     """Arcs of radii 6 and 4 over 6 pull the wall up with 3 each, and across it with √27 - √7."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from force_cases import HALL
+from nightly import at_night
 from refusals import refused
 from volume_cases import cap
 
@@ -236,7 +237,7 @@ def test_the_form_pressure_of_a_structure_is_net_and_more_snow_is_a_load_of_its_
 
 
 @pytest.mark.parametrize(
-    ("tension", "word"), [(0.8, "raising the net pressure"), (0.3, "of the net pressure")]
+    ("tension", "word"), [(0.8, "raising the net pressure"), *at_night((0.3, "of the net pressure"))]
 )
 def test_the_search_raises_what_is_net_of_the_snow(tension, word):
     """The cap over the unit disc rests up to a net pressure of 2 α: 0.8 carries 0.75, and 0.3 does not."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from convergence import orders
+from nightly import at_night
 from scipy.optimize import brentq
 from volume_cases import DOUBLE, TRIPLE, connected_caps, cylinder
 
@@ -92,7 +93,7 @@ def test_of_two_connected_bubbles_one_swallows_the_other():
     assert areas[1] < areas[0]
 
 
-@pytest.mark.parametrize(("between", "limit"), [("rings", 2.0 * np.pi), ("plates", np.pi)])
+@pytest.mark.parametrize(("between", "limit"), [("rings", 2.0 * np.pi), *at_night(("plates", np.pi))])
 def test_a_cylinder_of_prescribed_volume_is_stable_up_to_a_length(between, limit):
     """Plateau's limit 2πR between rings, πR between plates; under a given pressure both are half of that."""
 

@@ -5,6 +5,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from nightly import at_night
 from refusals import refused
 from shapes import rotation
 from starts import four_fans, joined_caps, spherical_cap, stationary, two_squares
@@ -99,9 +100,7 @@ def pinched():
     "make",
     [
         partial(joined_caps, 1.0),
-        partial(four_fans, 4, alpha_aux=2.0),
-        partial(pinched),
-        partial(squares),
+        *at_night(partial(four_fans, 4, alpha_aux=2.0), partial(pinched), partial(squares)),
         partial(roofs),
     ],
     ids=["sliding wall", "four walls", "pinched wall", "sliding on lines", "sliding on circles"],
@@ -253,6 +252,7 @@ def test_shells_and_a_cable_across_them_stay_where_they_are():
         np.testing.assert_allclose(shell.reactions.sum(axis=0), -total, atol=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_film_with_a_rope_across_follows_poisson():
     """α Δu + τ u_xx δ(y - ½) = s over the square: a series of the odd modes n, k = nπ, of closed form.
 

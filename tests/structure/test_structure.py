@@ -87,6 +87,18 @@ def test_loads_balance_their_totals():
     np.testing.assert_allclose(model.nodal_loads(form)[4], [0, 0, 4 / 3])
 
 
+@pytest.mark.parametrize("together", [False, True])
+def test_self_weight_stays_in_combinations_that_do_not_name_it(together):
+    """Also where it acts in one step with another load: there it was left out without a word."""
+    weight, snow, wind = SelfWeight(gravity=10.0), Snow(0.5), Wind({"roof": 0.1})
+    loads = [(weight, snow), wind] if together else [weight, snow, wind]
+    model = model_of(pyramid(), loads=loads, combinations={"u": {"wind": 1.5, "form": 1.2}})
+    form, last = model.steps[0], model.steps[-1]
+    assert last.gravity == 10.0
+    np.testing.assert_allclose(last.pressures, 1.2 * form.pressures + 0.15)
+    np.testing.assert_allclose(last.forces, 1.2 * form.forces)
+
+
 def test_snow_does_not_fall_on_what_is_below(tmp_path):
     """A bulge wider than its base carries snow on the plan of its upper side alone."""
     base = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])

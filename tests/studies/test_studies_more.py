@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from nightly import at_night
 from tables import last_row
 
 from generators import four_fans, spherical_cap, two_squares
@@ -329,7 +330,10 @@ def test_each_program_of_the_bench_brings_a_cap_to_rest_and_is_heard_where_there
     assert none.said
 
 
-@pytest.mark.parametrize("name", [name for name, case in bench.CASES.items() if case.exact == case.exact])
+EXACT = [name for name, case in bench.CASES.items() if case.exact == case.exact and name != "evaporation"]
+
+
+@pytest.mark.parametrize("name", [*EXACT, *at_night("evaporation")])
 def test_the_energies_of_the_bench_come_to_those_of_smooth_surfaces_with_the_square_of_the_edges(name):
     case = bench.CASES[name]
     errors = []

@@ -46,7 +46,7 @@ def test_a_branch_ends_to_the_last_digit_at_the_parameter_asked_for(control):
 
 
 @pytest.mark.parametrize("above", [False, *at_night(True)])
-@pytest.mark.parametrize("goal", ["parameter", "energy"])
+@pytest.mark.parametrize("goal", ["parameter", *at_night("energy")])
 def test_goal_that_a_step_passes_twice_is_met_the_first_time(small_cap, goal, above):
     """λ and E turn at the fold: both ends of the step over it lie on one side of the goal."""
     start = small_cap
