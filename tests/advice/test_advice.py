@@ -152,6 +152,21 @@ def test_a_roof_too_steep_at_a_hole_is_advised_to_be_flatter(tmp_path, wish):
     assert flatter.check_mesh().persists
 
 
+def test_a_ridge_that_is_too_high_in_a_sail_is_advised_to_be_lower(tmp_path):
+    """It was "held by the mesh" without a word on what to type."""
+    sail = (
+        "[plan]\noutline = [[0, 0], [12, 0], [12, 8], [0, 8]]\nedge_length = 0.7\ntension = 2\npressure = 0\n"
+    )
+    first = outcome_of(tmp_path, f"{sail}supports = [[[3, 4, 4], [9, 4, 4]]]\n")
+    assert first.good
+    first.check_mesh()
+    heading, line = firmer(first).split("\n  ")
+    assert heading == "type in roof.toml, which was tried and persists:"
+    assert line == "[plan] supports number 1: 0.35 times its heights, up to 1.4  (now up to 4)"
+    lower = outcome_of(tmp_path, f"{sail}supports = [[[3, 4, 1.4], [9, 4, 1.4]]]\n")
+    assert lower.check_mesh().persists
+
+
 def test_every_way_to_a_roof_says_what_to_type(tmp_path, capsys):
     """``pcmc solve`` alone did."""
     path, pdf = tmp_path / "roof.toml", tmp_path / "roof.pdf"
