@@ -31,7 +31,10 @@ MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no t
 CONTACT = 1.5  # order where a rest ends: beside it a junction rises as the distance to the power of 3/2
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
-FURTHER = 3  # meshes ahead at which an eigenvalue that only falls is foreseen
+LIMIT = (
+    0.84  # of the step before: what moves by less from mesh to mesh has a limit in sight, as for error bars
+)
+FURTHER = 3  # meshes ahead at which an eigenvalue that only falls, or a line that leans, is foreseen
 RUNNING_AWAY = {Status.DIVERGED: "it inflates without bound", Status.VANISHED: "it shrinks to nothing"}
 
 
@@ -97,7 +100,7 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
         moved = f"by {before:.2g}, then {last:.2g} in the mean"
         reason = f"each finer surface is farther from the last one ({moved}), most"
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
-    return _stability(surfaces, certificates)
+    return _falling_line(surfaces) or _stability(surfaces, certificates)
 
 
 def shape_order(surfaces: Sequence[Surface]) -> float:
@@ -155,6 +158,38 @@ def _moves(coarse: Surface, fine: Surface) -> Floats:
     return np.linalg.norm(space.project(fine.vertices[: coarse.n] - coarse.vertices), axis=1)
 
 
+def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
+    """The finding where a line in which walls meet leans ever more at its foot: it will lie down.
+
+    At its foot the walls are planes through their bottoms and the line, and must balance. With all bottoms on
+    one side of a straight line, as in a T, they cannot: each finer mesh sees it lean more, by about as much.
+    """
+    if len(surfaces) < 3:
+        return None
+    first = surfaces[0]
+    leans = [_foot_leans(surface)[: first.n] for surface in surfaces]
+    before, step = leans[-2] - leans[-3], leans[-1] - leans[-2]
+    falling = (step > 0.0) & (step >= LIMIT * before) & (leans[-1] + FURTHER * step >= 90.0)
+    if not falling.any():
+        return None
+    foot = int(np.where(falling, step, 0.0).argmax())
+    values = ", ".join(f"{lean[foot]:.0f}°" for lean in leans)
+    reason = f"the line in which walls meet leans ever more at its foot ({values}) and will lie down,"
+    return _at(MeshVerdict.HELD_BY_MESH, first, reason, first.vertices[foot])
+
+
+def _foot_leans(surface: Surface) -> Floats:
+    """(n,) degrees from Π's normal at which lines between walls alone leave what holds them; 0 elsewhere."""
+    X, leans = surface.vertices, np.zeros(surface.n)
+    lines = [curve for curve in surface.topology.junctions if surface.walls[list(curve.sheets)].all()]
+    for end, beside in (pair for line in lines for pair in line.ends):
+        if surface.pinned[end]:
+            step = X[beside] - X[end]
+            run, rise = np.linalg.norm(surface.plane.along(step)), step @ np.array(surface.plane.normal)
+            leans[end] = np.degrees(np.arctan2(run, abs(rise)))
+    return leans
+
+
 def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
     """The finding from the trend of the lowest eigenvalue, where all else persists."""
     index, finest = certificates[0].index, surfaces[-1]
@@ -164,7 +199,7 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     if index != 0 or len(lowest) < max(3, len(surfaces)):
         return Finding(MeshVerdict.PERSISTS, reason)
     step, before = lowest[-1] - lowest[-2], lowest[-2] - lowest[-3]
-    if not (before < 0.0 and step < 0.84 * before):  # a limit in sight, as for the error bars
+    if not (before < 0.0 and step < LIMIT * before):  # a limit in sight, as for the error bars
         return Finding(MeshVerdict.PERSISTS, reason)
     values = ", ".join(f"{value:.3g}" for value in lowest)
     reason += f", but the lowest eigenvalue falls from mesh to mesh ({values}) with no limit in sight"
@@ -212,7 +247,7 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats, more
     nearest, advice, ending = np.inf, "", ""
     reason += f" near {point_text(place, surface.size)}{more}"
     for curve in surface.topology.junctions:
-        ends = [end for end, _ in curve.ends if surface.fixed[end]]
+        ends = [end for end, _ in curve.ends if surface.pinned[end]]
         if not ends or not sliding[list(curve.sheets)].any():
             continue
         length = segment_lengths(X, curve.pairs).sum()

@@ -94,7 +94,7 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     for number, curve in enumerate(several):
         mine = on_curve & (label == curve)
         groups[mine] = number
-        if (surface.fixed & mine).any():
+        if (surface.pinned & mine).any():
             lengths[number] = segment_lengths(surface.vertices, edges[mine[edges[:, 0]]]).sum()
     return groups, lengths
 
@@ -229,18 +229,18 @@ def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> b
     """Whether a junction near the place slides on a support next to its fixed end, or lies along it."""
     X, topo = surface.vertices, surface.topology
     near = np.linalg.norm(X - place, axis=1) <= reach
-    if not (near & topo.on_junction & ~surface.fixed).any():
+    if not (near & topo.on_junction & ~surface.pinned).any():
         return False
-    if (near & surface.fixed).any() and (near & surface.on_plane).any():
+    if (near & surface.pinned).any() and (near & surface.on_ground).any():
         return True
-    held = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
+    held = topo.edges[topo.boundary_edge & surface.pinned[topo.edges].all(axis=1)]
     for curve in topo.junctions:
         if near[curve.vertices].any() and pinchable[list(curve.sheets)].any():
             for end, beside in curve.ends:
                 sides = X[held[(held == end).any(axis=1)].sum(axis=1) - end] - X[end]
                 edge = X[beside] - X[end]
                 lengths = np.linalg.norm(sides, axis=1) * np.linalg.norm(edge)
-                if surface.fixed[end] and (sides @ edge > np.cos(np.radians(ALONG)) * lengths).any():
+                if surface.pinned[end] and (sides @ edge > np.cos(np.radians(ALONG)) * lengths).any():
                     return True
     return False
 
@@ -266,7 +266,7 @@ def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
     ends = []
     for curve in surface.topology.junctions:
         for end, beside in curve.ends:
-            if not surface.fixed[end] or motion[beside] < SLIPS * largest or largest == 0.0:
+            if not surface.pinned[end] or motion[beside] < SLIPS * largest or largest == 0.0:
                 continue
             walls = tuple(surface.patches[i].name for i in curve.sheets if surface.walls[i])
             names, share = names_of(surface, curve.sheets), float(motion[beside] / largest)

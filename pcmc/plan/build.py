@@ -121,19 +121,19 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
     """The surface and its mirror image in Π, turned over and held at the same fixed vertices; there patches
     have ``factor`` times the tension, and no snow."""
     F, topo = surface.faces.astype(np.int64), surface.topology
-    for f in np.flatnonzero(surface.fixed[F].all(axis=1)).tolist():  # both sheets would have this triangle
+    for f in np.flatnonzero(surface.pinned[F].all(axis=1)).tolist():  # both sheets would have this triangle
         sides = np.flatnonzero(topo.valence[topo.edge_of_face[f]] == 2)
         beside = np.flatnonzero((topo.edge_of_face == topo.edge_of_face[f, sides[0]]).any(axis=1))
         g = int(beside[beside != f][0])
         b, a, c = np.roll(F[f], -int(sides[0]))
         d = int(F[g].sum() - a - c)
-        if len(sides) > 1 or surface.fixed[d] or surface.patch_of_face[f] != surface.patch_of_face[g]:
+        if len(sides) > 1 or surface.pinned[d] or surface.patch_of_face[f] != surface.patch_of_face[g]:
             text = "cushion: a triangle has all corners on the rim; use a smaller edge_length"
             raise PlanError(text, what="edge_length", where=surface.vertices[b].round(3).tolist())
         F[f], F[g] = (b, a, d), (b, d, c)
     n, normal = surface.n, np.array(surface.plane.normal)
-    number = np.where(surface.fixed, np.arange(n), n + np.cumsum(~surface.fixed) - 1)
-    inner = ~surface.fixed
+    number = np.where(surface.pinned, np.arange(n), n + np.cumsum(~surface.pinned) - 1)
+    inner = ~surface.pinned
     free = surface.vertices[inner]
     image = free - 2.0 * surface.plane.height(free)[:, None] * normal
     below = [
@@ -145,7 +145,7 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
         np.concatenate([F, number[F][:, ::-1]]),
         np.concatenate([surface.patch_of_face, surface.patch_of_face + len(surface.patches)]),
         (*surface.patches, *below),
-        np.concatenate([surface.fixed, np.zeros(len(free), dtype=bool)]),
+        np.concatenate([surface.pinned, np.zeros(len(free), dtype=bool)]),
         plane=surface.plane,
         on_planes=tuple((plane, np.concatenate([on, on[inner]])) for plane, on in surface.on_planes),
         curves=surface.curves,

@@ -200,8 +200,10 @@ def step_name(together: Sequence[Load]) -> str:
     return " and ".join(dict.fromkeys(load.name for load in together))
 
 
-def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
-    """Loads, or tuples of them, whose patches are there."""
+def check_loads(
+    loads: object, surface: Surface, replaced: Sequence[str] = ()
+) -> tuple[Load | tuple[Load, ...], ...]:
+    """Loads, or tuples of them, whose patches are there; no wind on walls ``replaced`` by members."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
@@ -211,6 +213,9 @@ def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...
                 validate.refuse("loads", load, expected)
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
+                if name in replaced and isinstance(load, Wind):
+                    text = f"Wind.pressures: a member stands in the place of {name!r}, so no wind acts on it"
+                    raise OptionError(f"{text}; leave it out", what="Wind.pressures", where=name)
     return tuple(loads)
 
 

@@ -112,20 +112,19 @@ class StructuralModel:
         if self.elements == "shell" and any(plane.mirror for plane, _ in surface.on_planes):
             text = "elements: shells would be hinged in a mirror; take the whole roof, pcmc.mirrored(surface)"
             raise OptionError(text, what="elements", found="shell")
-        if not isinstance(self.cable_material, Material | None):
-            validate.refuse("cable_material", self.cable_material, "a Material or None")
+        for name, kind in (("cable_material", Material), ("gas", Gas)):
+            if not isinstance(getattr(self, name), kind | None):
+                validate.refuse(name, getattr(self, name), f"a {kind.__name__} or None")
         if self.cable_material is None and surface.cables and isinstance(self.material, Mapping):
             validate.refuse("cable_material", None, "a Material, as the patches have several", hint=hint)
-        vars(self).update(surface=surface, thickness=thickness, loads=check_loads(self.loads, surface))
-        vars(self)["combinations"] = check_combinations(self.combinations, self.loads)
-        if not isinstance(self.gas, Gas | None):
-            validate.refuse("gas", self.gas, "a Gas or None")
         if self.gas is not None:
             self.gas.check(surface, self.units)
         members = tuple(validate.sequence("members", self.members, "a sequence of Members"))
         if not all(isinstance(member, Member) for member in members):
             validate.refuse("members", self.members, "a sequence of Members")
-        vars(self)["members"] = members
+        vars(self).update(surface=surface, thickness=thickness, members=members)
+        vars(self)["loads"] = check_loads(self.loads, surface, [line.wall for line in self.lines])
+        vars(self)["combinations"] = check_combinations(self.combinations, self.loads)
         self.cable_sections, self.bars  # noqa: B018
         of_lines = [line.member.material for line in self.beams] + [of for _, of in self.cable_sections]
         if self.weights and not any(material.density for material in (*self.materials, *of_lines)):
@@ -290,10 +289,8 @@ class StructuralModel:
     @cached_array
     def on_members(self) -> Bools:
         """(n,) the vertices that members carry in the place of walls and supports."""
-        found = np.zeros(self.surface.n, dtype=bool)
-        for line in self.lines:
-            found[line.vertices] = True
-        return found & ~self.held
+        vertices = [line.vertices for line in self.lines]
+        return np.isin(np.arange(self.surface.n), np.concatenate([[], *vertices])) & ~self.held
 
     @cached_array
     def freed(self) -> Ints:

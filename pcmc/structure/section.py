@@ -300,9 +300,10 @@ class Structure:
             return self.of_whole(surface, whole, plan).check(whole, plan)
         self.thicknesses(surface)
         self.materials(surface)
-        check_loads(self.loads_on(surface), surface)
         members = members_of(self.members, plan)
-        bars_on(surface, members, lines_on(surface, members))
+        lines = lines_on(surface, members)
+        check_loads(self.loads_on(surface), surface, [line.wall for line in lines])
+        bars_on(surface, members, lines)
         checked_areas(self.cable_area, surface, [str(member.on) for member in members])
 
     def model(self, surface: Any, plan: Plan | None = None, **about: Any) -> StructuralModel:

@@ -169,6 +169,19 @@ def test_a_junction_that_comes_down_changes():
     assert "the junction over 'wall' rests on the plane along 0 of its length 4, here along 4" in found.reason
 
 
+def test_a_line_between_walls_that_will_lie_down_is_held_by_the_mesh():
+    outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
+    tee = [Divider([[5, 0], [5, 8]], wall=1.5), Divider([[5, 4], [12, 4]], wall=1.5)]
+    cross = [Divider([[6, 0], [6, 8]], wall=1.5), Divider([[0, 4], [12, 4]], wall=1.5)]
+    upright = [Divider(divider.curve, wall=1.5, upright=True) for divider in tee]
+    for dividers, verdict in ((tee, "HELD_BY_MESH"), (cross, "PERSISTS"), (upright, "PERSISTS")):
+        plan = Plan(outline, dividers=dividers, tension=4.0, edge_length=1.2)
+        found = check_mesh(solve(plan.surface()))
+        assert found.verdict is MeshVerdict[verdict]
+        assert ("leans ever more at its foot" in str(found)) is (dividers is tee)
+    assert found.place is None
+
+
 def test_near_a_junction_whose_wall_is_held_there_is_nothing_to_hold():
     """The top of the junction of two caps is drawn up: another shape, and no end that only the mesh holds."""
     slides = joined_caps(1.0, exact=True)

@@ -76,6 +76,15 @@ def test_a_mirror_plane_is_no_support_below_a_roof():
     assert rises[0] == pytest.approx(rises[1], rel=1e-12)
 
 
+def test_the_sheets_of_a_cushion_are_apart_where_two_mirror_planes_meet():
+    quarter = {"mirrors": [*MIRROR, [[0, 5], [5, 5]]], **VALUES}
+    corners = [[0, 0, 2], [5, 0, 2], [5, 5, 2], [0, 5, 2]]
+    roof, cushion = (pcmc.solve(Plan(corners, cushion=c, **quarter).surface()).surface for c in (None, 1.0))
+    middle = np.linalg.norm(cushion.vertices[:, :2] - 5.0, axis=1) < 1e-9
+    assert cushion.vertices[middle, 2].max() == pytest.approx(roof.vertices[:, 2].max(), rel=1e-3)
+    assert middle.sum() == 2
+
+
 def test_masts_in_the_mirror_carry_and_can_be_moved():
     masts = [[0, 0, 0], [5, 0, 3], [5, 6, 4], [5, 10, 0], [0, 10, 2]]
     flat = {

@@ -6,7 +6,8 @@ from nightly import at_night
 from shapes import tube
 from starts import spherical_cap
 
-from pcmc import Circle, Patch, Surface, Verdict, solve
+from generators.grid import grid_faces
+from pcmc import Circle, Patch, Plane, Surface, Verdict, mirrored, solve
 from pcmc.certificate.diagnosis import narrowest_neck
 from pcmc.solvers import solve_once
 from pcmc.solvers.result import Status
@@ -65,6 +66,19 @@ def test_half_a_film_with_its_neck_free_on_the_plane():
     fold = solve(half_film(0.75)).tried[-1]
     assert fold.folds
     assert 0.75 * fold.value == pytest.approx(WIDEST, rel=0.02)
+
+
+def test_half_of_a_film_behind_a_mirror_plane_pinches_off_as_the_whole():
+    """Its neck slides on Π, and at its ends along the line where both planes meet."""
+    z, angle = np.meshgrid(np.linspace(0.0, 1.0, 5), np.linspace(0.0, np.pi, 9), indexing="ij")
+    X = np.stack([np.cos(angle), np.sin(angle), 0.8 * z], axis=-1).reshape(-1, 3).round(15)
+    mirror = {Plane(normal=(0, 1, 0), mirror=True): X[:, 1] == 0.0}
+    held = {"fixed": X[:, 2] == 0.8, "on_plane": X[:, 2] == 0.0, "on_planes": mirror}
+    half = Surface(X, grid_faces(4, 8)[:, ::-1], np.zeros(64, int), [Patch("film", 1.0, 0.0)], **held)
+    for piece in (half, mirrored(half)):
+        found = solve(piece)
+        assert found.status is Status.NONE_FOUND
+        assert "a neck pinches off near (0, 0" in found.certificate.detail
 
 
 def test_a_neck_that_pinches_off_without_proof_is_called_that():

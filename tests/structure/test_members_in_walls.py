@@ -5,12 +5,14 @@ import re
 import numpy as np
 import pytest
 from hall_with_members import STEEL, TUBE, hall, hall_under_load, hall_with
+from refusals import refused
 from small_project import HALL_WITH_ARCH
 from structures import model_of
 
 import pcmc
 from generators import joined_caps
-from pcmc import Material, StructuralModel, cli
+from pcmc import Material, StructuralModel, Wind, cli
+from pcmc.base.errors import OptionError
 from pcmc.plan import CableLine, Plan
 from pcmc.structure import Member, Profile, analyse, calculix
 from pcmc.structure.member_forces import (
@@ -39,6 +41,14 @@ def test_the_junction_of_two_spheres_needs_no_bending():
     assert np.polyfit(np.log(edges), np.log(forces), 1)[0] > 1.6
     assert forces[-1] < 3e-3
     assert shares[-1] < 0.015 < shares[0] / 3.0
+
+
+def test_wind_on_a_wall_with_a_member_is_refused():
+    """The wall is no element then: its wind was left out without a word."""
+    arch, caps = Member("wall", TUBE, STEEL), joined_caps(1.0, exact=True)
+    with refused(OptionError, what="Wind.pressures"):
+        model_of(caps, members=[arch], loads=[Wind({"wall": 0.2})], anyway=True)
+    model_of(caps, loads=[Wind({"wall": 0.2})], anyway=True)
 
 
 @needs_ccx

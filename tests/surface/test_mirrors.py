@@ -13,6 +13,7 @@ from generators import barrel, four_fans, hypar_roof, schwarz_p, spherical_cap, 
 from generators.schwarz_p import AREA
 from pcmc import Cable, Circle, Line, Patch, Plane, Room, Surface, cli, cut, mirrored
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
+from pcmc.certificate.diagnosis import slipping_ends
 from pcmc.forces.curvature import mean_curvature
 from pcmc.forces.functional import energy_and_gradient, patch_volumes
 from pcmc.forces.jacobian import linearise
@@ -94,6 +95,12 @@ def test_solved_alone_the_whole_comes_out_the_same(case):
     assert again.iterations <= 1
     assert again.energy == pytest.approx(pcmc.energy(mirrored(half.surface)), rel=1e-12)
     assert full.energy == pytest.approx(again.energy, rel=1e-7)
+
+
+def test_a_junction_does_not_end_where_two_mirror_planes_meet():
+    quarter = pcmc.solve(quarter_of_fans()).surface
+    ends = [end for mode in pcmc.certify(quarter, modes=3).modes for end in slipping_ends(quarter, mode)]
+    assert {tuple(end.place.round(9).tolist()) for end in ends} == {(20.0, 0.0, 0.0)}
 
 
 def test_the_certificate_says_which_motions_it_is_about():
