@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ..base.arrays import toml, toml_key
-from ..base.errors import PcmcError
+from ..base.errors import OptionError, PcmcError
 from ..base.units import Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
@@ -20,13 +20,13 @@ from ..certificate.verdict import Verdict
 from ..plan import Divider, Plan
 from ..plan.edges import usual_cable
 from ..plan.parts import BALANCED
-from ..solvers import solve
-from ..solvers.result import Result, Status
+from ..solvers.result import Result
 from ..surface import Surface
 from ..surface.pieces import two_digits
 from .rises import SHARES, Rise, as_sail, net_pressures, point_masts, ring_lines, with_rings
 
 if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
     from ..design import Design, Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
@@ -48,6 +48,7 @@ class Ended(Protocol):
     def solved(self) -> Result: ...
     @property
     def good(self) -> bool: ...
+    def check_mesh(self) -> MeshCheck | None: ...
 
 
 Trial = Callable[[Plan, Surface, Sequence["Target"]], Ended]  # solves a plan from a surface, with targets
@@ -63,8 +64,6 @@ class Task:
     rises: Sequence[Rise]  # heights instead of tensions, which are the last targets
     targets: Sequence[Target]
     vary: Sequence[Parameter]
-    method: str
-    options: Mapping[str, Any]  # of the method
     units: Units
 
 
@@ -97,20 +96,18 @@ def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
     return [text for text in (drawn, balanced) if text]
 
 
-def apexes_below_supports(
-    plan: Plan | None, surface: Surface, targets: Sequence[Target], units: Units
-) -> list[str]:
-    """A line for each apex that is wanted below a part of the patch which is held higher.
+def check_apexes(plan: Plan | None, surface: Surface, targets: Sequence[Target], units: Units) -> None:
+    """Refuse an apex that is wanted below a part of the patch which is held higher.
 
     >>> from pcmc import Target
     >>> from pcmc.plan import Hole
     >>> eye = Hole({"circle": {"centre": [4, 4, 2], "radius": 1}}, name="eye")
     >>> plan = Plan([[0, 0], [8, 0], [8, 8], [0, 8]], holes=[eye], tension=5.0, edge_length=1.0)
-    >>> apexes_below_supports(plan, plan.surface(), [Target("apex", value=1.5)], Units("m"))
-    ["hole 'eye' is held at 2 m, so the apex cannot be 1.5 m"]
+    >>> check_apexes(plan, plan.surface(), [Target("apex", value=1.5)], Units("m"))
+    Traceback (most recent call last):
+    pcmc.base.errors.OptionError: hole 'eye' is held at 2 m, so the apex cannot be 1.5 m
     """
     heights, near = surface.plane.height(surface.vertices), SAME * surface.size
-    lines, unit = [], units.behind("length")
     for target in targets:
         highest = target.at_most if target.value is None else target.value
         if target.quantity != "apex" or highest is None:
@@ -120,14 +117,13 @@ def apexes_below_supports(
         top = float(heights[corners[surface.pinned[corners]]].max(initial=-math.inf))
         if top <= highest + near:
             continue
-        holder = "a support"
+        holder, unit = "a support", units.behind("length")
         for hole in plan.holes if plan is not None else ():
             edge = hole.curve.local(surface.plane).at(hole.curve.dense)
             if holder == "a support" and edge.shape[1] > 2 and abs(float(edge[:, 2].max()) - top) <= near:
                 holder = hole.name
-        held = f"{holder} is held at {top:.6g}{unit}"
-        lines.append(f"{held}, so the {target.label} cannot be {highest:.6g}{unit}")
-    return lines
+        text = f"{holder} is held at {top:.6g}{unit}, so the {target.label} cannot be {highest:.6g}{unit}"
+        raise OptionError(text, what="apex", where=target.of, found=highest)
 
 
 def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: Trial) -> list[str]:
@@ -146,7 +142,9 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        mended = Mended(plan, ended.solved, True) if certified else _mended(task, plan, ended.solved)
+        mended = (
+            Mended(plan, ended.solved, True) if certified else _mended(task, plan, ended.solved, try_plan)
+        )
         better = mended.plan
         targets = task.targets[: -len(task.rises)] if mended.sail and task.rises else task.targets
         met, reached = False, ""
@@ -169,12 +167,20 @@ def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: T
     return [f"{mended.cause}{where}, {tried}:", *lines, *mended.rings, *ending]
 
 
-def _mended(task: Task, plan: Plan, result: Result) -> Mended:
+def _mended(task: Task, plan: Plan, result: Result, try_plan: Trial) -> Mended:
     """The plan with other supports if these alone bring it to rest; else with other tensions and walls.
 
     Free edges get cables; single points get rings, from the size for their heights on, which finer meshes
     hold, too.
     """
+
+    def tried(changed: Plan) -> Ended | None:
+        """How a plan ends on a mesh that is not fine; None if it has none, as with a patch inside a ring."""
+        try:
+            return try_plan(changed, coarse(changed, result.surface).surface(), ())
+        except PcmcError:
+            return None
+
     sail, masts = as_sail(plan, task.rises), point_masts(plan)
     base = plan if sail is None else sail
     fit = all(mast.has_room and not mast.in_mirror for mast in masts)
@@ -182,39 +188,21 @@ def _mended(task: Task, plan: Plan, result: Result) -> Mended:
     shares = [share for share in SHARES if share >= least] if masts and fit else []
     for share in shares if masts or sail is None else (0.0,):
         changed = with_rings(base, masts, share) if masts else base
-        other = _tried(task, changed, result)
-        if other is not None and other.certificate.certified and (not masts or _persists(other)):
+        other = tried(changed)
+        check = other.check_mesh() if other is not None and other.good and masts else None
+        if other is not None and other.good and (not masts or (check is not None and check.persists)):
             rings = ring_lines(masts, share, drawn=bool(task.drawing))
-            return Mended(changed, other, True, sail is not None, rings)
+            return Mended(changed, other.solved, True, sail is not None, rings)
     better, last = plan, result
     for _ in range(TRIES):
         before, better = better, _step(better, last)
-        other = _tried(task, better, last) if changes(before, better) else None
+        other = tried(better) if changes(before, better) else None
         if other is None:  # nothing left to change, or too coarse for this plan
             break
-        if other.certificate.certified:
+        if other.good:
             return Mended(better, result, True)
-        if other.status is Status.STOPPED:  # by Ctrl-C, which ends the command
-            raise KeyboardInterrupt
-        last = other
+        last = other.solved
     return Mended(better, result, False)
-
-
-def _tried(task: Task, plan: Plan, result: Result) -> Result | None:
-    """How a plan ends on a mesh that is not fine; None where it has none, as with a patch inside a ring."""
-    try:
-        return solve(coarse(plan, result.surface).surface(), task.method, **task.options)
-    except PcmcError:
-        return None
-
-
-def _persists(result: Result) -> bool:
-    from ..accuracy import check_mesh  # takes long to import
-
-    try:
-        return check_mesh(result).persists
-    except PcmcError:
-        return False
 
 
 def coarse(plan: Plan, surface: Surface) -> Plan:
@@ -321,13 +309,15 @@ def with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:
 def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
     """The lines to type that make the one plan the other; some tensions stand ``instead`` of rises."""
     rows: list[tuple[str, Any, Any, Sequence[str]]]
-    rows = [("[plan]", plan, other, ("edge", "cable", "tension", "pressure"))]
+    rows, alone = [("[plan]", plan, other, ("edge", "cable", "tension", "pressure"))], set[str]()
     for before, after in zip(plan.patches, other.patches, strict=True):
         rows.append((f"[plan.patches] {toml_key(before.name)}:", before, after, ("tension", "pressure")))
     for number, (hole, new) in enumerate(zip(plan.holes, other.holes, strict=False), 1):
         rows.append((f"[[plan.holes]] number {number}:", hole, new, ("edge", "cable")))
     for number, (divider, line) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
         place = f"[[plan.dividers]] number {number} ({divider.name!r}):"
+        if vars(divider) == vars(Divider(divider.curve, name=f"wall {number}")):
+            alone.add(place)
         rows.append((place, divider, line, ("wall", "bottom", "upright")))
     risen = {"[plan]" if r.patch is None else f"[plan.patches] {toml_key(r.patch)}:": r.kind for r in instead}
     walls, lines = other.surface().patches, []
@@ -344,7 +334,7 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
                 if new == old:  # balanced as it is
                     continue
             why = f"instead of {kind}" if kind else f"now {_shown(old)}"
-            if isinstance(before, Divider) and vars(before) == vars(Divider(before.curve, name=before.name)):
+            if place in alone:
                 why += f"; a curve alone becomes {{curve = ..., {key} = {_shown(new)}}}"
             change = f"remove {key}" if new is None else f"{key} = {_shown(new)}"
             lines.append(f"{place} {change}  ({why})")

@@ -12,13 +12,16 @@ from dataclasses import replace
 
 from ..base.arrays import toml_key
 from ..plan import Plan
-from ..surface import Surface
+from ..surface import Plane, Surface
+from ..surface.curves import Curve
 from ..surface.pieces import two_digits
 from .advice import changes, with_dividers, with_upright
 from .rises import Rise, net_pressures
 
 STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
 FLATTER = (0.85, 0.7, 0.5)  # times the heights wanted, or 1 over these times the tensions given
+
+LOWER = (0.7, 0.5, 0.35)  # times the heights of raised lines, at whose ends a sail is as steep as at a point
 
 Change = tuple[Plan, Sequence[Rise], list[str]]  # a plan, the heights that it is to have, the lines to type
 
@@ -40,6 +43,21 @@ def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:
         other = plan if rises else _scaled(plan, 1.0 / share)
         lines = [_line(*both) for both in zip(rises, lower, strict=True)] or changes(plan, other)
         yield other, lower, lines
+
+
+def lower_lines(plan: Plan) -> Iterator[Change]:
+    """The plan with lower heights z of the raised lines that hold it; none where its plane is not z = 0."""
+    curves = {k: s for k, s in enumerate(plan.supports) if isinstance(s, Curve)}
+    raised = {k: c for k, c in curves.items() if c.pieces[0].points.shape[1] > 2 and plan.plane == Plane()}
+    for share in LOWER if raised else ():
+        supports, lines = [*plan.supports], []
+        for number, curve in raised.items():
+            lower = (replace(piece, points=piece.points * [1.0, 1.0, share]) for piece in curve.pieces)
+            supports[number] = replace(curve, pieces=tuple(lower))
+            top = float(curve.at(curve.dense)[:, 2].max())
+            change = f"{share:g} times its heights, up to {share * top:g}  (now up to {top:g})"
+            lines.append(f"[plan] supports number {number + 1}: {change}")
+        yield replace(plan, supports=supports), (), lines
 
 
 def _lower(rise: Rise, share: float) -> Rise:

@@ -237,13 +237,14 @@ def point_masts(plan: Plan) -> list[Mast]:
     points = np.array([plan.plane.to_local(p) if len(p) == 3 else np.append(p, 0.0) for p in given.values()])
     snap, places = SNAP * plan.edge_length, shapely.points(points[:, :2])
     rim = PlanLine("outline", Kind.OUTLINE, plan.outline.local(plan.plane)).shape
+    within = shapely.intersects(shapely.Polygon(rim).buffer(snap), places)
     in_mirror = np.zeros(len(points), dtype=bool)
     for mirror in mirrors:  # there the roof goes on
         rim = rim.difference(mirror.shape.buffer(snap))
         in_mirror |= mirror.nearest(points[:, :2])[1] <= snap
     others = [line.nearest(points[:, :2])[1] for line in lines]
     away = np.min([shapely.distance(rim, places), *others], axis=0)
-    inside = away > snap
+    inside = within & (away > snap)
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))

@@ -245,7 +245,7 @@ class Certificate:
             ("", self.detail),
             ("units", units.sentence if units else ""),
             ("residual", f"{self.residual:.2e} of {self.scale:.4g}"),
-            ("energy", f"{self.energy:.10g}{units.behind('energy')}"),
+            ("energy", f"{self.energy:.10g}{units.behind('energy')}{tables.cut_note(self.acting.surface)}"),
             ("volume", "" if math.isnan(self.volume) else f"{self.volume:.6g}{units.behind('volume')}"),
             ("Morse index", "-" if self.index is None else str(self.index)),
             ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),

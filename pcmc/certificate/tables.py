@@ -18,6 +18,7 @@ from ..forces.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.images import lattice_of
 from ..surface.pieces import point_text
 from ..surface.topology import EdgeCurve
 from .forces import CableEnd, cable_parts, sheet_pulls
@@ -217,6 +218,14 @@ def lean_table(surface: Surface) -> pd.DataFrame:
             place = surface.vertices[surface.faces[face]].mean(axis=0)
             rows.append([surface.patches[wall].name, angle, *place])
     return pd.DataFrame(rows, columns=["wall", "lean", *"xyz"])
+
+
+def cut_note(surface: Surface) -> str:
+    """What of a cell's energy does not depend on where the cell is cut; empty where all of it does not."""
+    if not surface.net_pressures.any() or len(lattice_of(surface)) < 3:
+        return ""
+    areas = float(surface.tensions @ patch_areas(surface))
+    return f"; {areas:.10g} of areas, and the volumes as they are where the cell is cut"
 
 
 def lean_texts(table: pd.DataFrame, size: float, least: float = 0.05) -> list[str]:

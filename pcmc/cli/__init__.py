@@ -10,8 +10,10 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 OK, NOT_CERTIFIED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit codes
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -32,6 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     default = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # nohup ignores it
     own_process = arguments is None and default
+    if arguments is None:
+        _keep_freed_memory()
     if own_process:
         signal.signal(signal.SIGINT, _exit)  # a library that is half imported may lose an exception
         gc.disable()  # until all is imported; what lives to the end is not worth searching
@@ -47,6 +51,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if own_process:
             signal.signal(signal.SIGINT, _exit)  # until Python has ended
             gc.freeze()  # and it ends without a last search
+
+
+def _keep_freed_memory() -> None:
+    """Let large arrays reuse the memory of those before, which Linux would take back and clear each time."""
+    if sys.platform == "linux":
+        import ctypes
+
+        with suppress(AttributeError):  # of glibc alone
+            set_option = ctypes.CDLL(None).mallopt
+            set_option(M_MMAP_THRESHOLD, 2**31 - 1)
+            set_option(M_TRIM_THRESHOLD, -1)
 
 
 def _stopped() -> int:

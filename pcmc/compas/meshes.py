@@ -308,5 +308,4 @@ def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **optio
 
 def _plain_certificate(found: pcmc.Certificate) -> dict[str, Any]:
     tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries", "supports")}
-    values = {"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}
-    return {name: plain(value) for name, value in values.items()}
+    return dict(plain({"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}))

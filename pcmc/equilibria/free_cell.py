@@ -21,7 +21,7 @@ from scipy.linalg import expm
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, SurfaceError
-from ..base.tolerances import SAME_PRESSURE
+from ..base.tolerances import AT_REST
 from ..certificate import Certificate
 from ..forces.functional import patch_areas
 from ..forces.rooms import room_pressures, room_volumes
@@ -207,7 +207,7 @@ def _expect_free(surface: Surface, what: str) -> None:
     pressures = surface.net_pressures
     of_rooms = room_pressures(surface) @ surface.room_signs if surface.rooms else 0.0 * pressures
     other = np.abs(pressures - of_rooms)
-    if other.max() > SAME_PRESSURE * max(np.abs(pressures).max(), surface.tensions.max() / surface.size):
+    if other.max() > AT_REST * max(np.abs(pressures).max(), surface.tensions.max() / surface.size):
         name = surface.patches[int(other.argmax())].name
         text = f"{what}: patch {name!r} has a given pressure, whose volume in a cell is known up to a"
         text += " constant only; prescribe the volume with a room, or give it pressure 0"

@@ -154,7 +154,7 @@ def _findings(certificate: Certificate, moving: bool) -> dict[str, Any]:
     for name, table in tables.items():  # pandas' own ``to_dict`` takes ten times as long, at every answer
         columns = [table[column].tolist() for column in table]
         rows[name] = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
-    return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
+    return {**certificate.numbers(), **rows}
 
 
 def fields(state: SessionState, origin: Floats) -> Arrays:

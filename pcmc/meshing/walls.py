@@ -99,7 +99,7 @@ def add_walls(
         tops.append(UpperEdge(chain if along.any() else chain[::-1], number, bottom == "held"))
     if edge_length is None:
         edge_length = float(edge_lengths(surface)[surface.topology.seam_edge].mean())
-    walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
+    walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.pinned)
     columns = np.zeros((len(walls.vertices), surface.support_columns.shape[1]), dtype=bool)
     columns[:, 0], columns[:, 1] = walls.fixed, walls.sliding
     return surface.with_mesh(

@@ -60,8 +60,9 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
     ``ratios`` are height / width by axes, one of each row; titles, scales and legends keep their space.
     """
     _as_written(figure)
+    layout = figure.get_layout_engine()
     for _ in range(5):
-        figure.draw_without_rendering()
+        layout.execute(figure)
         boxes = {axes: axes.get_window_extent() for axes in ratios}
         missing = sum(ratio * boxes[axes].width - boxes[axes].height for axes, ratio in ratios.items())
         if abs(missing) < 0.5:  # pixels

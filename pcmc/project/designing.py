@@ -8,16 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..advice.advice import Task, advice, apexes_below_supports, chosen_values
+from ..advice.advice import Task, advice, check_apexes, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
+from ..base.units import Units
 from ..certificate.balance import unbalanced
 from ..forces.pinching import standing_part
 from ..io import metres_note
 from ..plan import Plan
 from ..structure.calculix import expect_program
 from ..surface import Surface
+from ..surface.lagrange import expect_flat
 from . import cache
 from .checking import in_file
 from .file import Project, load
@@ -187,7 +189,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     given = start_of(project)
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
-    _check_wishes(project, surface)
+    _check_wishes(project, surface, start.units)
     swapped = False
     if project.swap:
         solved, swapped = solve_and_swap(project, surface, report)
@@ -207,11 +209,10 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     outcome = replace(solved, notes=notes, units=start.units, data=start.data)
     if outcome.good or swapped:
         return outcome
-    notes += apexes_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")
     drawing = "" if project.drawing is None else project.drawing.path.name
-    names = ("rises", "targets", "vary", "method", "options", "units")
-    task = Task(project.plan, project.where_to_type, drawing, *(getattr(project, name) for name in names))
+    wanted = project.rises, project.targets, project.vary, project.units
+    task = Task(project.plan, project.where_to_type, drawing, *wanted)
 
     def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
         plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())
@@ -220,10 +221,11 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
 
 
-def _check_wishes(project: Project, surface: Surface) -> None:
+def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
     """Refuse what the surface cannot give, and warn where a junction cannot balance, before the work."""
     with in_file(project.path):
         structure, output = project.structure, project.output
+        check_apexes(project.plan, surface, project.targets, units)
         if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")
@@ -233,6 +235,8 @@ def _check_wishes(project: Project, surface: Surface) -> None:
             expect_program()
         if project.pattern is not None and (output.pattern or output.report):
             of_material(project.pattern, structure, surface)
+        if project.verify:
+            expect_flat(surface, "verify")
         if project.margin:
             from ..accuracy.varied import Varied  # takes long to import
 

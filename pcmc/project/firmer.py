@@ -9,7 +9,7 @@ from itertools import chain
 from typing import cast
 
 from ..advice.advice import coarse
-from ..advice.persisting import firmer_walls, flatter
+from ..advice.persisting import firmer_walls, flatter, lower_lines
 from ..advice.rises import Rise, take_rises, with_rises
 from ..base.errors import PcmcError
 from ..plan import Plan
@@ -47,6 +47,7 @@ def _found(outcome: Outcome, changed: Changed | None, step: OnStep) -> str:
         warnings.simplefilter("ignore")  # the project's own warnings were shown
         tried = [firmer_walls(project.plan, outcome.surface, project.rises)]
         tried += [flatter(project.plan, project.rises)] if held else []
+        tried += [lower_lines(project.plan)] if held and project.drawing is None else []
         for plan, rises, lines in chain(*tried):
             if _persists(replace(project, plan=coarse(plan, outcome.surface)), rises, changed, step):
                 if rises and rises is not project.rises and not take_rises(project.data)[1]:  # by an option

@@ -6,7 +6,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import LostWarning, OptionError
-from ..structure.drawn import drawn_members
+from ..structure.columns import drawn_members
 from ..structure.section import members_of
 
 if TYPE_CHECKING:

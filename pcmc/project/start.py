@@ -103,7 +103,8 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
             patches = changes.get("patches", surface.patches)
             changes["patches"] = [walled if p.name == name else p for p in patches]
     if len(mesh.supports):
-        changes |= {"fixed": _supported(surface, mesh.supports)}
+        fixed = surface.original[_supported(surface, mesh.supports)]
+        changes |= {"fixed": np.isin(surface.original, fixed)}  # images, too
         changes |= dict.fromkeys(("on_plane", "on_line"), ())
         changes["on_planes"] = tuple((plane, on) for plane, on in surface.on_planes if plane.mirror)
     if changes:
@@ -118,6 +119,11 @@ def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
     X, boundary = surface.vertices, np.zeros(surface.n, dtype=bool)
     outer = surface.topology.boundary_edge & ~surface.mirror_edge  # at a mirror the roof goes on
     boundary[surface.topology.edges[outer]] = True
+    if isinstance(supports, str) and not boundary.any():
+        text = (
+            f"mesh.supports: the surface has no boundary for {supports!r}; leave supports out, or name points"
+        )
+        raise OptionError(text, what="mesh.supports", found=supports)
     if supports == BOUNDARY:
         return boundary
     height = surface.plane.height(X)

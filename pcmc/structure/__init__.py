@@ -1,7 +1,7 @@
 """Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer."""
 
 from .analysis import Analysis, Case, analyse
-from .drawn import drawn_members
+from .columns import drawn_members
 from .gas import Gas
 from .inp import write_structure
 from .loads import SelfWeight, Snow, Step, Wind

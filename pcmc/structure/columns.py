@@ -1,4 +1,5 @@
-"""Columns and stays: their forces, by statics alone, from what the points of supports carry.
+"""Columns and stays: their forces, by statics alone, from what the points of supports carry; with these and
+those of beams and cables, all members at rest.
 
 A point that holds the roof exerts the force R on it. Bars from there to their feet, in the directions d_i of
 length 1, with the forces N_i, tension above 0, pull the point with Σ N_i d_i. So
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -21,9 +23,10 @@ from scipy.optimize import lsq_linear
 
 from ..base.arrays import Floats
 from ..base.units import Units
+from ..forces.cables import pull_along
 from ..surface.pieces import point_text
-from .member_forces import forces_on_members, frame_of
-from .members import at_points
+from .member_forces import forces_on_members, frame_of, members_at_rest
+from .members import PlacedMember, at_points
 from .model import StructuralModel
 
 LEAST = 0.01  # of the force at a point: a smaller part that bars leave is not told, nor a smaller thrust
@@ -117,3 +120,25 @@ def column_text(model: StructuralModel, table: pd.DataFrame, units: Units) -> st
 
 def _vector(value: Floats) -> str:
     return point_text(np.array([float(f"{c:.3g}") + 0.0 for c in value]))
+
+
+def drawn_members(model: StructuralModel) -> tuple[PlacedMember, ...]:
+    """All members of a model but its surface's own cables, as files, drawings and the page have them: with
+    their forces at rest where the surface is certified.
+
+    >>> from pcmc import Material, Member, Profile
+    >>> from pcmc.plan import Plan
+    >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
+    >>> arch = Member("wall 1", Profile.tube(0.1, 0.005), Material(2.1e8))
+    >>> model = StructuralModel(hall.surface(), Material(5e5), 1e-3, members=[arch], anyway=True)
+    >>> [(one.name, one.kind, one.wall, one.forces) for one in drawn_members(model)]
+    [('wall 1', 'beam', 'wall 1', None)]
+    """
+    members = *model.lines, *model.bars
+    if not model.certificate.certified:
+        return members
+    found = {beam.line.name: beam.within[:, 0] for beam in members_at_rest(model)}
+    found |= {cable.name: pull_along(model.standing, cable, cable.edges) for cable in model.standing.cables}
+    found |= {str(name): own["N"].to_numpy() for name, own in columns_at_rest(model).groupby("member")}
+    forces = {name: (float(N.min()), float(N.max())) for name, N in found.items()}
+    return tuple(replace(member, forces=forces.get(member.name)) for member in members)

@@ -46,8 +46,7 @@ class Gas:
     volume: float | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
-            validate.refuse("Gas.patches", self.patches, "a sequence of patch names")
+        validate.sequence("Gas.patches", self.patches, "a sequence of patch names")
         if self.ambient is not None:
             vars(self)["ambient"] = validate.number("Gas.ambient", self.ambient, least=0.0, most=LARGEST)
         if self.volume is not None:

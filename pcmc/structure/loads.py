@@ -51,7 +51,7 @@ class SelfWeight:
         if self.gravity is not None:
             gravity = validate.number("SelfWeight.gravity", self.gravity, least=SMALLEST, most=LARGEST)
             vars(self)["gravity"] = gravity
-        _check_name(self.name)
+        validate.checked_name("name of a load", self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
         return replace(step, gravity=standard if self.gravity is None else self.gravity)
@@ -73,12 +73,11 @@ class Snow:
 
     def __post_init__(self) -> None:
         load = validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
-        if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
-            validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
-        vars(self).update(load=load, patches=tuple(self.patches), **_checked_zone("Snow", self))
+        patches = validate.sequence("Snow.patches", self.patches, "a sequence of patch names")
+        vars(self).update(load=load, patches=tuple(patches), **_checked_zone("Snow", self))
         if len(validate.sequence("Snow.slides", self.slides)):
             vars(self)["slides"] = _checked_slopes("Snow.slides", self.slides)
-        _check_name(self.name)
+        validate.checked_name("name of a load", self.name)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
         """A third of each triangle's load at each of its corners; triangles below others carry none."""
@@ -118,7 +117,7 @@ class Wind:
             for zone, value in self.pressures.items()
         }
         vars(self).update(pressures=checked, **_checked_zone("Wind", self))
-        _check_name(self.name)
+        validate.checked_name("name of a load", self.name)
 
     @property
     def patches(self) -> tuple[str, ...]:
@@ -231,7 +230,7 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
     checked: dict[str, dict[str, float]] = {}
     limits: dict[str, Any] = {"least": -1e3, "most": 1e3}
     for name, factors in given.items():
-        _check_name(name)
+        validate.checked_name("name of a combination", name)
         if name in (*steps, FORM):
             text = f"combination {name!r}: a case has this name; give the combination another one"
             raise OptionError(text, what="combinations", found=name)
@@ -298,8 +297,3 @@ def _checked_slopes(what: str, given: Any) -> tuple[float, float]:
     if not least < most:
         validate.refuse(what, given, "two slopes in degrees, the smaller one first")
     return least, most
-
-
-def _check_name(name: object) -> None:
-    if not isinstance(name, str) or not name.strip() or "\n" in name:
-        validate.refuse("name of a load", name, "a line of text")

@@ -49,6 +49,11 @@ def curve(spec: Any, closed: bool = False) -> Curve:
         problem = "a curve of several pieces is a list of them, without join: [{polyline = ...}, {arc = ...}]"
         raise OptionError(problem, what="curve", found=list(spec), expected=CURVES)
     for key in kinds:
+        if key in ("centre", "radius", "axes", "sweep"):
+            text = (
+                f"{key} stands in the table of its curve, as in {{circle = {{centre = [5, 3], radius = 1}}}}"
+            )
+            raise OptionError(text, what=key, found=spec[key])
         validate.choice("curve", key, CURVES)
     if len(kinds) != 1:
         problem = f"a curve needs exactly one of {', '.join(CURVES)}; found {list(spec)}"

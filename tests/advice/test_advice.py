@@ -12,7 +12,8 @@ from explore_cases import followed
 from nightly import at_night, night_but
 from printed import words_of
 
-from pcmc import cli
+from generators import two_squares
+from pcmc import certify, cli
 from pcmc.advice.advice import changes
 from pcmc.advice.persisting import firmer_walls, flatter
 from pcmc.certificate.diagnosis import describe_saddle
@@ -78,6 +79,16 @@ def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, kind):
     assert outcome_of(tmp_path, typed(text, lines)).good
 
 
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
+def test_of_a_roof_that_is_shown_whole_the_whole_is_tried(tmp_path, monkeypatch):
+    """The part between the mirrors alone was."""
+    half = HALL.replace("dividers", "") + "mirrors = [[[12, 0], [12, 6]]]\n" + f"{CHANCEL}wall = 1.0\n"
+    text = half + "[plan.patches]\nnave = {tension = 7.0}\napse = {tension = 4.0}\n[output]\nwhole = true\n"
+    assert "comes to rest" in outcome_of(tmp_path, text).advice[0]
+    monkeypatch.setattr("pcmc.project.outcome.certify", lambda surface: certify(two_squares(2)))
+    assert "comes to rest" not in "".join(outcome_of(tmp_path, text).advice)
+
+
 def test_a_wall_that_is_balanced_as_it_is_is_no_change():
     line = Divider([[6, 0], [6, 6]])
     hall = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], [line], edge_length=0.8, tension=5.0)
@@ -103,6 +114,9 @@ def test_a_line_for_a_divider_that_may_be_a_curve_alone_says_what_that_becomes()
     hall = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], lines, edge_length=0.8, tension=5.0)
     upright = replace(hall, dividers=[replace(line, upright=True) for line in hall.dividers])
     alone, table = changes(hall, upright)
+    named = replace(hall, dividers=[replace(line, name=f"seam {k}") for k, line in enumerate(hall.dividers)])
+    other = replace(named, dividers=[replace(line, upright=True) for line in named.dividers])
+    assert changes(named, other)[0].endswith("upright = true  (now false)")
     assert alone.endswith("(now false; a curve alone becomes {curve = ..., upright = true})")
     assert table.endswith("upright = true  (now false)")
 
@@ -136,6 +150,21 @@ def test_a_roof_too_steep_at_a_hole_is_advised_to_be_flatter(tmp_path, wish):
     flatter = outcome_of(tmp_path, STEEP + line.removeprefix("[plan] ").split("  (")[0])
     assert flatter.good
     assert flatter.check_mesh().persists
+
+
+def test_a_ridge_that_is_too_high_in_a_sail_is_advised_to_be_lower(tmp_path):
+    """It was "held by the mesh" without a word on what to type."""
+    sail = (
+        "[plan]\noutline = [[0, 0], [12, 0], [12, 8], [0, 8]]\nedge_length = 0.7\ntension = 2\npressure = 0\n"
+    )
+    first = outcome_of(tmp_path, f"{sail}supports = [[[3, 4, 4], [9, 4, 4]]]\n")
+    assert first.good
+    first.check_mesh()
+    heading, line = firmer(first).split("\n  ")
+    assert heading == "type in roof.toml, which was tried and persists:"
+    assert line == "[plan] supports number 1: 0.35 times its heights, up to 1.4  (now up to 4)"
+    lower = outcome_of(tmp_path, f"{sail}supports = [[[3, 4, 1.4], [9, 4, 1.4]]]\n")
+    assert lower.check_mesh().persists
 
 
 def test_every_way_to_a_roof_says_what_to_type(tmp_path, capsys):

@@ -4,7 +4,7 @@ import pytest
 from refusals import refused
 
 from pcmc import cli
-from pcmc.base.errors import FileError
+from pcmc.base.errors import FileError, OptionError
 from pcmc.project import load, run_project
 
 ROUND = "[plan]\nedge_length = 1.0\noutline = {circle = {centre = [0, 0], radius = 5}}\n"
@@ -54,6 +54,13 @@ def test_an_apex_that_is_not_above_the_outline_is_refused(given, apex):
     raised = "[plan]\noutline = [[0, 0, 3], [12, 0, 3], [12, 8, 3], [0, 8, 3]]\n"
     with pytest.raises(FileError, match=f"apex is {apex} over the plane, and the outline is at 3 and more"):
         given(f"{raised}apex = {apex}\n")
+
+
+def test_an_apex_between_the_heights_of_the_outline_is_refused_before_the_solve(given, monkeypatch):
+    monkeypatch.setattr("pcmc.project.designing.solve_project", None)
+    project = given("[plan]\noutline = [[0, 0, 3], [12, 0, 3], [12, 8, 5], [0, 8, 5]]\napex = 4\n")
+    with refused(OptionError, what="apex", found=4.0):
+        run_project(project)
 
 
 def test_each_patch_may_have_its_own_rise(given):

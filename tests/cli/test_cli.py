@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 import sys
 from importlib.metadata import version
@@ -372,3 +373,21 @@ def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
     monkeypatch.setattr("pcmc.project.solving.solve", broken)
     with pytest.raises(ZeroDivisionError):
         cli.main(["solve", "roof.toml"])
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other systems have no such options")
+def test_the_command_keeps_the_memory_of_large_arrays_for_the_next():
+    program = """
+import resource, sys
+from pcmc import cli
+sys.argv = ["pcmc", "--version"]
+cli.main()
+first = b"x" * 2**26
+del first
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+second = b"x" * 2**26
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+    run = [sys.executable, "-c", program]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=True)
+    assert int(done.stdout.split()[-1]) < 1000  # pages; 16 384 where the system takes them back

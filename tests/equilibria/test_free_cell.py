@@ -104,6 +104,13 @@ def test_a_foam_under_the_pressure_that_it_balanced_comes_to_the_same_cell():
     assert found.ways_down == 1
 
 
+def test_what_rounding_leaves_of_the_pressure_on_a_film_is_no_given_one():
+    foam = at_rest(weaire_phelan_foam(0))
+    name = next(patch.name for patch in foam.patches if patch.pressure == 0.0)
+    rounded = foam.retensioned(pressures={name: 3e-13 * foam.pressures.max()})
+    assert cell_stress(rounded) == pytest.approx(cell_stress(foam), abs=1e-9)
+
+
 @pytest.mark.parametrize("pressure", [0.0, *at_night(1.0)])
 def test_where_no_size_balances_the_pressure_the_nearest_that_does_is_named(pressure):
     with pytest.raises(OptionError, match=r"found no cell for a pressure of .* pass pressure=-1\.609,"):

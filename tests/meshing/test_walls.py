@@ -287,3 +287,14 @@ def test_files_tables_and_pictures_show_a_sail_as_roof(tmp_path):
     drawn = [c.vertices for c in drawing_set(hall, "m", anyway=True).curves if c.layer == "PCMC-WALL"]
     assert set(np.concatenate(drawn)) <= set(hall.faces[hall.patch_of_face == 2].ravel())
     assert repr(hall).splitlines()[2].startswith("  walls: wall 1 ")
+
+
+def test_a_wall_up_to_the_axis_of_two_mirror_planes_stands_as_that_of_a_plan():
+    corners, mirrors = [[0, 0, 1], [6, 0, 1], [6, 6, 1], [0, 6, 1]], [[[6, 0], [6, 6]], [[0, 6], [6, 6]]]
+    patches = {"a": {"tension": 6.0}, "b": {"tension": 6.0}}
+    quarters = [
+        Plan(corners, [Divider([[0, 0], [6, 6]], wall=wall)], patches=patches, mirrors=mirrors).surface()
+        for wall in (1.5, None)
+    ]
+    one, other = (pcmc.energy(pcmc.solve(s).surface) for s in (quarters[0], add_walls(quarters[1], 1.5)))
+    assert one == pytest.approx(other, rel=1e-6)

@@ -1,8 +1,10 @@
 """What a project changes of its mesh: supports leave mirror planes, walls follow pressures."""
 
 import pytest
+from periodic_cases import bay
 
 import pcmc
+from generators import kelvin_foam
 from pcmc import cli
 from pcmc.base.errors import FileWarning, OptionError
 from pcmc.base.units import Units
@@ -23,6 +25,37 @@ def test_supports_of_a_project_leave_the_mirror_plane_of_its_mesh(tmp_path, supp
     assert roof.good
     assert len(roof.surface.on_planes) == 1
     assert roof.surface.vertices[:, 2].max() == pytest.approx(plain.surface.vertices[:, 2].max(), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "supports", ['"boundary"', '"ground"', "[[[0, 0, 0], [1, 0, 0]], [[0, 1, 0], [0.5, 1, 0]]]"]
+)
+def test_supports_of_a_bay_hold_images_and_their_vertices(tmp_path, supports):
+    pcmc.write(tmp_path / "bay.pcmc", bay(6))
+    (tmp_path / "roof.toml").write_text(f'[mesh]\nfile = "bay.pcmc"\nsupports = {supports}\n')
+    surface = build(tmp_path / "roof.toml")
+    assert surface.fixed[surface.images[:, 0]].any()
+    assert (surface.fixed == bay(6).fixed).all() or "0.5" in supports
+
+
+@pytest.mark.parametrize("supports", ["boundary", "ground"])
+def test_supports_of_a_surface_without_boundary_are_refused(tmp_path, supports):
+    pcmc.write(tmp_path / "foam.pcmc", kelvin_foam(levels=0))
+    (tmp_path / "foam.toml").write_text(f'[mesh]\nfile = "foam.pcmc"\nsupports = "{supports}"\n')
+    with pytest.raises(
+        OptionError, match=f"the surface has no boundary for '{supports}'; leave supports out"
+    ):
+        build(tmp_path / "foam.toml")
+
+
+def test_a_proof_of_a_cell_is_refused_before_the_work(tmp_path, capsys):
+    pcmc.write(tmp_path / "foam.pcmc", kelvin_foam(levels=0))
+    command = ["solve", str(tmp_path / "foam.pcmc"), "--verify", "-o", str(tmp_path / "new.pcmc")]
+    assert cli.main(command) == 2
+    said = capsys.readouterr()
+    assert not said.out
+    assert "verify: not for a periodic surface" in said.err
+    assert not (tmp_path / "new.pcmc").exists()
 
 
 def test_the_rise_of_half_a_mesh_is_over_its_supports_and_not_over_its_mirror_plane(tmp_path):

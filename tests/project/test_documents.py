@@ -146,6 +146,7 @@ MISSED = '[targets]\nmeet = [{quantity = "apex", value = 30.0}]\nvary = ["roof"]
         (SMALL + OUTPUT + 'net = ["a.obj"]\nnet_size = -1.0', "net_size"),
         (SMALL + OUTPUT + 'net = ["a.stl"]\nnet_size = 1.0', "a.stl"),
         (SMALL + OUTPUT + 'net = ["a.obj"]\nnet_size = 1.0\nnet_pattern = "octagons"', "output.net_pattern"),
+        (SMALL + "[solve]\norder = 2\n[pattern]\nwidth = 2.0\n", "solve.order"),
     ],
 )
 def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypatch, text, key):

@@ -129,6 +129,8 @@ def test_bad_curves_are_refused(spec, fields):
 def test_an_unknown_curve_has_a_hint():
     with pytest.raises(OptionError, match=r"a list of them, without join: .{polyline = \.\.\.}, {arc"):
         curve({"join": [{"polyline": [[0, 0], [4, 0]]}, {"arc": [[4, 0], [2, 3], [0, 0]]}]})
+    with pytest.raises(OptionError, match="radius stands in the table of its curve"):
+        curve({"circle": [5, 3], "radius": 1})
     with pytest.raises(OptionError, match="unknown curve 'circl'; did you mean 'circle'"):
         curve({"circl": {}})
 
