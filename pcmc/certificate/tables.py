@@ -162,7 +162,7 @@ def cable_end_table(surface: Surface, ends: Iterable[CableEnd]) -> pd.DataFrame:
     direction from the end along the cable. Where several cables end, their support carries the sum.
     """
     rows = [
-        [cable.name, vertex, *surface.vertices[vertex].tolist(), bool(surface.held[vertex]), *force.tolist()]
+        [cable.name, vertex, *surface.vertices[vertex].tolist(), bool(surface.supported[vertex]), *force.tolist()]
         for cable, vertex, force in ends
     ]
     columns = ["cable", "vertex", *"xyz", "held", "force_x", "force_y", "force_z"]
