@@ -265,7 +265,7 @@ def test_one_remedy_is_printed_the_one_that_was_tried(tmp_path, capsys):
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
 def test_advice_that_misses_the_targets_says_so(tmp_path, monkeypatch):
     """A roof that comes to rest and misses the targets is advised in these words."""
-    monkeypatch.setattr("pcmc.advice.advice._loosened", lambda plan, vary: None)
+    monkeypatch.setattr("pcmc.project.advising.loosened", lambda plan, vary: None)
     targets = "[targets]\nmeet = [{quantity = 'apex', of = 'nave', value = 5.0}]\nvary = ['nave']\n"
     outcome = outcome_of(tmp_path, WRONG["a wall too weak for its neighbours"] + targets)
     heading, line, *_, last = outcome.advice
