@@ -36,14 +36,7 @@ if TYPE_CHECKING:
     from .certificate.theorem import Theorem, verify
     from .cloth import CuttingPattern, cutting_pattern
     from .design import Design, Parameter, Target, meet, sensitivities
-    from .equilibria import (
-        Equilibria,
-        NeighbourSwap,
-        cell_stress,
-        find_equilibria,
-        free_cell,
-        swap_neighbours,
-    )
+    from .equilibria import Equilibria, cell_stress, find_equilibria, free_cell
     from .forces.curvature import curvature_error, mean_curvature, target_curvature
     from .forces.functional import energy, gradient
     from .forces.rooms import room_volume_gradients, room_volumes
@@ -53,6 +46,7 @@ if TYPE_CHECKING:
     from .panelling import FewerFamilies, PanelNet, Panels, fewer_families, panel_net, panels
     from .solvers import solve
     from .solvers.continuation import BoundaryMotion, Direction, follow
+    from .solvers.neighbours import NeighbourSwap, swap_neighbours
     from .structure import (
         Gas,
         Material,
@@ -151,14 +145,7 @@ _NAMES = {
     "forces.functional": ("energy", "gradient"),
     "forces.second_variation": ("hessian",),
     "forces.rooms": ("room_volume_gradients", "room_volumes"),
-    "equilibria": (
-        "Equilibria",
-        "NeighbourSwap",
-        "cell_stress",
-        "find_equilibria",
-        "free_cell",
-        "swap_neighbours",
-    ),
+    "equilibria": ("Equilibria", "cell_stress", "find_equilibria", "free_cell"),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
     "structure": (
@@ -176,6 +163,7 @@ _NAMES = {
     ),
     "solvers": ("solve",),
     "solvers.continuation": ("BoundaryMotion", "Direction", "follow"),
+    "solvers.neighbours": ("NeighbourSwap", "swap_neighbours"),
     "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
     "surface.images": ("images_in",),

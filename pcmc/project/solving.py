@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import OptionError
 from ..certificate.diagnosis import VANISHED, vanished_films
 from ..solvers import solve, solve_once
+from ..solvers.neighbours import swap_neighbours
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .checking import in_file
@@ -66,8 +67,6 @@ def solve_and_swap(project: Project, surface: Surface, report: OnStep) -> tuple[
 
     They are swapped on the first mesh and with the first tensions; what else the project asks for follows.
     """
-    from ..equilibria import swap_neighbours  # takes long to import
-
     known = {patch.name for patch in surface.patches}
     for name in project.swap:
         if name != VANISHED:

@@ -1,4 +1,4 @@
-"""The solvers: a method each, branches of equilibria, and the search for one from further starts.
+"""The solvers: a method each, branches of equilibria, further starts, and films whose neighbours swap.
 
 Gives ``solve``, the package's own, ``solve_once``, which tries the given start alone, ``find_method`` and
 ``METHODS``. May import ``certificate`` and below.

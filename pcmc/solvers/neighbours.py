@@ -12,10 +12,10 @@ from ..certificate.diagnosis import vanished_films
 from ..forces.rooms import energy_at_volumes
 from ..meshing.films import film_of
 from ..meshing.neighbour_swap import swap
-from ..solvers import solve
-from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.parts import listed
+from . import solve
+from .result import Result
 
 
 @dataclass(frozen=True, eq=False)
