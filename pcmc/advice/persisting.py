@@ -10,18 +10,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..base.arrays import toml_key
 from ..plan import Plan
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
 from .advice import changes, with_dividers, with_upright
-from .rises import Rise, net_pressures
+from .rises import Rise, net_pressures, outline_heights
 
 STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
 FLATTER = (0.85, 0.7, 0.5)  # times the heights wanted, or 1 over these times the tensions given
-
-LOWER = (0.7, 0.5, 0.35)  # times the heights of raised lines, at whose ends a sail is as steep as at a point
+LOWER = (0.7, 0.5, 0.35)  # times the heights of raised lines, at whose ends a sail is steep
 
 Change = tuple[Plan, Sequence[Rise], list[str]]  # a plan, the heights that it is to have, the lines to type
 
@@ -46,17 +47,17 @@ def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:
 
 
 def lower_lines(plan: Plan) -> Iterator[Change]:
-    """The plan with lower heights z of the raised lines that hold it; none where its plane is not z = 0."""
-    curves = {k: s for k, s in enumerate(plan.supports) if isinstance(s, Curve)}
-    raised = {k: c for k, c in curves.items() if c.pieces[0].points.shape[1] > 2 and plan.plane == Plane()}
-    for share in LOWER if raised else ():
+    """The plan with the raised lines that hold it nearer to its outline's level; none where Π is not z = 0."""
+    level = float(outline_heights(plan).mean())
+    curves = {k: s for k, s in enumerate(plan.supports) if isinstance(s, Curve) and plan.plane == Plane()}
+    tops = {k: float(z.max()) for k, c in curves.items() for z in c.at(c.dense).T[2:] if (z != level).any()}
+    for share in LOWER if tops else ():
         supports, lines = [*plan.supports], []
-        for number, curve in raised.items():
-            lower = (replace(piece, points=piece.points * [1.0, 1.0, share]) for piece in curve.pieces)
-            supports[number] = replace(curve, pieces=tuple(lower))
-            top = float(curve.at(curve.dense)[:, 2].max())
-            change = f"{share:g} times its heights, up to {share * top:g}  (now up to {top:g})"
-            lines.append(f"[plan] supports number {number + 1}: {change}")
+        for k, top in tops.items():
+            supports[k] = curves[k].mapped(np.diag([1.0, 1.0, share]), np.array([0, 0, (1 - share) * level]))
+            over = f" over {level:g}" if level else ""
+            change = f"{share:g} times its heights{over}, up to {level + share * (top - level):g}"
+            lines.append(f"[plan] supports number {k + 1}: {change}  (now up to {top:g})")
         yield replace(plan, supports=supports), (), lines
 
 

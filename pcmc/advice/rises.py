@@ -105,7 +105,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
     leasts = least_tensions(plan, least)
-    heights = _outline_heights(plan)
+    heights = outline_heights(plan)
     level, lowest, loads = float(heights.mean()), float(heights.min()), net_pressures(plan)
     targets, vary = [], []
     for rise in rises:
@@ -134,7 +134,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     return plan, targets, vary
 
 
-def _outline_heights(plan: Plan) -> Floats:
+def outline_heights(plan: Plan) -> Floats:
     """(k,) heights over Π of points of the outline."""
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)
     return outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
@@ -248,7 +248,7 @@ def point_masts(plan: Plan) -> list[Mast]:
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))
-    least, heights = LEAST_RING * plan.edge_length, points[:, 2] - _outline_heights(plan).mean() - _dome(plan)
+    least, heights = LEAST_RING * plan.edge_length, points[:, 2] - outline_heights(plan).mean() - _dome(plan)
     found = zip(given, points, away.tolist(), heights.tolist(), in_mirror.tolist(), inside, strict=True)
     return [Mast(k, point, far, high, least, cut) for k, point, far, high, cut, free in found if free]
 
