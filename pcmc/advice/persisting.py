@@ -47,7 +47,7 @@ def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:
 
 
 def lower_lines(plan: Plan) -> Iterator[Change]:
-    """The plan with the raised lines that hold it nearer to its outline's level; none where Π is not z = 0."""
+    """The plan with its raised lines nearer to its outline's level; none where Π is not z = 0."""
     level = float(outline_heights(plan).mean())
     curves = {k: s for k, s in enumerate(plan.supports) if isinstance(s, Curve) and plan.plane == Plane()}
     tops = {k: float(z.max()) for k, c in curves.items() for z in c.at(c.dense).T[2:] if (z != level).any()}
