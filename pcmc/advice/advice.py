@@ -1,9 +1,14 @@
-"""What was chosen for a project, and what to type where its roof has no equilibrium or misses its targets."""
+"""What was chosen for a project, and the plans to try where its roof does not rest or finer meshes lose it.
+
+Near its end on a straight outline a junction lies down along one of its sheets, unless its wall holds it in
+a plane or down on its bottom: weak walls have shapes on coarse meshes that no smooth surface has. Near a
+small hole, or a corner that points into the roof, a high roof is steeper than a surface can be.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +24,10 @@ from ..certificate.verdict import Verdict
 from ..plan import Divider, Plan
 from ..plan.edges import usual_cable
 from ..plan.parts import BALANCED
-from ..surface import Surface
+from ..surface import Plane, Surface
+from ..surface.curves import Curve
 from ..surface.pieces import two_digits
-from .rises import Rise, net_pressures
+from .rises import Rise, net_pressures, outline_heights
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target
@@ -30,7 +36,12 @@ BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of 
 NO_LOADS = ("distance", "tensions")  # a fold on these ways says nothing of the loads
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
+STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
+FLATTER = (0.85, 0.7, 0.5)  # times the heights wanted, or 1 over these times the tensions given
+LOWER = (0.7, 0.5, 0.35)  # times the heights of raised lines, at whose ends a sail is steep
 SAME = 1e-6  # of the surface's size: heights that differ by less are one
+
+Change = tuple[Plan, Sequence[Rise], list[str]]  # a plan, the heights that it is to have, the lines to type
 
 
 def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
@@ -127,7 +138,7 @@ def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
     from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area  # needs shapely
 
-    pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
+    pressures = [abs(p) for p in net_pressures(plan).values()]
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
     tried = [a for a in certificate.tried if a.folds and a.way not in NO_LOADS]
     folds = [1.0 / attempt.value for attempt in tried if attempt.value]
@@ -140,6 +151,51 @@ def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     if plan.tension is not None:
         return replace(plan, tension=higher(plan.tension))
     return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
+
+
+def firmer_walls(plan: Plan, surface: Surface, rises: Sequence[Rise]) -> Iterator[Change]:
+    """The plan with upright walls, then with strong ones; ``surface`` is its roof, ``rises`` its heights."""
+    most = float(surface.tensions[surface.roof].max(initial=0.0))
+    walls = {divider.name for divider in plan.dividers if divider.wall is not None}
+    strong = [with_dividers(plan, walls, wall=two_digits(times * most)) for times in STRONG if walls]
+    for other in filter(None, (with_upright(plan), *strong)):
+        yield other, rises, changes(plan, other)
+
+
+def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:
+    """The plan with lower heights, or with higher tensions where it has no ``rises``; none for a sail."""
+    for share in FLATTER if rises or any(net_pressures(plan).values()) else ():
+        times = [1.0 / share if rise.kind == "span_ratio" else share for rise in rises]
+        lower = [replace(r, value=two_digits(r.value * k)) for r, k in zip(rises, times, strict=True)]
+        other = plan if rises else _scaled(plan, 1.0 / share)
+        lines = [_line(*both) for both in zip(rises, lower, strict=True)] or changes(plan, other)
+        yield other, lower, lines
+
+
+def lower_lines(plan: Plan) -> Iterator[Change]:
+    """The plan with its raised lines nearer to its outline's level; none where Π is not z = 0."""
+    level = float(outline_heights(plan).mean())
+    curves = {k: s for k, s in enumerate(plan.supports) if isinstance(s, Curve) and plan.plane == Plane()}
+    tops = {k: float(z.max()) for k, c in curves.items() for z in c.at(c.dense).T[2:] if (z != level).any()}
+    for share in LOWER if tops else ():
+        supports, lines = [*plan.supports], []
+        for k, top in tops.items():
+            supports[k] = curves[k].mapped(np.diag([1.0, 1.0, share]), np.array([0, 0, (1 - share) * level]))
+            over = f" over {level:g}" if level else ""
+            change = f"{share:g} times its heights{over}, up to {level + share * (top - level):g}"
+            lines.append(f"[plan] supports number {k + 1}: {change}  (now up to {top:g})")
+        yield replace(plan, supports=supports), (), lines
+
+
+def _line(rise: Rise, lower: Rise) -> str:
+    place = "[plan]" if rise.patch is None else f"[plan.patches] {toml_key(rise.patch)}:"
+    return f"{place} {rise.kind} = {lower.value:g}  (now {rise.value:g})"
+
+
+def _scaled(plan: Plan, factor: float) -> Plan:
+    areas = [replace(area, tension=two_digits(area.tension * factor)) for area in plan.patches]
+    whole = None if plan.tension is None else two_digits(plan.tension * factor)
+    return replace(plan, patches=areas, tension=whole)
 
 
 def with_upright(plan: Plan) -> Plan | None:

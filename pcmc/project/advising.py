@@ -9,8 +9,7 @@ from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..advice.advice import changes, coarse, improved, loosened
-from ..advice.persisting import firmer_walls, flatter, lower_lines
+from ..advice.advice import changes, coarse, firmer_walls, flatter, improved, loosened, lower_lines
 from ..advice.rises import SHARES, as_sail, point_masts, ring_lines, take_rises, with_rings, with_rises
 from ..base.errors import PcmcError
 from ..certificate.balance import strained_junction

@@ -168,12 +168,12 @@ def run_project(
     if outcome.good or anyway:
         with in_file(project.path):
             outcome.analysis(anyway, progress)
-    if project.output.report is not None and (outcome.good or anyway):
-        firmer(outcome, changed, progress)
-    if outputs and (outcome.good or anyway):
-        jobs = project_files(project, outcome, anyway, progress)
-        with output_folder(project.folder or Path()):
-            outcome = replace(outcome, files=write_all(jobs, progress))
+        if project.output.report is not None:
+            firmer(outcome, changed, progress)
+        if outputs:
+            jobs = project_files(project, outcome, anyway, progress)
+            with output_folder(project.folder or Path()):
+                outcome = replace(outcome, files=write_all(jobs, progress))
     if use_cache and changed is None and not project.swap:
         cache.keep(project, outcome)
     if check_after and project.mesh_check:

@@ -15,8 +15,7 @@ from printed import words_of
 from generators import two_squares
 from pcmc import certify, cli, solve
 from pcmc.accuracy import MeshVerdict, check_mesh
-from pcmc.advice.advice import changes
-from pcmc.advice.persisting import firmer_walls, flatter, lower_lines
+from pcmc.advice.advice import changes, firmer_walls, flatter, lower_lines
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.explore.roof import ShownRoof
 from pcmc.plan import Divider, PatchSpec, Plan
