@@ -31,9 +31,7 @@ MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no t
 CONTACT = 1.5  # order where a rest ends: beside it a junction rises as the distance to the power of 3/2
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
-LIMIT = (
-    0.84  # of the step before: what moves by less from mesh to mesh has a limit in sight, as for error bars
-)
+LIMIT = 0.84  # of the step before: what moves by less has a limit in sight, as for error bars
 FURTHER = 3  # meshes ahead at which an eigenvalue that only falls, or a line that leans, is foreseen
 RUNNING_AWAY = {Status.DIVERGED: "it inflates without bound", Status.VANISHED: "it shrinks to nothing"}
 
@@ -199,7 +197,7 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     if index != 0 or len(lowest) < max(3, len(surfaces)):
         return Finding(MeshVerdict.PERSISTS, reason)
     step, before = lowest[-1] - lowest[-2], lowest[-2] - lowest[-3]
-    if not (before < 0.0 and step < LIMIT * before):  # a limit in sight, as for the error bars
+    if not (before < 0.0 and step < LIMIT * before):
         return Finding(MeshVerdict.PERSISTS, reason)
     values = ", ".join(f"{value:.3g}" for value in lowest)
     reason += f", but the lowest eigenvalue falls from mesh to mesh ({values}) with no limit in sight"

@@ -205,6 +205,8 @@ def with_vertices_on(
     onto_circles_of(surface, support, new)
     at, points = on[cut].between()
     new[drawn] = points[drawn]
+    if surface.order == 1:
+        _rest_on_bottoms(surface, cut, new)
     number = surface.n + np.arange(len(new))
     curves: tuple[HeldCurve, ...] = ()
     if surface.held_curves:
@@ -259,3 +261,26 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     below = 0.25 * (share[start] + share[end])[:, None] * (drop[start] + drop[end])
     middle[rising] = np.where(of_held[start, None], place - below, on_sliding)
     return middle
+
+
+def _rest_on_bottoms(surface: Surface, cut: Bools, new: Floats) -> None:
+    """Move new points (k,3) of a wall as those of its held bottom were moved, where it rests, in place.
+
+    A curved bottom has new points beside the middles of its edges; what does not lie on it does not rest.
+    """
+    part, topo = standing_part(surface), surface.topology
+    rows, foot = part.walls.rows, part.walls.foot.copy()
+    down = (part.resting | part.walls.corner) & (foot >= 0)
+    if not (part.resting & down).any():
+        return
+    bottoms = foot[foot >= 0]
+    down[rows.vertices] = under_low(rows, down) & (rows.feet[:, 0] >= 0)
+    foot[rows.vertices] = np.where(rows.fraction == 0.0, *rows.feet.T)
+    foot[bottoms], down[bottoms] = bottoms, True
+    moved = new - 0.5 * surface.vertices[topo.edges[cut]].sum(axis=1)
+    number = np.full(len(cut) + 1, -1)
+    number[np.flatnonzero(cut)] = np.arange(len(new))
+    ends = topo.edges[cut]
+    follows = (foot[ends] >= 0).all(axis=1) & down[ends].any(axis=1) & ~surface.fixed[ends].all(axis=1)
+    below = np.where(follows, number[topo.edge_numbers(foot[ends])], -1)
+    new[below >= 0] += moved[below[below >= 0]]

@@ -23,7 +23,7 @@ from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..structure.section import Structure, check_members
-from .checking import check_project_keys, in_file, line_of
+from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
 
@@ -242,17 +242,6 @@ def project_of(
         structure = Structure(**data["structure"]) if "structure" in data else None
         pattern = section_of(CuttingOptions, "pattern", data["pattern"]) if "pattern" in data else None
         output.check(units, structure, pattern)
-        if (order := values["options"].get("order", 1)) not in (None, 1):
-            flat = {"solve.accuracy": values["wanted"].accuracy, "pattern": pattern, "output.net": output.net}
-            flat |= {f"solve.{key}": values.get(key) for key in ("margin", "verify")}
-            flat |= {"output.structure": output.structure, "output.tolerance": output.tolerance}
-            flat |= {"structure.run": structure is not None and structure.run}
-            for key in (key for key, wanted in flat.items() if wanted):
-                line = f"line {line_of(text, ('solve',), 'order')}: " if text else ""
-                problem = (
-                    f"solve.order = {order} makes curved elements, and {key} is for flat triangles alone"
-                )
-                raise FileError(f"{line}{problem}; remove one of them", what="solve.order", found=order)
         values |= {"output": output, "units": units, "drawing": drawing}
         values |= {"structure": structure, "pattern": pattern}
         stages = stages if isinstance(stages, list) else [stages]

@@ -145,7 +145,7 @@ def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
         raise FileError(f"{path}: is not the store of a sweep; name another file", what=str(path))
     try:
         address = f"{path.absolute().as_uri()}?mode={mode}"
-        with closing(sqlite3.connect(address, READERS, isolation_level=None, uri=True)) as database:
+        with closing(sqlite3.connect(address, timeout=READERS, isolation_level=None, uri=True)) as database:
             yield database
     except sqlite3.Error as error:
         raise FileError(f"{path}: cannot be used as a sweep's store ({error})", what=str(path)) from error

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from pcmc import Patch, Plane, Surface
+from pcmc import Patch, Plane, Surface, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.forces.functional import patch_areas, patch_volumes
+from pcmc.forces.pinching import standing_part
 from pcmc.meshing.refinement import held_midpoints, prolongation, refine
+from pcmc.plan import Divider, Plan
 
 
 def tent(plane: Plane | None = None) -> Surface:
@@ -188,3 +190,16 @@ def test_bad_projections_are_refused():
     first = int(np.flatnonzero(refine(tent()).fixed[tent().n :])[0])
     with refused(SurfaceError, what="vertices", where=tent().n + first):
         refine(tent(), project=lambda p: np.full_like(p, np.nan))
+
+
+def test_what_rests_on_a_curved_bottom_rests_on_a_finer_mesh():
+    arc = {"arc": [[4, 0], [5, 3], [4, 6]]}
+    plan = Plan([[0, 0], [9, 0], [9, 6], [0, 6]], [Divider(arc, wall=8.0)], tension=3.2, edge_length=1.5)
+    coarse = solve(plan.surface()).surface
+    down = standing_part(coarse).resting
+    fine = refine(coarse)
+    tops = standing_part(coarse).walls.top_edges
+    both = int((down | coarse.fixed)[tops].all(axis=1).sum())  # each has a new vertex that rests, too
+    assert both >= 3
+    assert standing_part(fine).resting.sum() == down.sum() + both
+    assert solve(fine).certificate.certified

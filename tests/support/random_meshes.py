@@ -45,6 +45,9 @@ def loaded_surface(seed: int) -> Surface:
     if rooms and rng.random() < 0.7:
         fixed[np.unique(edges[bare.topology.boundary_edge])] = True
     planes = dict(_plane(rng, bare, k) for k in range(int(rng.integers(0, 3))))
+    up = np.array(bare.plane.normal)
+    if any(plane.mirror and abs(up @ plane.normal) > 1e-9 for plane in planes):
+        heavy = {}  # behind a mirror plane that leans over Π weights pull the other way: they are refused
     mesh = X, bare.faces, bare.patch_of_face, bare.retensioned(weights=heavy).patches
     return Surface(*mesh, fixed, bare.on_plane, bare.plane, on_planes=planes, cables=cables, rooms=rooms)
 
