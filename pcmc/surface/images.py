@@ -202,10 +202,9 @@ def check_weights(
     if (np.abs(t @ up) > ON * np.linalg.norm(t, axis=1)).any():
         found.append("a translation of images leads away from")
     if found:
-        text = (
-            f"weights: {found[0]} the plane Π, and what goes on there would weigh otherwise; take the weights"
-        )
-        raise SurfaceError(f"{text} out, or give the plane= that is level", what="weights", found=found)
+        text = f"weights: {found[0]} the plane Π, and what goes on there would weigh otherwise"
+        hint = "take the weights out, or give the plane= that is level"
+        raise SurfaceError(f"{text}; {hint}", what="weights", found=found)
 
 
 def checked_images(given: Any, X: Floats, F: Ints, fixed: Bools, on_plane: Bools) -> Ints:
