@@ -101,7 +101,9 @@ def wall_rows(
     else:
         edge, tops = np.empty(surface.n, dtype=np.int64), np.flatnonzero(foot >= 0)
         edge[top_edges.ravel()] = np.repeat(np.arange(len(top_edges)), 2)
-        above = tops[_nearest_line(X, vertices, foot[tops], tops)]
+        at = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]  # on the lines from the feet to the top
+        points = ((1.0 - at) * X[foot[tops]] + at * X[tops]).reshape(-1, 3)
+        above = tops[np.asarray(cKDTree(points).query(X[vertices])[1]) % len(tops)]
         ends = top_edges[edge[above]]
         fraction = (ends[:, 1] == above).astype(float)
         feet, bottom = foot[ends], surface.pinned
@@ -146,13 +148,6 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     fraction = fraction[row, best]
     fraction = np.where(fraction < SNAP, 0.0, np.where(fraction > 1.0 - SNAP, 1.0, fraction))
     return top_edges[near[row, best]], fraction
-
-
-def _nearest_line(X: Floats, vertices: Ints, start: Ints, end: Ints) -> Ints:
-    """(w,) which of the lines from ``start`` to ``end`` (k,) is nearest to each wall vertex."""
-    at = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]
-    near = cKDTree(((1.0 - at) * X[start] + at * X[end]).reshape(-1, 3)).query(X[vertices])[1]
-    return np.asarray(near) % len(start)
 
 
 def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom: Bools) -> Floats:

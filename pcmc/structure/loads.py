@@ -202,7 +202,7 @@ def step_name(together: Sequence[Load]) -> str:
 def check_loads(
     loads: object, surface: Surface, replaced: Sequence[str] = ()
 ) -> tuple[Load | tuple[Load, ...], ...]:
-    """Loads, or tuples of them, whose patches are there; no wind on walls ``replaced`` by members."""
+    """Loads, or tuples of them, whose patches are there; none on walls ``replaced`` by members."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
@@ -212,9 +212,9 @@ def check_loads(
                 validate.refuse("loads", load, expected)
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
-                if name in replaced and isinstance(load, Wind):
-                    text = f"Wind.pressures: a member stands in the place of {name!r}, so no wind acts on it"
-                    raise OptionError(f"{text}; leave it out", what="Wind.pressures", where=name)
+                if name in replaced:
+                    text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
+                    raise OptionError(f"{text}; leave it out", what="loads", where=name)
     return tuple(loads)
 
 

@@ -183,6 +183,11 @@ def lattice_of(surface: Any) -> Floats:
     return read_only(basis)
 
 
+def goes_on_above(surface: Any) -> bool:
+    """Whether a periodic surface goes on above itself, as a foam does: a translation leads away from Π."""
+    return bool((np.abs(lattice_of(surface) @ surface.plane.normal) > ON * surface.size).any())
+
+
 def check_weights(
     parts: Iterable[Any], plane: Plane, on_planes: Iterable[tuple[Plane, Bools]], X: Floats, pairs: Ints
 ) -> None:

@@ -66,6 +66,15 @@ def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
     assert 2.0 * half.cables[columns].to_numpy() == pytest.approx(whole.cables[columns].to_numpy(), rel=1e-6)
 
 
+def test_a_mirror_holds_no_end_of_a_cable():
+    """The cable goes on behind it: "held" told of a support in the middle of the roof."""
+    line = {"curve": [[0, 3], [5, 3]], "cable": 3.0, "wall": False}
+    outline, mirror = [[0, 0], [5, 0], [5, 6], [0, 6]], [[[5, 0], [5, 6]]]
+    half = Plan(outline, [line], mirrors=mirror, edge_length=1.0, tension=3.0, pressure=0.5).surface()
+    ends = pcmc.certify(half).cable_ends
+    assert dict(zip(ends.x, ends.held, strict=True)) == {0.0: True, 5.0: False}
+
+
 def test_under_a_cable_across_one_patch_no_curvature_is_asked_for():
     whole = halves()[1]
     assert np.isnan(pcmc.mean_curvature(whole)[whole.cables[0].edges]).all()
