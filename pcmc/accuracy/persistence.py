@@ -165,7 +165,14 @@ def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
     if len(surfaces) < 3:
         return None
     first = surfaces[0]
-    leans = [_foot_leans(surface)[: first.n] for surface in surfaces]
+    leans = np.zeros((len(surfaces), first.n))  # degrees from Π's normal at the feet
+    for lean, surface in zip(leans, surfaces, strict=True):
+        lines = [curve for curve in surface.topology.junctions if surface.walls[list(curve.sheets)].all()]
+        for end, beside in (pair for line in lines for pair in line.ends):
+            if surface.pinned[end]:
+                step = surface.vertices[beside] - surface.vertices[end]
+                run, rise = np.linalg.norm(surface.plane.along(step)), step @ np.array(surface.plane.normal)
+                lean[end] = np.degrees(np.arctan2(run, abs(rise)))
     before, step = leans[-2] - leans[-3], leans[-1] - leans[-2]
     falling = (step > 0.0) & (step >= LIMIT * before) & (leans[-1] + FURTHER * step >= 90.0)
     if not falling.any():
@@ -174,18 +181,6 @@ def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
     values = ", ".join(f"{lean[foot]:.0f}°" for lean in leans)
     reason = f"the line in which walls meet leans ever more at its foot ({values}) and will lie down,"
     return _at(MeshVerdict.HELD_BY_MESH, first, reason, first.vertices[foot])
-
-
-def _foot_leans(surface: Surface) -> Floats:
-    """(n,) degrees from Π's normal at which lines between walls alone leave what holds them; 0 elsewhere."""
-    X, leans = surface.vertices, np.zeros(surface.n)
-    lines = [curve for curve in surface.topology.junctions if surface.walls[list(curve.sheets)].all()]
-    for end, beside in (pair for line in lines for pair in line.ends):
-        if surface.pinned[end]:
-            step = X[beside] - X[end]
-            run, rise = np.linalg.norm(surface.plane.along(step)), step @ np.array(surface.plane.normal)
-            leans[end] = np.degrees(np.arctan2(run, abs(rise)))
-    return leans
 
 
 def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
