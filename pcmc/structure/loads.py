@@ -214,10 +214,8 @@ def check_loads(
             if not isinstance(load, Load):
                 validate.refuse("loads", load, expected)
             if leaning and not isinstance(load, Wind):
-                text = f"{load.name}: the {leaning[0]} leans over the plane Π, and behind it the load would"
-                raise OptionError(
-                    f"{text} act otherwise; take the whole, pcmc.mirrored(surface)", what="loads"
-                )
+                text = f"{load.name}: the {leaning[0]} leans over the plane Π, and behind it down is elsewhere"
+                raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
                 if name in replaced:
