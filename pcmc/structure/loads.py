@@ -214,7 +214,7 @@ def check_loads(
             if not isinstance(load, Load):
                 validate.refuse("loads", load, expected)
             if leaning and not isinstance(load, Wind):
-                text = f"{load.name}: the {leaning[0]} leans over the plane Π, and behind it down is elsewhere"
+                text = f"{load.name}: the {leaning[0]} leans over Π, and behind it down is elsewhere"
                 raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
