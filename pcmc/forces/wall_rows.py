@@ -239,7 +239,9 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
         return None
     closed = len(top_edges) == len(bottom_edges) == count
     if closed and sum(map(np.size, ends)) == 0:
-        ends = [_nearest_edges(surface.vertices, top_edges, bottom_edges)]
+        ways, X = np.concatenate([bottom_edges, bottom_edges[:, ::-1]]), surface.vertices
+        apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6)))
+        ends = [np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])]
     top_ends, bottom_ends = np.concatenate(ends, axis=1)
     if not len(top_ends):
         return None
@@ -251,14 +253,6 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
     foot = np.full(n, -1, dtype=np.int64)
     foot[tops[above]] = bottoms[below]
     return foot
-
-
-def _nearest_edges(X: Floats, top_edges: Ints, bottom_edges: Ints) -> Ints:
-    """(2,2) the ends of the top edge and of the bottom edge that are nearest, in the same sense."""
-    ways = np.concatenate([bottom_edges, bottom_edges[:, ::-1]])
-    found = cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6))
-    apart, way = map(np.asarray, found)
-    return np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])
 
 
 @dataclass(frozen=True, eq=False)
