@@ -224,7 +224,7 @@ def unheld(surface: Surface) -> Unheld | None:
     (None, Unheld(vertex=0, falls=False), 'nothing fixes the part of the surface arou')
     """
     parts, patch = surface.topology.components, surface.patch_of_face
-    resting = surface.held.copy()
+    resting = surface.supported.copy()
     resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
     ends, _, weight = surface.cable_edges
     heavy = np.append(surface.faces[surface.weights[patch] > 0.0, 0], ends[weight > 0.0, 0])

@@ -10,7 +10,8 @@ import pytest
 from refusals import refused
 
 import pcmc
-from pcmc import Cable, Material, Plane, Snow, StructuralModel
+from generators.grid import grid_faces
+from pcmc import Cable, Material, Patch, Plane, SelfWeight, Snow, StructuralModel, Surface, Wind
 from pcmc.base.errors import LostWarning, OptionError
 from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
@@ -58,6 +59,21 @@ def test_half_of_shells_is_refused():
     with refused(OptionError, what="elements"):
         StructuralModel(half, Material(5e5), 1e-3, **given)
     StructuralModel(whole, Material(5e5), 1e-3, **given)
+
+
+def test_snow_and_weight_behind_a_mirror_that_is_not_upright_are_refused():
+    """Half of an upright film: its image would weigh upwards, and the displacements were not the whole's."""
+    x, z = np.meshgrid(np.linspace(-2.0, 2.0, 5), np.linspace(0.0, 2.0, 3), indexing="ij")
+    X = np.stack([x.ravel(), 0.0 * x.ravel(), z.ravel()], axis=1)
+    rim, level = (np.abs(X[:, 0]) == 2.0) | (X[:, 2] == 2.0), Plane(normal=(0, 0, 1), mirror=True)
+    parts = {"fixed": rim, "on_planes": {level: X[:, 2] == 0.0}, "plane": Plane((0, 0, -1))}
+    half = pcmc.solve(Surface(X, grid_faces(4, 2), [0] * 16, [Patch("film", 1.0, 0.3)], **parts)).surface
+    for surface in (half, pcmc.mirrored(half)):
+        StructuralModel(surface, Material(5e5, density=1.0), 1e-3, [Wind({"film": 0.1})])
+    for load in (Snow(0.1), SelfWeight()):
+        StructuralModel(surface, Material(5e5, density=1.0), 1e-3, [load])
+        with refused(OptionError, what="loads"):
+            StructuralModel(half, Material(5e5, density=1.0), 1e-3, [load])
 
 
 def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
