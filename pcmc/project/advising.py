@@ -35,13 +35,6 @@ class Mended(NamedTuple):
     sail: bool = False  # cables instead of free edges
     rings: Sequence[str] = ()  # what to type or draw for rings instead of single points
 
-    @property
-    def cause(self) -> str:
-        """Why, before a heading; empty without changes of what holds the roof."""
-        causes = ["edges that nothing holds"] if self.sail else []
-        causes += ["a roof held at a single point"] if self.rings else []
-        return f"the cause is {' and '.join(causes)}; " if causes else ""
-
 
 def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -> list[str]:
     """What to type so that a project comes to rest and meets its targets: a heading, and a line a change.
@@ -80,7 +73,10 @@ def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -
     if project.drawing is not None and mended.rings:
         where = " and ".join([f"draw in {project.drawing.path.name}", *([where] if lines else [])])
     ending = [f"with them, the targets are {reached}"] if reached else []
-    return [f"{mended.cause}{where}, {tried}:", *lines, *mended.rings, *ending]
+    causes = ["edges that nothing holds"] if mended.sail else []
+    causes += ["a roof held at a single point"] if mended.rings else []
+    cause = f"the cause is {' and '.join(causes)}; " if causes else ""
+    return [f"{cause}{where}, {tried}:", *lines, *mended.rings, *ending]
 
 
 def _mended(project: Project, plan: Plan, outcome: Outcome) -> Mended:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..advice.advice import check_apexes, chosen_values
-from ..base.errors import BalanceWarning, FileError, OptionError
+from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
 from ..base.units import Units
@@ -216,16 +216,6 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
     with in_file(project.path):
         structure, output = project.structure, project.output
         check_apexes(project.plan, surface, project.targets, units)
-        order = project.options.get("order") or surface.order
-        flat = {f"solve.{key}": getattr(project, key) for key in ("margin", "verify")}
-        flat |= {"solve.accuracy": project.wanted.accuracy, "pattern": project.pattern}
-        flat |= {f"output.{key}": getattr(output, key) for key in ("net", "structure", "tolerance")}
-        flat["structure.run"] = structure is not None and structure.run
-        for key in (key for key, wanted in flat.items() if wanted and order > 1):
-            text = f"the elements are curved, of order {order}, and {key} is for flat triangles alone; type"
-            raise FileError(
-                f"{text} order = 1 under [solve], or leave it out", what="solve.order", found=order
-            )
         if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")

@@ -68,6 +68,21 @@ class Project:
     rises: Sequence[Rise] = ()  # heights that the plan has instead of tensions; each is one of the targets
     chosen: Chosen = field(default_factory=Chosen)  # for the drawing, where neither it nor the file says
 
+    def __post_init__(self) -> None:
+        order, output = self.options.get("order"), self.output
+        flat = {
+            "solve.accuracy": self.wanted.accuracy,
+            "solve.margin": self.margin,
+            "solve.verify": self.verify,
+        }
+        flat |= {f"output.{key}": getattr(output, key) for key in ("net", "structure", "tolerance")}
+        flat |= {"pattern": self.pattern, "structure.run": self.structure is not None and self.structure.run}
+        for key in (key for key, wanted in flat.items() if wanted and order not in (None, 1)):
+            text = f"the elements are curved, of order {order}, and {key} is for flat triangles alone; type"
+            raise OptionError(
+                f"{text} order = 1 under [solve], or leave it out", what="solve.order", found=order
+            )
+
     @property
     def inputs(self) -> list[Path]:
         """All files that it is read from, which nothing writes over."""
