@@ -31,9 +31,7 @@ MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no t
 CONTACT = 1.5  # order where a rest ends: beside it a junction rises as the distance to the power of 3/2
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
-LIMIT = (
-    0.84  # of the step before: what moves by less from mesh to mesh has a limit in sight, as for error bars
-)
+LIMIT = 0.84  # of the step before: what moves by less has a limit in sight, as for error bars
 FURTHER = 3  # meshes ahead at which an eigenvalue that only falls, or a line that leans, is foreseen
 RUNNING_AWAY = {Status.DIVERGED: "it inflates without bound", Status.VANISHED: "it shrinks to nothing"}
 
@@ -167,7 +165,14 @@ def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
     if len(surfaces) < 3:
         return None
     first = surfaces[0]
-    leans = [_foot_leans(surface)[: first.n] for surface in surfaces]
+    leans = np.zeros((len(surfaces), first.n))  # degrees from Π's normal at the feet
+    for lean, surface in zip(leans, surfaces, strict=True):
+        lines = [curve for curve in surface.topology.junctions if surface.walls[list(curve.sheets)].all()]
+        for end, beside in (pair for line in lines for pair in line.ends):
+            if surface.pinned[end]:
+                step = surface.vertices[beside] - surface.vertices[end]
+                run, rise = np.linalg.norm(surface.plane.along(step)), step @ np.array(surface.plane.normal)
+                lean[end] = np.degrees(np.arctan2(run, abs(rise)))
     before, step = leans[-2] - leans[-3], leans[-1] - leans[-2]
     falling = (step > 0.0) & (step >= LIMIT * before) & (leans[-1] + FURTHER * step >= 90.0)
     if not falling.any():
@@ -176,18 +181,6 @@ def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
     values = ", ".join(f"{lean[foot]:.0f}°" for lean in leans)
     reason = f"the line in which walls meet leans ever more at its foot ({values}) and will lie down,"
     return _at(MeshVerdict.HELD_BY_MESH, first, reason, first.vertices[foot])
-
-
-def _foot_leans(surface: Surface) -> Floats:
-    """(n,) degrees from Π's normal at which lines between walls alone leave what holds them; 0 elsewhere."""
-    X, leans = surface.vertices, np.zeros(surface.n)
-    lines = [curve for curve in surface.topology.junctions if surface.walls[list(curve.sheets)].all()]
-    for end, beside in (pair for line in lines for pair in line.ends):
-        if surface.pinned[end]:
-            step = X[beside] - X[end]
-            run, rise = np.linalg.norm(surface.plane.along(step)), step @ np.array(surface.plane.normal)
-            leans[end] = np.degrees(np.arctan2(run, abs(rise)))
-    return leans
 
 
 def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
@@ -199,7 +192,7 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     if index != 0 or len(lowest) < max(3, len(surfaces)):
         return Finding(MeshVerdict.PERSISTS, reason)
     step, before = lowest[-1] - lowest[-2], lowest[-2] - lowest[-3]
-    if not (before < 0.0 and step < LIMIT * before):  # a limit in sight, as for the error bars
+    if not (before < 0.0 and step < LIMIT * before):
         return Finding(MeshVerdict.PERSISTS, reason)
     values = ", ".join(f"{value:.3g}" for value in lowest)
     reason += f", but the lowest eigenvalue falls from mesh to mesh ({values}) with no limit in sight"

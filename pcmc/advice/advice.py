@@ -1,17 +1,21 @@
-"""What was chosen for a project, and what to type where its roof has no equilibrium or misses its targets."""
+"""What was chosen for a project, and the plans to try where its roof does not rest or finer meshes lose it.
+
+Near its end on a straight outline a junction lies down along one of its sheets, unless its wall holds it in
+a plane or down on its bottom: weak walls have shapes on coarse meshes that no smooth surface has. Near a
+small hole, or a corner that points into the roof, a high roof is steeper than a surface can be.
+"""
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.arrays import toml, toml_key
-from ..base.errors import OptionError, PcmcError
+from ..base.errors import OptionError
 from ..base.units import Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
@@ -20,68 +24,24 @@ from ..certificate.verdict import Verdict
 from ..plan import Divider, Plan
 from ..plan.edges import usual_cable
 from ..plan.parts import BALANCED
-from ..solvers.result import Result
-from ..surface import Surface
+from ..surface import Plane, Surface
+from ..surface.curves import Curve
 from ..surface.pieces import two_digits
-from .rises import SHARES, Rise, as_sail, net_pressures, point_masts, ring_lines, with_rings
+from .rises import Rise, net_pressures, outline_heights
 
 if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
-    from ..design import Design, Parameter, Target
+    from ..design import Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
 NO_LOADS = ("distance", "tensions")  # a fold on these ways says nothing of the loads
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
-TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
+STRONG = (1.0, 1.6)  # times the largest tension of the patches: such walls rest at their ends, or all along
+FLATTER = (0.85, 0.7, 0.5)  # times the heights wanted, or 1 over these times the tensions given
+LOWER = (0.7, 0.5, 0.35)  # times the heights of raised lines, at whose ends a sail is steep
 SAME = 1e-6  # of the surface's size: heights that differ by less are one
 
-
-class Ended(Protocol):
-    """How a project was solved, by its outcome."""
-
-    @property
-    def certificate(self) -> Certificate: ...
-    @property
-    def design(self) -> Design | None: ...
-    @property
-    def solved(self) -> Result: ...
-    @property
-    def good(self) -> bool: ...
-    def check_mesh(self) -> MeshCheck | None: ...
-
-
-Trial = Callable[[Plan, Surface, Sequence["Target"]], Ended]  # solves a plan from a surface, with targets
-
-
-@dataclass(frozen=True)
-class Task:
-    """What a project asks for."""
-
-    plan: Plan | None  # None for a mesh
-    where: str  # to type: "type in roof.toml"
-    drawing: str  # of its plan; empty without one
-    rises: Sequence[Rise]  # heights instead of tensions, which are the last targets
-    targets: Sequence[Target]
-    vary: Sequence[Parameter]
-    units: Units
-
-
-class Mended(NamedTuple):
-    """A plan that was changed until its roof comes to rest, and what was changed."""
-
-    plan: Plan
-    result: Result  # of the plan with its first changes
-    rests: bool
-    sail: bool = False  # cables instead of free edges
-    rings: Sequence[str] = ()  # what to type or draw for rings instead of single points
-
-    @property
-    def cause(self) -> str:
-        """Why, before a heading; empty without changes of what holds the roof."""
-        causes = ["edges that nothing holds"] if self.sail else []
-        causes += ["a roof held at a single point"] if self.rings else []
-        return f"the cause is {' and '.join(causes)}; " if causes else ""
+Change = tuple[Plan, Sequence[Rise], list[str]]  # a plan, the heights that it is to have, the lines to type
 
 
 def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
@@ -126,110 +86,12 @@ def check_apexes(plan: Plan | None, surface: Surface, targets: Sequence[Target],
         raise OptionError(text, what="apex", where=target.of, found=highest)
 
 
-def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: Trial) -> list[str]:
-    """What to type so that a project comes to rest and meets its targets: a heading, and a line a change.
-
-    ``given`` is the start shape of the project, ``start`` the one that was solved, with the command's
-    tensions, and ``ended`` how that ended; ``try_plan`` solves another plan from a surface, with targets.
-    """
-    plan, certified = task.plan, ended.certificate.certified
-    if certified and (plan is None or ended.design is None or ended.design.met):
-        return []
-    if plan is None or start is not given:
-        strained = strained_junction(start)
-        if strained is None or strained.remedy is None:
-            return []
-        return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the project's own warnings were shown
-        mended = (
-            Mended(plan, ended.solved, True) if certified else _mended(task, plan, ended.solved, try_plan)
-        )
-        better = mended.plan
-        targets = task.targets[: -len(task.rises)] if mended.sail and task.rises else task.targets
-        met, reached = False, ""
-        if mended.rests and targets:
-            better, met, reached = _with_targets(task, better, mended.result, targets, try_plan)
-        lines = changes(plan, better, task.rises if mended.sail else ())
-    if not (lines or mended.rings):
-        return []
-    tried = "which was tried and comes to rest" if mended.rests else "as a first step"
-    if mended.rings:
-        tried += ", on finer meshes, too"
-    if met:
-        tried = "which was tried, comes to rest and meets the targets"
-    elif mended.rests and targets:
-        tried = "which was tried without the targets and comes to rest"
-    where = task.where
-    if task.drawing and mended.rings:
-        where = " and ".join([f"draw in {task.drawing}", *([where] if lines else [])])
-    ending = [f"with them, the targets are {reached}"] if reached else []
-    return [f"{mended.cause}{where}, {tried}:", *lines, *mended.rings, *ending]
-
-
-def _mended(task: Task, plan: Plan, result: Result, try_plan: Trial) -> Mended:
-    """The plan with other supports if these alone bring it to rest; else with other tensions and walls.
-
-    Free edges get cables; single points get rings, from the size for their heights on, which finer meshes
-    hold, too.
-    """
-
-    def tried(changed: Plan) -> Ended | None:
-        """How a plan ends on a mesh that is not fine; None if it has none, as with a patch inside a ring."""
-        try:
-            return try_plan(changed, coarse(changed, result.surface).surface(), ())
-        except PcmcError:
-            return None
-
-    sail, masts = as_sail(plan, task.rises), point_masts(plan)
-    base = plan if sail is None else sail
-    fit = all(mast.has_room and not mast.in_mirror for mast in masts)
-    least = max((mast.share for mast in masts), default=0.0)
-    shares = [share for share in SHARES if share >= least] if masts and fit else []
-    for share in shares if masts or sail is None else (0.0,):
-        changed = with_rings(base, masts, share) if masts else base
-        other = tried(changed)
-        check = other.check_mesh() if other is not None and other.good and masts else None
-        if other is not None and other.good and (not masts or (check is not None and check.persists)):
-            rings = ring_lines(masts, share, drawn=bool(task.drawing))
-            return Mended(changed, other.solved, True, sail is not None, rings)
-    better, last = plan, result
-    for _ in range(TRIES):
-        before, better = better, _step(better, last)
-        other = tried(better) if changes(before, better) else None
-        if other is None:  # nothing left to change, or too coarse for this plan
-            break
-        if other.good:
-            return Mended(better, result, True)
-        last = other.solved
-    return Mended(better, result, False)
-
-
 def coarse(plan: Plan, surface: Surface) -> Plan:
     """The plan of a surface with a mesh that is not fine."""
     return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(surface.m / TRIANGLES)))
 
 
-def _with_targets(
-    task: Task, plan: Plan, result: Result, targets: Sequence[Target], try_plan: Trial
-) -> tuple[Plan, bool, str]:
-    """The first plan that meets the targets, and whether one does; else the plan, and what it reaches."""
-    reached = ""
-    for candidate in (plan, _loosened(plan, task.vary)):
-        if candidate is task.plan or candidate is None:  # tried already, or nothing to loosen
-            continue
-        try:
-            trial = try_plan(candidate, coarse(candidate, result.surface).surface(), targets)
-        except PcmcError:  # such as a target that the coarse mesh cannot measure
-            continue
-        if trial.good:
-            return candidate, True, ""
-        if trial.design is not None:
-            reached = reached or trial.design.text(task.units)
-    return plan, False, reached
-
-
-def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
+def loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
     """The plan with all walls balanced, and the tensions that vary at the mean of the others; or None.
 
     A wall that was chosen for far tensions holds those that vary near them.
@@ -244,12 +106,11 @@ def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
     return replace(with_dividers(plan, walls, wall=BALANCED), patches=areas)
 
 
-def _step(plan: Plan, result: Result) -> Plan:
-    """The plan with the tensions, cables and supports that remove what its certificate complains of."""
-    certificate = result.certificate
+def improved(plan: Plan, certificate: Certificate) -> Plan:
+    """The plan with the tensions, cables and supports that remove what a certificate complains of."""
     grew = any(isinstance(proof, Overload) for proof in certificate.proofs)
     if grew or certificate.verdict in (Verdict.RAN_AWAY, Verdict.NONE_FOUND):
-        plan = _stiffer(plan, result)
+        plan = _stiffer(plan, certificate)
     if plan.cable is not None and plan.cable < (usual := usual_cable(plan)):  # its arcs may not fit
         plan = replace(plan, cable=usual)
     if not plan.supports:  # a ring that a cable alone holds is at rest at one radius, and stable at none
@@ -273,13 +134,13 @@ def _step(plan: Plan, result: Result) -> Plan:
     return plan
 
 
-def _stiffer(plan: Plan, result: Result) -> Plan:
+def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
     from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area  # needs shapely
 
-    pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
+    pressures = [abs(p) for p in net_pressures(plan).values()]
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
-    tried = [a for a in result.certificate.tried if a.folds and a.way not in NO_LOADS]
+    tried = [a for a in certificate.tried if a.folds and a.way not in NO_LOADS]
     folds = [1.0 / attempt.value for attempt in tried if attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
@@ -290,6 +151,51 @@ def _stiffer(plan: Plan, result: Result) -> Plan:
     if plan.tension is not None:
         return replace(plan, tension=higher(plan.tension))
     return replace(plan, patches=[replace(area, tension=higher(area.tension)) for area in plan.patches])
+
+
+def firmer_walls(plan: Plan, surface: Surface, rises: Sequence[Rise]) -> Iterator[Change]:
+    """The plan with upright walls, then with strong ones; ``surface`` is its roof, ``rises`` its heights."""
+    most = float(surface.tensions[surface.roof].max(initial=0.0))
+    walls = {divider.name for divider in plan.dividers if divider.wall is not None}
+    strong = [with_dividers(plan, walls, wall=two_digits(times * most)) for times in STRONG if walls]
+    for other in filter(None, (with_upright(plan), *strong)):
+        yield other, rises, changes(plan, other)
+
+
+def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:
+    """The plan with lower heights, or with higher tensions where it has no ``rises``; none for a sail."""
+    for share in FLATTER if rises or any(net_pressures(plan).values()) else ():
+        times = [1.0 / share if rise.kind == "span_ratio" else share for rise in rises]
+        lower = [replace(r, value=two_digits(r.value * k)) for r, k in zip(rises, times, strict=True)]
+        other = plan if rises else _scaled(plan, 1.0 / share)
+        lines = [_line(*both) for both in zip(rises, lower, strict=True)] or changes(plan, other)
+        yield other, lower, lines
+
+
+def lower_lines(plan: Plan) -> Iterator[Change]:
+    """The plan with its raised lines nearer to its outline's level; none where Π is not z = 0."""
+    level = float(outline_heights(plan).mean())
+    curves = {k: s for k, s in enumerate(plan.supports) if isinstance(s, Curve) and plan.plane == Plane()}
+    tops = {k: float(z.max()) for k, c in curves.items() for z in c.at(c.dense).T[2:] if (z != level).any()}
+    for share in LOWER if tops else ():
+        supports, lines = [*plan.supports], []
+        for k, top in tops.items():
+            supports[k] = curves[k].mapped(np.diag([1.0, 1.0, share]), np.array([0, 0, (1 - share) * level]))
+            over = f" over {level:g}" if level else ""
+            change = f"{share:g} times its heights{over}, up to {level + share * (top - level):g}"
+            lines.append(f"[plan] supports number {k + 1}: {change}  (now up to {top:g})")
+        yield replace(plan, supports=supports), (), lines
+
+
+def _line(rise: Rise, lower: Rise) -> str:
+    place = "[plan]" if rise.patch is None else f"[plan.patches] {toml_key(rise.patch)}:"
+    return f"{place} {rise.kind} = {lower.value:g}  (now {rise.value:g})"
+
+
+def _scaled(plan: Plan, factor: float) -> Plan:
+    areas = [replace(area, tension=two_digits(area.tension * factor)) for area in plan.patches]
+    whole = None if plan.tension is None else two_digits(plan.tension * factor)
+    return replace(plan, patches=areas, tension=whole)
 
 
 def with_upright(plan: Plan) -> Plan | None:

@@ -8,7 +8,7 @@ height carries it on any mesh.
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -105,7 +105,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
     leasts = least_tensions(plan, least)
-    heights = _outline_heights(plan)
+    heights = outline_heights(plan)
     level, lowest, loads = float(heights.mean()), float(heights.min()), net_pressures(plan)
     targets, vary = [], []
     for rise in rises:
@@ -119,9 +119,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             of = f" of {rise.patch!r}" if rise.patch else ""
             text = f"{rise.kind}{of} is {height:g} over the plane, and the outline is at {lowest:g} and more"
             raise OptionError(f"{text}; give a greater one", what=rise.kind, where=rise.patch, found=height)
-        names: str | list[str] = rise.patch or [
-            name for name in patch_names(plan) if loads.get(name, plan.pressure - plan.snow)
-        ]
+        names: str | list[str] = rise.patch or [n for n in patch_names(plan) if loads.get(n, loads.get(""))]
         if not names:
             text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
             text += f" pressure = ..., or tension = ... instead of {rise.kind}"
@@ -129,33 +127,30 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         plan = _retensioned(plan, rise.patch, leasts.get(rise.patch or "", least), height - lowest)
         vary.append(Parameter(names))
         targets.append(Target("apex", rise.patch, height))
-    if any(divider.wall != BALANCED for divider in plan.dividers):
-        plan = _levelled(plan, {rise.patch for rise in rises})
+    if any(divider.wall != BALANCED for divider in plan.dividers):  # any wall balances equal tensions
+        risen = {rise.patch for rise in rises}
+        most = max((area.tension for area in plan.patches if area.name in risen), default=0.0)
+        areas = [replace(area, tension=most) if area.name in risen else area for area in plan.patches]
+        plan = replace(plan, patches=areas)
     return plan, targets, vary
 
 
-def _outline_heights(plan: Plan) -> Floats:
+def outline_heights(plan: Plan) -> Floats:
     """(k,) heights over Π of points of the outline."""
     outline = plan.outline.local(plan.plane).at(plan.outline.dense)
     return outline[:, 2] if outline.shape[1] > 2 else np.zeros(len(outline))
 
 
-def _levelled(plan: Plan, names: Container[str | None]) -> Plan:
-    """The plan with the largest of some patches' tensions in all of these, which any wall balances."""
-    most = max((area.tension for area in plan.patches if area.name in names), default=0.0)
-    areas = [replace(area, tension=most) if area.name in names else area for area in plan.patches]
-    return replace(plan, patches=areas)
-
-
 def net_pressures(plan: Plan) -> dict[str, float]:
-    """p - s of each of the patches that a plan has, by name."""
-    return {a.name: a.pressure - (plan.snow if a.snow is None else a.snow) for a in plan.patches}
+    """p - s of each of the patches that a plan has, by name; without any, of the whole, under ""."""
+    own = {a.name: a.pressure - (plan.snow if a.snow is None else a.snow) for a in plan.patches}
+    return own or {"": plan.pressure - plan.snow}
 
 
 def _retensioned(plan: Plan, patch: str | None, least: float, rise: float) -> Plan:
     """The plan with the first tension for a rise, of a patch or of all."""
     if plan.tension is not None:
-        return replace(plan, tension=first_tension(least, plan.pressure - plan.snow, rise))
+        return replace(plan, tension=first_tension(least, net_pressures(plan)[""], rise))
     first = {name: first_tension(least, pressure, rise) for name, pressure in net_pressures(plan).items()}
     if patch is None:
         first = dict.fromkeys(first, max(first.values()))
@@ -248,7 +243,7 @@ def point_masts(plan: Plan) -> list[Mast]:
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))
-    least, heights = LEAST_RING * plan.edge_length, points[:, 2] - _outline_heights(plan).mean() - _dome(plan)
+    least, heights = LEAST_RING * plan.edge_length, points[:, 2] - outline_heights(plan).mean() - _dome(plan)
     found = zip(given, points, away.tolist(), heights.tolist(), in_mirror.tolist(), inside, strict=True)
     return [Mast(k, point, far, high, least, cut) for k, point, far, high, cut, free in found if free]
 
@@ -257,14 +252,13 @@ def _dome(plan: Plan) -> float:
     """The height to which pressure lifts the middle of a plan, about: of the flattest cap over its circle."""
     from ..plan.proposal import least_tension, plan_area
 
-    loads = net_pressures(plan)
-    values = [(area.tension, loads[area.name]) for area in plan.patches]
-    values = values or [(plan.tension or 1.0, plan.pressure - plan.snow)]
-    if not all(pressure > 0.0 for _, pressure in values):
+    loads, tensions = net_pressures(plan).values(), [area.tension for area in plan.patches]
+    if min(loads) <= 0.0:
         return 0.0
-    rim, curved = 2.0 * least_tension(plan_area(plan)), max(2.0 * alpha / p for alpha, p in values)
-    curved = max(curved, rim)
-    return curved - math.sqrt(curved**2 - rim**2)
+    rim = 2.0 * least_tension(plan_area(plan))
+    radii = (2.0 * alpha / p for alpha, p in zip(tensions or [plan.tension or 1.0], loads, strict=True))
+    radius = max(rim, *radii)
+    return radius - math.sqrt(radius**2 - rim**2)
 
 
 def with_rings(plan: Plan, masts: Sequence[Mast], share: float) -> Plan:

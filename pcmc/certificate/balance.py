@@ -15,7 +15,7 @@ from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.supports import common_point, uncancelled_pressures
 from ..surface.values import balanced_wall
-from .forces import loads
+from .forces import at_both_ends, held_boundary, loads
 from .proof import Overload, UnbalancedJunction, Unheld
 
 
@@ -37,11 +37,11 @@ def load_ratio(surface: Surface) -> float:
     the shape; ``overload`` is the proof.
     """
     topo = surface.topology
-    fixed, held = (np.asarray(mask[topo.edges].all(axis=1)) for mask in (surface.fixed, surface.supported))
+    fixed = at_both_ends(surface.fixed, topo.edges)
     corners = np.zeros(len(fixed), dtype=bool)  # edges that cut off one triangle between two held edges
     outer = topo.boundary_edge & fixed
     corners[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
-    carrying = (topo.boundary_edge & ~surface.mirror_edge & held) | (fixed & ~(corners & ~topo.boundary_edge))
+    carrying = held_boundary(surface) | (fixed & (topo.boundary_edge | ~corners))
     return _load_over_capacity(surface, carrying)
 
 
@@ -224,7 +224,7 @@ def unheld(surface: Surface) -> Unheld | None:
     (None, Unheld(vertex=0, falls=False), 'nothing fixes the part of the surface arou')
     """
     parts, patch = surface.topology.components, surface.patch_of_face
-    resting = surface.held.copy()
+    resting = surface.supported.copy()
     resting[surface.topology.edges[surface.uncancelled != 0.0]] = True
     ends, _, weight = surface.cable_edges
     heavy = np.append(surface.faces[surface.weights[patch] > 0.0, 0], ends[weight > 0.0, 0])

@@ -162,8 +162,8 @@ def cable_end_table(surface: Surface, ends: Iterable[CableEnd]) -> pd.DataFrame:
     direction from the end along the cable. Where several cables end, their support carries the sum.
     """
     rows = [
-        [cable.name, vertex, *surface.vertices[vertex].tolist(), bool(surface.held[vertex]), *force.tolist()]
-        for cable, vertex, force in ends
+        [cable.name, v, *surface.vertices[v].tolist(), bool(surface.supported[v]), *force.tolist()]
+        for cable, v, force in ends
     ]
     columns = ["cable", "vertex", *"xyz", "held", "force_x", "force_y", "force_z"]
     return pd.DataFrame(rows, columns=columns if rows else None)

@@ -60,8 +60,8 @@ def _keep_freed_memory() -> None:
 
         with suppress(AttributeError):  # of glibc alone
             set_option = ctypes.CDLL(None).mallopt
-            set_option(M_MMAP_THRESHOLD, 2**31 - 1)
-            set_option(M_TRIM_THRESHOLD, -1)
+            # before 2.35 it refuses the first; the second alone would map every array anew
+            set_option(M_MMAP_THRESHOLD, 2**31 - 1) and set_option(M_TRIM_THRESHOLD, -1)
 
 
 def _stopped() -> int:

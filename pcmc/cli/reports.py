@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..certificate.tables import lean_texts
-from ..project.firmer import Changed, firmer
+from ..project.advising import Changed, firmer
 from ..project.outcome import MOST_CHECKED, Outcome
 from . import NOT_CERTIFIED, OK
 

@@ -45,7 +45,7 @@ from .arguments import (
 from .reports import sweeping, working
 
 if TYPE_CHECKING:
-    from ..project.firmer import Changed
+    from ..project.advising import Changed
     from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."

@@ -106,13 +106,10 @@ def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
     a tilted plane Π, in its coordinates, as drawn seams have them."""
     plane, title = pattern.surface.plane, "Seams on the roof"
     if tilted := bool((plane.axes != np.eye(3)).any()):
-        title += ", seen square to its tilted plane, places in the axes of that"
-
-    def seen(points: Floats) -> Floats:
-        return np.asarray((plane.to_local(points) if tilted else points)[..., :2])
-
-    lines = [curve._replace(points=seen(curve.points)) for curve in _curves(pattern)]
-    texts = [(seen(at), str(strip.number), np.zeros(2)) for strip, at in _middles(pattern)]
+        title += ", seen square to its tilted plane and placed in its axes"
+    seen = plane.to_local if tilted else np.asarray
+    lines = [curve._replace(points=seen(curve.points)[:, :2]) for curve in _curves(pattern)]
+    texts = [(seen(at)[:2], str(strip.number), np.zeros(2)) for strip, at in _middles(pattern)]
     every = np.concatenate([line.points for line in lines])
     ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
     view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))

@@ -61,7 +61,7 @@ def sensitivities(
 
     Raises
     ------
-    SurfaceError : the surface is not at rest, or exactly at a fold.
+    SurfaceError : the surface is not at rest, or exactly at a fold; snow at a free edge.
     OptionError : no quantity or parameter, an unknown patch, a quantity that cannot be measured, a pressure
         at a free edge, where its change would depend on Π's point.
 
@@ -102,20 +102,14 @@ def slopes(
         alike = (one for one in parameters if one.kind == parameter.kind)
         named = {name: float(name in parameter.names) for one in alike for name in one.names}
         rates.append(rates_of(at.surface, parameter.key, named))
-        if parameter.key == "pressures":
-            _refuse_left_over(surface, parameter)
+        if parameter.key in ("pressures", "snows") and not surface.uncancelled.any():
+            value = parameter.value(surface)
+            changed = dict.fromkeys(parameter.names, value + (abs(value) or 1.0))
+            if left := pressures_left_over(surface.retensioned(**{parameter.key: changed})):
+                message = f"{parameter.label}: where it changes, {left}, or hold these edges"
+                raise OptionError(message, what=parameter.label)
     motions = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
     return [_slopes(at.surface, measure(at.surface, t), parameters, rates, motions) for t in targets]
-
-
-def _refuse_left_over(surface: Surface, parameter: Parameter) -> None:
-    """Refuse a pressure that has nothing to act against at a free edge once it changes (OptionError)."""
-    value = parameter.value(surface)
-    changed = dict.fromkeys(parameter.names, value + (abs(value) or 1.0))
-    left = pressures_left_over(surface.retensioned(pressures=changed))
-    if left and not surface.uncancelled.any():
-        message = f"{parameter.label}: where it changes, {left}, or hold these edges"
-        raise OptionError(message, what=parameter.label)
 
 
 def _slopes(

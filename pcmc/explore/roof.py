@@ -92,7 +92,8 @@ class ShownRoof:
         own = surface is self.surface or self.meets(surface, self.aims[0])
         if not own or differences(surface_of(project), surface, self.found(self.aims)):
             save = "save the roof shown as a project: pcmc solve looks for a change of it that persists"
-            return check if check.persists else dataclasses.replace(check, advice=save)
+            held = check.verdict.name == "HELD_BY_MESH"  # for other verdicts none is looked for
+            return dataclasses.replace(check, advice=save) if held else check
         known = {(self.outcome.unfold, "mesh check"): check}
         outcome = dataclasses.replace(self.outcome, result=None, start=surface, _known=known)
         projects.firmer(outcome, None, progress)

@@ -331,13 +331,12 @@ class Session:
         """Return to the start, as a new step."""
         return state.showing(self.start.surface).stepped()
 
-    def check_mesh(self, gone: Stop = lambda: False, advised: Advised | None = None) -> MeshCheck | None:
+    def check_mesh(self, gone: Stop = lambda: False, advised: Advised = lambda c, _: c) -> MeshCheck | None:
         """The mesh check of the surface shown, with what to type of ``advised``; None if the page shows
         another one, or is closed, before."""
 
         def checked(shown: Surface, callback: Check) -> MeshCheck:
-            check = check_mesh(shown, callback=callback)
-            return check if advised is None else advised(check, partial(self._tell, callback))
+            return advised(check_mesh(shown, callback=callback), partial(self._tell, callback))
 
         return self._look(checked, gone)
 

@@ -19,9 +19,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.tolerances import ON
 from ..surface import Surface
-from ..surface.images import lattice_of
+from ..surface.images import goes_on_above
 from .elements import Points, energy_mesh
 
 
@@ -34,7 +33,7 @@ def volumes_below(surface: Surface) -> Floats:
     >>> volumes_below(lid).tolist()  # the mean height 6 over a triangle of area ½
     [3.0]
     """
-    if surface.periodic and (np.abs(lattice_of(surface) @ surface.plane.normal) > ON * surface.size).any():
+    if goes_on_above(surface):
         return np.full(len(surface.patches), np.nan)
     mesh = energy_mesh(surface)
     at = Points.of(mesh, surface.vertices)

@@ -101,7 +101,9 @@ def wall_rows(
     else:
         edge, tops = np.empty(surface.n, dtype=np.int64), np.flatnonzero(foot >= 0)
         edge[top_edges.ravel()] = np.repeat(np.arange(len(top_edges)), 2)
-        above = tops[_nearest_line(X, vertices, foot[tops], tops)]
+        at = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]  # on the lines from the feet to the top
+        points = ((1.0 - at) * X[foot[tops]] + at * X[tops]).reshape(-1, 3)
+        above = tops[np.asarray(cKDTree(points).query(X[vertices])[1]) % len(tops)]
         ends = top_edges[edge[above]]
         fraction = (ends[:, 1] == above).astype(float)
         feet, bottom = foot[ends], surface.pinned
@@ -146,13 +148,6 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     fraction = fraction[row, best]
     fraction = np.where(fraction < SNAP, 0.0, np.where(fraction > 1.0 - SNAP, 1.0, fraction))
     return top_edges[near[row, best]], fraction
-
-
-def _nearest_line(X: Floats, vertices: Ints, start: Ints, end: Ints) -> Ints:
-    """(w,) which of the lines from ``start`` to ``end`` (k,) is nearest to each wall vertex."""
-    at = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]
-    near = cKDTree(((1.0 - at) * X[start] + at * X[end]).reshape(-1, 3)).query(X[vertices])[1]
-    return np.asarray(near) % len(start)
 
 
 def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom: Bools) -> Floats:
@@ -244,7 +239,9 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
         return None
     closed = len(top_edges) == len(bottom_edges) == count
     if closed and sum(map(np.size, ends)) == 0:
-        ends = [_nearest_edges(surface.vertices, top_edges, bottom_edges)]
+        ways, X = np.concatenate([bottom_edges, bottom_edges[:, ::-1]]), surface.vertices
+        apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6)))
+        ends = [np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])]
     top_ends, bottom_ends = np.concatenate(ends, axis=1)
     if not len(top_ends):
         return None
@@ -256,14 +253,6 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
     foot = np.full(n, -1, dtype=np.int64)
     foot[tops[above]] = bottoms[below]
     return foot
-
-
-def _nearest_edges(X: Floats, top_edges: Ints, bottom_edges: Ints) -> Ints:
-    """(2,2) the ends of the top edge and of the bottom edge that are nearest, in the same sense."""
-    ways = np.concatenate([bottom_edges, bottom_edges[:, ::-1]])
-    found = cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6))
-    apart, way = map(np.asarray, found)
-    return np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,8 +76,7 @@ def edge_length_for(plan: Plan) -> float:
     190.0
     """
     parts = _parts_of_plan(plan)
-    holes = [hole.curve for hole in plan.holes]
-    return first_edge_length(parts, holes) if parts else plan.edge_length
+    return first_edge_length(parts, [hole.curve for hole in plan.holes]) if parts else plan.edge_length
 
 
 def _parts_of_plan(plan: Plan) -> list[Part]:

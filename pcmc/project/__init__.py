@@ -1,8 +1,8 @@
+from .advising import firmer
 from .cache import cached_files, clear_cache
 from .designing import designed, opened, run, run_project
 from .drawn import is_drawing
 from .file import Project, load
-from .firmer import firmer
 from .keys import json_schema, reference, sections
 from .outcome import Outcome
 from .planning import project_text

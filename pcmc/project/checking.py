@@ -11,17 +11,8 @@ from typing import Any
 
 from ..base.errors import FileError, PcmcError, unknown
 from ..surface.curve_data import CURVES
-from .keys import (
-    KINDS,
-    OR_CURVE,
-    REQUIRED,
-    Section,
-    fits,
-    main_sections,
-    sections,
-    solve_section,
-    target_sections,
-)
+from . import keys
+from .keys import KINDS, OR_CURVE, REQUIRED, Section, fits, main_sections, solve_section, target_sections
 
 LONGEST = 1023  # bits of a float's exponent
 VALUE = re.compile(r"(?<![\w.])[-+]?\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")  # a number of TOML
@@ -78,8 +69,8 @@ def _check_range(text: str, value: Any, place: Place) -> None:
 def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
     if not isinstance(table, Mapping):
         above, below = ".".join(place[:-2]), ".".join(place[:-1])
-        keys = [key.name for one in main_sections() if one.name == above for key in one.keys]
-        hint = f"; as a key of [{above}] it stands above [{below}]" if place[-1] in keys else ""
+        names = [key.name for one in main_sections() if one.name == above for key in one.keys]
+        hint = f"; as a key of [{above}] it stands above [{below}]" if place[-1] in names else ""
         raise _wrong_kind(text, place, table, "a table", hint)
     known = {key.name: key for key in section.keys}
     title = f"[{'.'.join(place)}]" if place else "the project"
@@ -93,11 +84,9 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
     for name in table:
         if name not in known:
             curves = CURVES if section.name in OR_CURVE and not known.keys() & table.keys() else ()
-            message = unknown(f"key of {title}", name, [*known, *curves])
-            homes = [one.name for one in sections()[:-1] if any(key.name == name for key in one.keys)]
-            if homes:
-                listed = " or ".join(f"[{home}]" if home else "the file itself" for home in homes[:2])
-                message = message.replace("Known:", f"it is a key of {listed}. Known:")
+            homes = [one.title for one in keys.sections()[:-1] if any(key.name == name for key in one.keys)]
+            home = f"{name!r} is a key of {' or '.join(homes[:2])}. Known:" if homes else "Known:"
+            message = unknown(f"key of {title}", name, [*known, *curves]).replace("Known:", home)
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
         if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..advice.advice import Task, advice, check_apexes, chosen_values
+from ..advice.advice import check_apexes, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
 from ..base.files import folder as output_folder
@@ -16,22 +15,21 @@ from ..base.units import Units
 from ..certificate.balance import unbalanced
 from ..forces.pinching import standing_part
 from ..io import metres_note
-from ..plan import Plan
 from ..structure.calculix import expect_program
 from ..surface import Surface
 from ..surface.lagrange import expect_flat
 from . import cache
+from .advising import Changed, advice, firmer
 from .checking import in_file
 from .file import Project, load
-from .firmer import Changed, firmer
 from .outcome import EXTENSIVE, OnStep, Outcome, ignore
-from .settings import AccuracyWanted, of_material
+from .settings import of_material
 from .solving import solve_and_swap, solve_project
 from .start import start_of
 from .writing import check_outputs, project_files, write_all
 
 if TYPE_CHECKING:
-    from ..design import Target
+    pass
 
 
 def opened(
@@ -170,12 +168,12 @@ def run_project(
     if outcome.good or anyway:
         with in_file(project.path):
             outcome.analysis(anyway, progress)
-    if project.output.report is not None and (outcome.good or anyway):
-        firmer(outcome, changed, progress)
-    if outputs and (outcome.good or anyway):
-        jobs = project_files(project, outcome, anyway, progress)
-        with output_folder(project.folder or Path()):
-            outcome = replace(outcome, files=write_all(jobs, progress))
+        if project.output.report is not None:
+            firmer(outcome, changed, progress)
+        if outputs:
+            jobs = project_files(project, outcome, anyway, progress)
+            with output_folder(project.folder or Path()):
+                outcome = replace(outcome, files=write_all(jobs, progress))
     if use_cache and changed is None and not project.swap:
         cache.keep(project, outcome)
     if check_after and project.mesh_check:
@@ -210,15 +208,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     if outcome.good or swapped:
         return outcome
     report("looking for advice")
-    drawing = "" if project.drawing is None else project.drawing.path.name
-    wanted = project.rises, project.targets, project.vary, project.units
-    task = Task(project.plan, project.where_to_type, drawing, *wanted)
-
-    def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
-        plain = replace(project, plan=plan, targets=targets, remeshing=(), wanted=AccuracyWanted())
-        return solve_project(plain, surface)
-
-    return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
+    return replace(outcome, advice=advice(project, given.surface, surface, outcome))
 
 
 def _check_wishes(project: Project, surface: Surface, units: Units) -> None:

@@ -23,7 +23,7 @@ from ..cloth.settings import CuttingOptions
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..structure.section import Structure, check_members
-from .checking import check_project_keys, in_file, line_of
+from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
 
@@ -67,6 +67,21 @@ class Project:
     drawing: Drawing | None = None  # that the plan refers to, or that ``path`` is
     rises: Sequence[Rise] = ()  # heights that the plan has instead of tensions; each is one of the targets
     chosen: Chosen = field(default_factory=Chosen)  # for the drawing, where neither it nor the file says
+
+    def __post_init__(self) -> None:
+        order, output = self.options.get("order"), self.output
+        flat = {
+            "solve.accuracy": self.wanted.accuracy,
+            "solve.margin": self.margin,
+            "solve.verify": self.verify,
+        }
+        flat |= {f"output.{key}": getattr(output, key) for key in ("net", "structure", "tolerance")}
+        flat |= {"pattern": self.pattern, "structure.run": self.structure is not None and self.structure.run}
+        for key in (key for key, wanted in flat.items() if wanted and order not in (None, 1)):
+            text = f"the elements are curved, of order {order}, and {key} is for flat triangles alone; type"
+            raise OptionError(
+                f"{text} order = 1 under [solve], or leave it out", what="solve.order", found=order
+            )
 
     @property
     def inputs(self) -> list[Path]:
@@ -242,17 +257,6 @@ def project_of(
         structure = Structure(**data["structure"]) if "structure" in data else None
         pattern = section_of(CuttingOptions, "pattern", data["pattern"]) if "pattern" in data else None
         output.check(units, structure, pattern)
-        if (order := values["options"].get("order", 1)) not in (None, 1):
-            flat = {"solve.accuracy": values["wanted"].accuracy, "pattern": pattern, "output.net": output.net}
-            flat |= {f"solve.{key}": values.get(key) for key in ("margin", "verify")}
-            flat |= {"output.structure": output.structure, "output.tolerance": output.tolerance}
-            flat |= {"structure.run": structure is not None and structure.run}
-            for key in (key for key, wanted in flat.items() if wanted):
-                line = f"line {line_of(text, ('solve',), 'order')}: " if text else ""
-                problem = (
-                    f"solve.order = {order} makes curved elements, and {key} is for flat triangles alone"
-                )
-                raise FileError(f"{line}{problem}; remove one of them", what="solve.order", found=order)
         values |= {"output": output, "units": units, "drawing": drawing}
         values |= {"structure": structure, "pattern": pattern}
         stages = stages if isinstance(stages, list) else [stages]

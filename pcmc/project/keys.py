@@ -156,6 +156,13 @@ class Section:
     keys: tuple[Key, ...] = field(repr=False)
     condition: str = ""  # when these are its keys; empty for always
 
+    @property
+    def title(self) -> str:
+        """What a message calls it."""
+        return (
+            f"[{self.name}]{self.condition and f' with {self.condition}'}" if self.name else "the file itself"
+        )
+
     def example(self, key: str) -> str:
         """The end of a message about a key: what to type for it; empty where ``EXAMPLES`` have none."""
         example = EXAMPLES.get(f"{self.name}.{key}".lstrip("."), "")

@@ -120,10 +120,8 @@ def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
     outer = surface.topology.boundary_edge & ~surface.mirror_edge  # at a mirror the roof goes on
     boundary[surface.topology.edges[outer]] = True
     if isinstance(supports, str) and not boundary.any():
-        text = (
-            f"mesh.supports: the surface has no boundary for {supports!r}; leave supports out, or name points"
-        )
-        raise OptionError(text, what="mesh.supports", found=supports)
+        text = f"mesh.supports: the surface has no boundary for {supports!r}; leave supports out,"
+        raise OptionError(f"{text} or name points", what="mesh.supports", found=supports)
     if supports == BOUNDARY:
         return boundary
     height = surface.plane.height(X)

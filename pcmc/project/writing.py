@@ -68,8 +68,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         if project.pattern is not None and (output.pattern or output.report):
             progress("cutting strips")
             pattern = outcome.cutting_pattern(project.pattern, anyway)
-            jobs = pattern_files(pattern, output.pattern, *about)
-            add("cutting pattern", jobs)
+            add("cutting pattern", pattern_files(pattern, output.pattern, *about))
         if output.report is not None:
             listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
             listed |= {project.path.name: "project"} | {path.name: what for what, (path, _) in made}

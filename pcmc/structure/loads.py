@@ -14,6 +14,7 @@ from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from ..surface.images import leaning_mirrors
 from ..surface.values import in_the_open
 
 GRAVITY = 9.81  # m/s²
@@ -202,19 +203,24 @@ def step_name(together: Sequence[Load]) -> str:
 def check_loads(
     loads: object, surface: Surface, replaced: Sequence[str] = ()
 ) -> tuple[Load | tuple[Load, ...], ...]:
-    """Loads, or tuples of them, whose patches are there; no wind on walls ``replaced`` by members."""
+    """Loads, or tuples of them, whose patches are there; none on walls ``replaced`` by members, and none that
+    acts downwards beside mirror planes that lean."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
+    leaning = leaning_mirrors(surface.plane, surface.on_planes)
     for entry in loads:
         for load in entry if isinstance(entry, tuple) and entry else (entry,):
             if not isinstance(load, Load):
                 validate.refuse("loads", load, expected)
+            if leaning and not isinstance(load, Wind):
+                text = f"{load.name}: the {leaning[0]} leans over Π, and behind it down is elsewhere"
+                raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
             for name in getattr(load, "patches", ()):
                 surface.patch_index(name)
-                if name in replaced and isinstance(load, Wind):
-                    text = f"Wind.pressures: a member stands in the place of {name!r}, so no wind acts on it"
-                    raise OptionError(f"{text}; leave it out", what="Wind.pressures", where=name)
+                if name in replaced:
+                    text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
+                    raise OptionError(f"{text}; leave it out", what="loads", where=name)
     return tuple(loads)
 
 

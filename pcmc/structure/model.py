@@ -35,7 +35,7 @@ from .loads import (
     load_steps,
 )
 from .material import Material
-from .members import Member, PlacedMember, bars_on, lines_on
+from .members import WHOLE, Member, PlacedMember, bars_on, lines_on
 from .pulls import balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
@@ -110,7 +110,7 @@ class StructuralModel:
         thickness = checked_thickness(self.thickness, surface)
         validate.choice("elements", self.elements, ("membrane", "shell"))
         if self.elements == "shell" and any(plane.mirror for plane, _ in surface.on_planes):
-            text = "elements: shells would be hinged in a mirror; take the whole roof, pcmc.mirrored(surface)"
+            text = f"elements: shells would be hinged in a mirror; {WHOLE}, or pcmc.mirrored(surface)"
             raise OptionError(text, what="elements", found="shell")
         for name, kind in (("cable_material", Material), ("gas", Gas)):
             if not isinstance(getattr(self, name), kind | None):

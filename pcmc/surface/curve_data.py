@@ -50,9 +50,7 @@ def curve(spec: Any, closed: bool = False) -> Curve:
         raise OptionError(problem, what="curve", found=list(spec), expected=CURVES)
     for key in kinds:
         if key in ("centre", "radius", "axes", "sweep"):
-            text = (
-                f"{key} stands in the table of its curve, as in {{circle = {{centre = [5, 3], radius = 1}}}}"
-            )
+            text = f"{key} stands in the table of its curve: {{circle = {{centre = [5, 3], radius = 1}}}}"
             raise OptionError(text, what=key, found=spec[key])
         validate.choice("curve", key, CURVES)
     if len(kinds) != 1:

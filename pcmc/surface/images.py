@@ -183,6 +183,16 @@ def lattice_of(surface: Any) -> Floats:
     return read_only(basis)
 
 
+def goes_on_above(surface: Any) -> bool:
+    """Whether a periodic surface goes on above itself, as a foam does: a translation leads away from Π."""
+    return bool((np.abs(lattice_of(surface) @ surface.plane.normal) > ON * surface.size).any())
+
+
+def leaning_mirrors(plane: Plane, on_planes: Iterable[tuple[Plane, Bools]]) -> list[Plane]:
+    """The mirror planes that are not upright over Π: what is behind them has its own down."""
+    return [p for p, _ in on_planes if p.mirror and abs(np.dot(plane.normal, p.normal)) > PARALLEL]
+
+
 def check_weights(
     parts: Iterable[Any], plane: Plane, on_planes: Iterable[tuple[Plane, Bools]], X: Floats, pairs: Ints
 ) -> None:
@@ -192,15 +202,14 @@ def check_weights(
     """
     if not any(part.weight for part in parts):
         return
-    t, up = X[pairs[:, 0]] - X[pairs[:, 1]], np.array(plane.normal)
-    found = [f"the {p} leans over" for p, _ in on_planes if p.mirror and abs(float(up @ p.normal)) > PARALLEL]
-    if (np.abs(t @ up) > ON * np.linalg.norm(t, axis=1)).any():
+    found = [f"the {mirror} leans over" for mirror in leaning_mirrors(plane, on_planes)]
+    t = X[pairs[:, 0]] - X[pairs[:, 1]]
+    if (np.abs(t @ np.array(plane.normal)) > ON * np.linalg.norm(t, axis=1)).any():
         found.append("a translation of images leads away from")
     if found:
-        text = (
-            f"weights: {found[0]} the plane Π, and what goes on there would weigh otherwise; take the weights"
-        )
-        raise SurfaceError(f"{text} out, or give the plane= that is level", what="weights", found=found)
+        text = f"weights: {found[0]} the plane Π, and what goes on there would weigh otherwise"
+        hint = "take the weights out, or give the plane= that is level"
+        raise SurfaceError(f"{text}; {hint}", what="weights", found=found)
 
 
 def checked_images(given: Any, X: Floats, F: Ints, fixed: Bools, on_plane: Bools) -> Ints:

@@ -20,7 +20,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON, SAME_PRESSURE
-from .images import check_weights
+from .images import check_weights, goes_on_above
 
 TRIED = 1000  # triangles of a patch that are looked at for others above them
 
@@ -206,10 +206,7 @@ def wall_patches(surface: Any) -> Bools:
     declared = np.array([patch.wall for patch in surface.patches])
     open_ones = surface.auxiliary & ~declared
     carrying = ~surface.auxiliary | (surface.weights != 0.0) & ~declared
-    image, vertex = surface.images.T
-    shift = (surface.vertices[image] - surface.vertices[vertex]) @ np.array(surface.plane.normal)
-    above = (np.abs(shift) > ON * surface.size).any()
-    if above or not open_ones.any() or not carrying.any():
+    if goes_on_above(surface) or not open_ones.any() or not carrying.any():
         return declared
     signs = surface.room_signs
     between = (signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0)

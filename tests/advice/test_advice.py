@@ -13,10 +13,11 @@ from nightly import at_night, night_but
 from printed import words_of
 
 from generators import two_squares
-from pcmc import certify, cli
-from pcmc.advice.advice import changes
-from pcmc.advice.persisting import firmer_walls, flatter
+from pcmc import certify, cli, solve
+from pcmc.accuracy import MeshVerdict, check_mesh
+from pcmc.advice.advice import changes, firmer_walls, flatter, lower_lines
 from pcmc.certificate.diagnosis import describe_saddle
+from pcmc.explore.roof import ShownRoof
 from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.project import firmer, load, run_project
 from pcmc.project.drawn import Chosen
@@ -167,6 +168,19 @@ def test_a_ridge_that_is_too_high_in_a_sail_is_advised_to_be_lower(tmp_path):
     assert lower.check_mesh().persists
 
 
+def test_a_ridge_is_lowered_towards_the_level_of_its_outline():
+    """Over an outline at 10 a ridge at 14 was to be at 9.8."""
+    outline = [[0, 0, 10], [12, 0, 10], [12, 8, 10], [0, 8, 10]]
+    arc = {"arc": [[3, 6, 12], [6, 6, 14], [9, 6, 12]]}
+    lines = [[[3, 4, 14], [9, 4, 14]], [[3, 2, 10], [9, 2, 10]], arc]
+    plan = Plan(outline, supports=lines, tension=2.0, pressure=0.0, edge_length=0.7)
+    other, _, (first, last) = next(lower_lines(plan))
+    assert first == "[plan] supports number 1: 0.7 times its heights over 10, up to 12.8  (now up to 14)"
+    assert last.startswith("[plan] supports number 3: 0.7 times its heights over 10, up to 12.8 ")
+    before, after = (p.supports[2].at([0.0, 0.5, 1.0]) for p in (plan, other))
+    assert after == pytest.approx(before * [1, 1, 0.7] + [0, 0, 3])
+
+
 def test_every_way_to_a_roof_says_what_to_type(tmp_path, capsys):
     """``pcmc solve`` alone did."""
     path, pdf = tmp_path / "roof.toml", tmp_path / "roof.pdf"
@@ -187,6 +201,16 @@ def test_every_way_to_a_roof_says_what_to_type(tmp_path, capsys):
     assert moved.endswith(
         "save the roof shown as a project: pcmc solve looks for a change of it that persists"
     )
+
+
+def test_a_page_promises_advice_of_a_project_only_where_it_is_looked_for(tmp_path):
+    """Of a roof that changes, too, it said that ``pcmc solve`` looks for a change."""
+    roof = ShownRoof(outcome_of(tmp_path, HALL + "tension = 5.0\n"))
+    moved = solve(roof.surface.retensioned({"patch 1": 6.0}))
+    check = replace(check_mesh(moved, meshes=2), advice="")
+    for verdict, promised in ((MeshVerdict.CHANGES, False), (MeshVerdict.HELD_BY_MESH, True)):
+        told = roof.advised(replace(check, verdict=verdict), print)
+        assert told.advice.startswith("save the roof shown as a project") is promised
 
 
 CORNERED = """[plan]
@@ -265,7 +289,7 @@ def test_one_remedy_is_printed_the_one_that_was_tried(tmp_path, capsys):
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
 def test_advice_that_misses_the_targets_says_so(tmp_path, monkeypatch):
     """A roof that comes to rest and misses the targets is advised in these words."""
-    monkeypatch.setattr("pcmc.advice.advice._loosened", lambda plan, vary: None)
+    monkeypatch.setattr("pcmc.project.advising.loosened", lambda plan, vary: None)
     targets = "[targets]\nmeet = [{quantity = 'apex', of = 'nave', value = 5.0}]\nvary = ['nave']\n"
     outcome = outcome_of(tmp_path, WRONG["a wall too weak for its neighbours"] + targets)
     heading, line, *_, last = outcome.advice

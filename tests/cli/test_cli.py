@@ -7,6 +7,7 @@ import platform
 import subprocess
 import sys
 from importlib.metadata import version
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -375,7 +376,18 @@ def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
         cli.main(["solve", "roof.toml"])
 
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other systems have no such options")
+def test_where_large_arrays_cannot_reuse_memory_no_option_is_set(monkeypatch):
+    """glibc before 2.35 refuses the first option, and with the second alone every array is mapped anew."""
+    asked = []
+    monkeypatch.setattr("ctypes.CDLL", lambda _: SimpleNamespace(mallopt=lambda *given: asked.append(given)))
+    monkeypatch.setattr("sys.platform", "linux")
+    cli._keep_freed_memory()
+    assert asked == [(cli.M_MMAP_THRESHOLD, 2**31 - 1)]
+
+
+@pytest.mark.skipif(
+    platform.libc_ver()[0] != "glibc" or platform.libc_ver()[1] < "2.35", reason="others have no such options"
+)
 def test_the_command_keeps_the_memory_of_large_arrays_for_the_next():
     program = """
 import resource, sys

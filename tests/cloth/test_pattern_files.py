@@ -295,7 +295,7 @@ def test_seams_on_a_tilted_plane_are_drawn_square_to_it_and_say_so(pattern):
     for one, other in zip(level, tilted, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-3)
     titles = [sheet.title for sheet in sheets]
-    assert titles[1] == f"{titles[0]}, seen square to its tilted plane, places in the axes of that"
+    assert titles[1] == f"{titles[0]}, seen square to its tilted plane and placed in its axes"
     places = [{text.text for text in sheet.texts} for sheet in sheets]
     assert len(places[0] ^ places[1]) <= 2
 

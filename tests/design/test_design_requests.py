@@ -10,7 +10,7 @@ from refusals import refused
 from shapes import pyramid
 
 import pcmc
-from generators import double_bubble, joined_caps, two_squares
+from generators import double_bubble, hypar_roof, joined_caps, two_squares
 from pcmc import Parameter, Target, meet, sensitivities
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.tolerances import AT_REST
@@ -94,6 +94,14 @@ def test_what_is_no_surface_or_not_at_rest_has_no_design():
     with refused(SurfaceError, what="surface", expected=AT_REST) as caught:
         sensitivities(joined_caps(2.0), Target("apex"), "wall")
     assert caught.value.found > AT_REST
+
+
+@pytest.mark.parametrize(("kind", "error"), [("pressure", OptionError), ("snow", SurfaceError)])
+def test_what_nothing_balances_at_a_free_edge_has_no_slope(kind, error):
+    """It depended on the point of Π; the roof under this snow would have been refused."""
+    sail = pcmc.solve(hypar_roof(4)).surface
+    with refused(error, what={"pressure": "pressure of roof"}.get(kind, "snow")):
+        sensitivities(sail, Target("area", "roof"), Parameter("roof", kind))
 
 
 def test_parameters_and_walls_of_no_tension():

@@ -158,6 +158,14 @@ def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypat
     assert [path.name for path in tmp_path.iterdir()] == ["roof.toml"]
 
 
+def test_a_proof_of_curved_elements_is_refused_before_the_roof_is_solved(tmp_path, monkeypatch, capsys):
+    """An option of the command was refused when all was solved and written."""
+    monkeypatch.setattr("pcmc.project.designing.solve_project", None)
+    (tmp_path / "roof.toml").write_text(SMALL + "[solve]\norder = 2\n", encoding="utf-8")
+    assert cli.main(["solve", str(tmp_path / "roof.toml"), "--verify"]) == cli.BAD_INPUT
+    assert "solve.verify is for flat triangles alone" in capsys.readouterr().err
+
+
 def test_a_patch_that_is_not_there_is_refused_before_the_roof_is_solved(tmp_path, monkeypatch):
     monkeypatch.setattr("pcmc.project.designing.solve_project", None)
     wind = STRUCTURE + "wind = {rof = 1.0}\n"

@@ -82,10 +82,20 @@ PLAN = "[plan]\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
     ("text", "says"),
     [
         ("", "such as [plan] with outline = [[0, 0], [12, 0], [12, 8], [0, 8]] and tension = 4.0"),
-        ("outline = [[0, 0], [6, 0], [6, 4]]", "unknown key of the project 'outline'; it is a key of [plan]"),
-        (PLAN + "tension = 4.0\nfiles = ['a.obj']", "it is a key of [output]"),
-        (PLAN + "units = 'mm'", "it is a key of the file itself or [mesh]"),
-        (PLAN + "wall = 2.0", "it is a key of [plan.dividers] or [mesh.patches.NAME]"),
+        (
+            "outline = [[0, 0], [6, 0], [6, 4]]",
+            "unknown key of the project 'outline'; 'outline' is a key of [plan]",
+        ),
+        (
+            PLAN + "tension = 4.0\nfiles = ['a.obj']",
+            "did you mean 'holes'? 'files' is a key of [output]. Known",
+        ),
+        (PLAN + "units = 'mm'", "is a key of the file itself or [mesh]"),
+        (
+            PLAN + "[solve]\nmethod = 'lbfgs'\nlevels = 2",
+            'is a key of [solve] with method = "newton". Known',
+        ),
+        (PLAN + "wall = 2.0", "is a key of [plan.dividers] or [mesh.patches.NAME]"),
         (PLAN + "[structure]\nuls = 1\nwidth = 1", "unknown key of [structure] 'uls'; Known:"),
         (PLAN + "[[plan.dividers]]\ncurve = [[3, 0], [3, 4]]\ndiameter = 0.2", "of [structure.members.NAME]"),
         (PLAN + "[plan.patches]\nwest = {tension = 3}\nrise = 2", "of [plan] it stands above [plan.patches]"),

@@ -10,7 +10,8 @@ import pytest
 from refusals import refused
 
 import pcmc
-from pcmc import Cable, Material, Plane, Snow, StructuralModel
+from generators.grid import grid_faces
+from pcmc import Cable, Material, Patch, Plane, SelfWeight, Snow, StructuralModel, Surface, Wind
 from pcmc.base.errors import LostWarning, OptionError
 from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
@@ -60,10 +61,34 @@ def test_half_of_shells_is_refused():
     StructuralModel(whole, Material(5e5), 1e-3, **given)
 
 
+def test_snow_and_weight_behind_a_mirror_that_is_not_upright_are_refused():
+    """Half of an upright film: its image would weigh upwards, and the displacements were not the whole's."""
+    x, z = np.meshgrid(np.linspace(-2.0, 2.0, 5), np.linspace(0.0, 2.0, 3), indexing="ij")
+    X = np.stack([x.ravel(), 0.0 * x.ravel(), z.ravel()], axis=1)
+    rim, level = (np.abs(X[:, 0]) == 2.0) | (X[:, 2] == 2.0), Plane(normal=(0, 0, 1), mirror=True)
+    parts = {"fixed": rim, "on_planes": {level: X[:, 2] == 0.0}, "plane": Plane((0, 0, -1))}
+    half = pcmc.solve(Surface(X, grid_faces(4, 2), [0] * 16, [Patch("film", 1.0, 0.3)], **parts)).surface
+    for surface in (half, pcmc.mirrored(half)):
+        StructuralModel(surface, Material(5e5, density=1.0), 1e-3, [Wind({"film": 0.1})])
+    for load in (Snow(0.1), SelfWeight()):
+        StructuralModel(surface, Material(5e5, density=1.0), 1e-3, [load])
+        with refused(OptionError, what="loads"):
+            StructuralModel(half, Material(5e5, density=1.0), 1e-3, [load])
+
+
 def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
     half, whole = (pcmc.certify(surface) for surface in halves())
     columns = ["sheet_pull", "cable_pull"]
     assert 2.0 * half.cables[columns].to_numpy() == pytest.approx(whole.cables[columns].to_numpy(), rel=1e-6)
+
+
+def test_a_mirror_holds_no_end_of_a_cable():
+    """The cable goes on behind it: "held" told of a support in the middle of the roof."""
+    line = {"curve": [[0, 3], [5, 3]], "cable": 3.0, "wall": False}
+    outline, mirror = [[0, 0], [5, 0], [5, 6], [0, 6]], [[[5, 0], [5, 6]]]
+    half = Plan(outline, [line], mirrors=mirror, edge_length=1.0, tension=3.0, pressure=0.5).surface()
+    ends = pcmc.certify(half).cable_ends
+    assert dict(zip(ends.x, ends.held, strict=True)) == {0.0: True, 5.0: False}
 
 
 def test_under_a_cable_across_one_patch_no_curvature_is_asked_for():

@@ -11,7 +11,7 @@ from structures import model_of
 
 import pcmc
 from generators import joined_caps
-from pcmc import Material, StructuralModel, Wind, cli
+from pcmc import Material, Snow, StructuralModel, Wind, cli
 from pcmc.base.errors import OptionError
 from pcmc.plan import CableLine, Plan
 from pcmc.structure import Member, Profile, analyse, calculix
@@ -43,12 +43,13 @@ def test_the_junction_of_two_spheres_needs_no_bending():
     assert shares[-1] < 0.015 < shares[0] / 3.0
 
 
-def test_wind_on_a_wall_with_a_member_is_refused():
-    """The wall is no element then: its wind was left out without a word."""
+@pytest.mark.parametrize("load", [Wind({"wall": 0.2}), Snow(0.2, ["wall"])])
+def test_a_load_on_a_wall_with_a_member_is_refused(load):
+    """The wall is no element then: its load was left out without a word."""
     arch, caps = Member("wall", TUBE, STEEL), joined_caps(1.0, exact=True)
-    with refused(OptionError, what="Wind.pressures"):
-        model_of(caps, members=[arch], loads=[Wind({"wall": 0.2})], anyway=True)
-    model_of(caps, loads=[Wind({"wall": 0.2})], anyway=True)
+    with refused(OptionError, what="loads", where="wall"):
+        model_of(caps, members=[arch], loads=[load], anyway=True)
+    model_of(caps, loads=[load], anyway=True)
 
 
 @needs_ccx

@@ -103,6 +103,19 @@ def test_a_junction_does_not_end_where_two_mirror_planes_meet():
     assert {tuple(end.place.round(9).tolist()) for end in ends} == {(20.0, 0.0, 0.0)}
 
 
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_half_of_a_heavy_bubble_that_only_its_mirror_holds_falls():
+    """As the whole does; of the half nothing was said but that its triangles have collapsed."""
+    corners = [[2, 0, 0], [-2, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 2], [0, 0, -2]]
+    upper = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]]
+    faces = upper + [[b, a, 5] for a, b, _ in upper]
+    bubble = Surface(corners, faces, [0] * 8, [Patch("bubble", 1.0, 0.5, weight=0.1)])
+    half = cut(refine(bubble), Plane(normal=(1, 0, 0)))
+    for surface in (half, mirrored(half)):
+        [proof] = pcmc.certify(surface).proofs
+        assert proof.falls
+
+
 def test_the_certificate_says_which_motions_it_is_about():
     """The cross of Example 3 is stable among symmetric motions; the whole is the saddle of the paper."""
     own = pcmc.solve(quarter_of_fans())
