@@ -1,0 +1,64 @@
+"""Wrong models, materials and loads of structural models: each is refused by name."""
+
+from functools import partial
+
+import pytest
+from refusals import refused
+from structures import model_of, pyramid
+
+from pcmc import Material, SelfWeight, Snow, Wind
+from pcmc.base.errors import OptionError
+from pcmc.project import Structure
+
+
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        ({"material": None}, "material"),
+        ({"material": 3.0}, "material"),
+        ({"thickness": 0.0}, "thickness"),
+        ({"thickness": -1.0}, "thickness"),
+        ({"thickness": 1e-320}, "thickness"),
+        ({"thickness": {"roof": 1e-320}}, "thickness"),
+        ({"thickness": 1e300}, "thickness"),
+        ({"thickness": None}, "thickness"),
+        ({"thickness": {}}, "thickness"),
+        ({"thickness": {"rof": 1.0}}, "patch"),
+        ({"loads": [Wind({"rof": 1.0})]}, "patch"),
+        ({"loads": [Snow(1.0, patches=["rof"])]}, "patch"),
+        ({"loads": Snow(1.0)}, "loads"),
+        ({"loads": [1.0]}, "loads"),
+        ({"loads": [()]}, "loads"),
+        ({"material": Material(1.0), "loads": [SelfWeight()]}, "Material.density"),
+        ({"cable_material": 1}, "cable_material"),
+    ],
+)
+def test_bad_models_are_refused(given, what):
+    with refused(OptionError, what=what):
+        model_of(pyramid(), **given)
+
+
+@pytest.mark.parametrize(
+    ("make", "what"),
+    [
+        (partial(Material, 0.0), "Material.young"),
+        (partial(Material, 1e-320), "Material.young"),
+        (partial(Material, 1.0, 0.3, 1e300), "Material.density"),
+        (partial(SelfWeight, 1e-320), "SelfWeight.gravity"),
+        (partial(Snow, 1e300), "Snow.load"),
+        (partial(Wind, {"roof": -1e300}), "Wind.pressures"),
+        (partial(Material, 1.0, 0.5), "Material.poisson"),
+        (partial(Material, 1.0, 0.3, -1.0), "Material.density"),
+        (partial(SelfWeight, 0.0), "SelfWeight.gravity"),
+        (partial(Snow, float("nan")), "Snow.load"),
+        (partial(Snow, 1.0, "roof"), "Snow.patches"),
+        (partial(Snow, 1.0, (), "two\nlines"), "name of a load"),
+        (partial(Wind, {}), "Wind.pressures"),
+        (partial(Wind, {"roof": "1"}), "Wind.pressures"),
+        (partial(Structure, thickness=1.0), "young"),
+        (partial(Structure, young=1.0), "thickness"),
+    ],
+)
+def test_bad_materials_and_loads_are_refused(make, what):
+    with refused(OptionError, what=what):
+        make()
