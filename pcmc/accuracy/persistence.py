@@ -22,6 +22,7 @@ from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.pieces import point_text
+from .extrapolation import LOWEST
 
 FAR = 0.25  # of the surface's extent: a finer surface this far away is another shape
 FLAT = 0.1  # of its size: the least extent that counts
@@ -31,7 +32,7 @@ MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no t
 CONTACT = 1.5  # order where a rest ends: beside it a junction rises as the distance to the power of 3/2
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
-LIMIT = 0.84  # of the step before: what moves by less has a limit in sight, as for error bars
+LIMIT = 0.5**LOWEST  # of the step before: what moves by less has a limit in sight, as for error bars
 FURTHER = 3  # meshes ahead at which an eigenvalue that only falls, or a line that leans, is foreseen
 RUNNING_AWAY = {Status.DIVERGED: "it inflates without bound", Status.VANISHED: "it shrinks to nothing"}
 
