@@ -175,7 +175,7 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
 
 
 def _check_strain(step: Step, what: str, left: Floats) -> None:
-    """Refuse a strain that thins a sheet or cable too much; ``left`` is the share of thickness² or section."""
+    """Refuse a strain that thins a sheet or cable too much; ``left``: share of thickness² or section."""
     if left.min() < LEFT:
         text = f"{step.name}: {what} stretches so far that the material's law leaves it no thickness"
         raise OptionError(f"{text}; give it a larger young or thickness, or less load", what="Material.young")
