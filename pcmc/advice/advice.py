@@ -123,8 +123,7 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
         balanced = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
         plan = balanced if changes(plan, balanced) else with_upright(plan) or plan
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
-        surface = plan.surface()
-        strained = strained_junction(surface)
+        strained = strained_junction(plan.surface())
         if strained is None or strained.remedy is None:
             break
         name, tension, _ = strained.remedy
@@ -138,8 +137,7 @@ def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
     from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area  # needs shapely
 
-    pressures = [abs(p) for p in net_pressures(plan).values()]
-    least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
+    least = ABOVE_LEAST * least_tension(plan_area(plan), max(map(abs, net_pressures(plan).values())))
     tried = [a for a in certificate.tried if a.folds and a.way not in NO_LOADS]
     folds = [1.0 / attempt.value for attempt in tried if attempt.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)

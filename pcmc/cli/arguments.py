@@ -165,8 +165,7 @@ class Build:
         roof, file = Shown(cache=self.cache).roof(project, progress, self.whole), project.path
         if roof.certified and not roof.good and not self.allow_uncertified:
             hint = f"pcmc solve {file} shows them, --allow-uncertified accepts the roof"
-            text = f"{file}: the roof misses its targets or its accuracy; {hint}"
-            raise FileError(text, what=str(file))
+            raise FileError(f"{file}: the roof misses its targets or its accuracy; {hint}", what=str(file))
         return roof
 
 

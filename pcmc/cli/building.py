@@ -49,12 +49,9 @@ FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 COST = "Cost of a family, as of its mould, and of a panel; adds NAME-costs.csv and .svg. Needs --change."
-PICTURE = "Picture to draw, coloured by family."
-MIRRORED = "alike: of one family; or apart."
 TOLERANCE = (
     "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 )
-HEIGHT = "Section at this height; may be repeated."
 TWO = "two numbers FAMILY,PANEL, 0 or more"
 LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
 TRUE_SIZE = "Draw every panel at true size, as a project may say, too; needs --tolerance."
@@ -63,7 +60,6 @@ DATE = "Date to print; by default the project's. No clock is read."
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
 DENSITY = "Mass per volume; above 0, self-weight is a load."
 RUN = "Run CalculiX on each case and combination; by default as the project says."
-SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
 Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
 
@@ -73,7 +69,7 @@ def panels_(
     file: Input,
     tolerance: Annotated[float | None, amount("LENGTH", FAMILY)] = None,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
-    picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
+    picture: Annotated[Path | None, option("PNG", "Picture to draw, coloured by family.")] = None,
     view: ViewName = "diagonal",
     pattern: Annotated[str | None, option("NAME", PATTERN)] = None,
     size: Annotated[float | None, amount("LENGTH", "Edge of the panels of a pattern.")] = None,
@@ -82,7 +78,7 @@ def panels_(
     sheet: SheetFormat = None,
     change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
     cost: Annotated[str | None, option("FAMILY,PANEL", COST)] = None,
-    mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
+    mirror_images: Annotated[str, option("NAME", "alike: of one family; or apart.")] = "alike",
     walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
@@ -202,7 +198,7 @@ def draw_(
     units: FileUnits = "",
     sheet: SheetFormat = None,
     scale: Annotated[int | None, count("1 to this; by default it fits.")] = None,
-    height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
+    height: Annotated[list[str] | None, option("Z", "Section at this height; may be repeated.")] = None,
     line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
     tolerance: Tolerance = None,
     panel_sheets: Annotated[bool, switch("--panel-sheets", TRUE_SIZE)] = False,
@@ -251,8 +247,7 @@ def report_(
     arguments.output_of(file, report=output)
     anyway = build.allow_uncertified
     with working() as progress:
-        project = arguments.load_project(file, units)
-        roof = build.roof(project, progress)
+        roof = build.roof(arguments.load_project(file, units), progress)
         if force and roof.units.force not in ("", force):
             own = roof.units.force
             text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
@@ -266,8 +261,7 @@ def report_(
         progress("laying out the pages")
         documents = _documents(roof, tolerance=tolerance, date=date)
         listed = {file.name: "project" if roof.result is not None else "surface"}
-        report = roof.report(documents, files=listed, anyway=anyway)
-        written = write_all([(output, report.write)], progress)
+        written = write_all([(output, roof.report(documents, files=listed, anyway=anyway).write)], progress)
     return reports.ended(roof.good, written)
 
 
@@ -285,7 +279,7 @@ class Model:
     poisson: Annotated[float | None, amount("VALUE", "Poisson's ratio, 0.3 by default.")] = None
     density: Annotated[float | None, amount("VALUE", DENSITY)] = None
     gravity: Annotated[float | None, amount("VALUE", "Length/s²; by default 9.81 m/s².")] = None
-    snow: Annotated[float | None, amount("VALUE", SNOW)] = None
+    snow: Annotated[float | None, amount("VALUE", "Load per plan area, besides the snow of the form.")] = None
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
     cable_area: Annotated[float | None, amount("VALUE", "Section of the cables.")] = None
 

@@ -189,7 +189,6 @@ REFER = "Refer to the drawing, so that the project follows it."
 MESH = "A mesh: .obj .ply .stl .off .dae .3ds .x3d and others."
 WELD = "Vertices nearer to each other than this become one; by default 1e-5 of the mesh's size."
 UNITS = "Unit of length wanted: m, cm, mm, ft or in; a file without one is taken to be in it."
-CLOSED = "Edges of the largest hole that is closed; 0 closes none."
 UP = "The axis that was up where the mesh was drawn: x, y or z; it is turned to be z."
 NEW_LENGTH = "Edge length of new triangles, for a scan; otherwise the triangles stay."
 
@@ -232,7 +231,7 @@ def repair_(
     file: Annotated[Path, typer.Argument(metavar="FILE", help=MESH)],
     output: Annotated[Path, option("FILE", "File to write.", *OUTPUT)],
     weld: Annotated[float | None, amount("LENGTH", WELD)] = None,
-    holes: Annotated[int, count(CLOSED)] = HOLES,
+    holes: Annotated[int, count("Edges of the largest hole that is closed; 0 closes none.")] = HOLES,
     edge_length: Annotated[float | None, amount("LENGTH", NEW_LENGTH)] = None,
     units: Annotated[str, option("NAME", UNITS, parser=parsed_unit)] = "",
     up: Annotated[str, option("AXIS", UP)] = "z",

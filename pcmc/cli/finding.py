@@ -18,7 +18,6 @@ from .reports import working
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
 SPAN = "Least and largest factor on it; by default 0.5,1.5. Of what is 0 now, least and largest value."
 FACTORS = "LOW,HIGH such as 0.5,1.5"
-STARTS = "Starts of deflated Newton around each equilibrium."
 CHECK = "Check the mesh of each: whether finer meshes have it, too."
 VERTICAL = "Vertical axis of the diagram: height, energy or volume."
 PICTURES, TABLE = (".png", ".svg", ".pdf"), ".csv"
@@ -30,7 +29,7 @@ def equilibria_(
     output: Annotated[list[Path] | None, MANY_FILES] = None,
     along: Annotated[list[str] | None, option("NAME", ALONG)] = None,
     span: Annotated[str | None, option("LOW,HIGH", SPAN)] = None,
-    starts: Annotated[int, count(STARTS)] = 6,
+    starts: Annotated[int, count("Starts of deflated Newton around each equilibrium.")] = 6,
     seed: Annotated[int, count("Seed of these starts.")] = 0,
     axis: Annotated[str, option("NAME", VERTICAL)] = "height",
     mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 FAR = 10.0  # degrees: walls that lean less are not reported
-NO_CHECK = "no mesh check: the surface is not at rest"
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -91,7 +90,7 @@ def mesh_check(
         if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
         elif roof.mesh_check_wanted(wanted) and roof.certificate.index is None:
-            print(NO_CHECK)
+            print("no mesh check: the surface is not at rest")
         return
     print(end="", flush=True)
     with working() as progress:

@@ -57,7 +57,6 @@ ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extr
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
 WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
 RISE = "Find the tension with which the whole roof rises so much over its outline."
-APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 SWAP = (
@@ -79,7 +78,7 @@ def solve_(
     loads: Loads,
     swap: Annotated[list[str] | None, option("NAME", SWAP)] = None,
     rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
-    apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
+    apex: Annotated[float | None, amount("LENGTH", "The same, over the plane.")] = None,
     span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False,

@@ -90,8 +90,7 @@ def arrange(
     points = np.concatenate([points, required_points[alone[np.unique(own, return_index=True)[1]]]])
     used = np.unique(np.concatenate([vertex, *(chain.vertices for chain in chains)]))
     chains = [replace(chain, vertices=np.searchsorted(used, chain.vertices)) for chain in chains]
-    required = np.searchsorted(used, vertex)
-    return Arrangement(points[used, :2], points[used, 2], tuple(chains), required)
+    return Arrangement(points[used, :2], points[used, 2], tuple(chains), np.searchsorted(used, vertex))
 
 
 def hole_points(drawn: Arrangement, lines: Sequence[PlanLine]) -> list[tuple[float, float]]:

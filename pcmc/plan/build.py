@@ -237,8 +237,7 @@ def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         raise PlanError(problem, what="patches", found=len(specs), expected=parts)
     else:
         owner = np.argsort(np.lexsort(centroid.round(6).T[::-1]))
-    snows = [plan.snow if spec.snow is None else spec.snow for spec in specs]
-    loads = zip(specs, snows, strict=True)
+    loads = zip(specs, [plan.snow if spec.snow is None else spec.snow for spec in specs], strict=True)
     patches = [Patch(s.name, s.tension, s.pressure, weight=s.weight, snow=snow) for s, snow in loads]
     return patches, owner[mesh.region]
 
@@ -315,8 +314,7 @@ def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None
     radius = float(distance.max())
     rise = RISE * radius if rise is None else rise
     slope = max(SLOPE, SLOPE / RISE * rise / radius)
-    full = rise * (u / u.max()) ** FULLNESS
-    return np.clip(full, LEAST * slope * distance, slope * distance)
+    return np.clip(rise * (u / u.max()) ** FULLNESS, LEAST * slope * distance, slope * distance)
 
 
 def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
@@ -324,8 +322,7 @@ def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
     free = np.flatnonzero(~known)
     u: Floats = np.zeros(len(load))
     if len(free):
-        factor = splu(L[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A")
-        u[free] = factor.solve(load[free])
+        u[free] = splu(L[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(load[free])
     return u
 
 

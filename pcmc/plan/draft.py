@@ -126,8 +126,7 @@ def _arranged(plan: Plan) -> tuple[list[PlanLine], list[Curve], Arrangement]:
     named = [np.array([*point, np.nan]) for point in plan.points.values()]  # vertices, but not held
     cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
     cut_points = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
-    required = np.reshape([*points, *named], (-1, 3)).astype(float)
-    drawn = arrange(lines, plan.edge_length, required, cut_points)
+    drawn = arrange(lines, plan.edge_length, np.reshape([*points, *named], (-1, 3)).astype(float), cut_points)
     check_count("patches", _part_count(plan, drawn))
     return lines, on_edge, replace(drawn, required=drawn.required[: len(points)])
 
@@ -271,8 +270,7 @@ def most_in_corners(curve: Curve, outline: PlanLine, edge_length: float, pressur
     for one in () if curve.closed or not len(corners) else (curve, curve.reversed()):
         away = one.at(one.parameter(np.array([0.0, WEDGE * edge_length])))[:, :2]
         width = float(outline.tree.query_nearest(shapely.Point(away[1]), return_distance=True)[1][0])
-        in_corner = np.linalg.norm(corners - away[0], axis=1).min() <= near
-        if in_corner and width < NARROW * WEDGE * edge_length:
+        if np.linalg.norm(corners - away[0], axis=1).min() <= near and width < NARROW * WEDGE * edge_length:
             most = min(most, CORNER_SHARE * pressure * width)
     return most
 
@@ -304,6 +302,5 @@ def rooms_between(plan: Plan, walls: Sequence[Patch], sides: Sequence[Sides]) ->
     for number, (name, room) in enumerate(plan.rooms.items()):
         signs = [(s.left == number) - (s.right == number) for s in sides]
         between = {wall.name: sign for wall, sign in zip(walls, signs, strict=True) if sign}
-        around = dict.fromkeys(room.patches, 1) | between
-        rooms.append(Room(name, tuple(around.items()), room.volume))
+        rooms.append(Room(name, tuple((dict.fromkeys(room.patches, 1) | between).items()), room.volume))
     return rooms

@@ -96,8 +96,7 @@ class PlanLine:
         for width in () if self.straight else 2.0 / 64.0 / 16.0 ** np.arange(8):
             trial = np.clip(t[:, None] + width * trials, 0.0, last)  # narrows the bracket 16 times
             at = self.curve.at(trial.ravel())[:, :2].reshape(*trial.shape, 2)
-            best = np.argmin(np.linalg.norm(at - xy[:, None], axis=2), axis=1)
-            t = trial[np.arange(len(t)), best]
+            t = trial[np.arange(len(t)), np.argmin(np.linalg.norm(at - xy[:, None], axis=2), axis=1)]
         return t, np.linalg.norm(self.curve.at(t)[:, :2] - xy, axis=1)
 
 
@@ -146,8 +145,7 @@ class LineTree:
     @cached_property
     def area(self) -> Any:
         """The polygon inside the outline and outside all holes."""
-        holes = [line.xy for line in self.lines if line.kind is Kind.HOLE]
-        area = shapely.Polygon(self.lines[0].xy, holes)
+        area = shapely.Polygon(self.lines[0].xy, [line.xy for line in self.lines if line.kind is Kind.HOLE])
         shapely.prepare(area)
         return area
 

@@ -229,8 +229,7 @@ def hole_of(spec: Any, number: int) -> Hole:
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
     name = hole_label(part.name) if checked_name(f"{what}.name", part.name, empty=True) else what
-    curve = curve_of(part.curve, what, closed=True)
-    return replace(part, curve=curve, name=name, **edge_cable(part, name))
+    return replace(part, curve=curve_of(part.curve, what, closed=True), name=name, **edge_cable(part, name))
 
 
 def hole_label(name: str) -> str:

@@ -64,8 +64,7 @@ def first_edge_length(parts: Sequence[Part], holes: Iterable[Curve]) -> float:
     area = sum(part.area.area for part in parts)
     least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
     rims = (curve.length / 12.0 for curve in holes)
-    usual = min([most, *(part.radius / ACROSS for part in parts), *rims])
-    return two_digits(max(usual, least))
+    return two_digits(max(min([most, *(part.radius / ACROSS for part in parts), *rims]), least))
 
 
 def edge_length_for(plan: Plan) -> float:

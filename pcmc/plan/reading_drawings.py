@@ -90,8 +90,7 @@ def _with_blocks(entities: Any, layer: str | None, depth: int) -> Iterator[tuple
         if entity.dxftype() == "INSERT" and depth < DEPTH:
             if entity.mcount > 1000:
                 raise RuntimeError(f"block reference {entity.dxf.handle} repeats {entity.mcount} times")
-            copies = entity.multi_insert() if entity.mcount > 1 else (entity,)
-            for copy in copies:
+            for copy in entity.multi_insert() if entity.mcount > 1 else (entity,):
                 yield from _with_blocks(copy.virtual_entities(), own, depth + 1)
         else:
             yield own, entity

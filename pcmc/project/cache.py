@@ -32,7 +32,6 @@ from ..surface.surface import FIELDS
 from .file import Project
 from .outcome import Outcome
 
-VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
 OWN = "[0-9a-f]" * 64 + ".pcmc"  # its files: the folder that ``PCMC_CACHE`` names may have others
 PARTS = ["plan", "mesh", "method", "options", "wanted", "search"]
@@ -42,7 +41,7 @@ NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a resu
 
 def cache_folder() -> Path | None:
     """The folder of the cache, which may not exist yet; None if it is switched off."""
-    given = os.environ.get(VARIABLE, "")
+    given = os.environ.get("PCMC_CACHE", "")
     if given.lower() == "off":
         return None
     if given:
@@ -87,8 +86,7 @@ def cached(project: Project) -> Outcome | None:
             status, history = DesignStatus[given["status"]], pd.DataFrame()
             design = Design(status, result, targets, parameters, given["solves"], history=history)
         units = Units(*values["units"]) if project.plan is None else project.units
-        notes = values.get("notes", ())
-        outcome = Outcome(result, design=design, units=units, cached=True, notes=notes)
+        outcome = Outcome(result, design=design, units=units, cached=True, notes=values.get("notes", ()))
         os.utime(path)
         return outcome
     return None

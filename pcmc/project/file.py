@@ -161,8 +161,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
         text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
         warnings.warn(text, FileWarning, stacklevel=2)
     elif project.drawing is None and project.plan is not None:
-        corners = project.plan.outline.at(project.plan.outline.dense)
-        width = float(np.ptp(corners, axis=0).max())
+        width = float(np.ptp(project.plan.outline.at(project.plan.outline.dense), axis=0).max())
         for note in filter(None, (mast_note(project.plan), unlikely_size(width, project.units.length))):
             warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
@@ -340,8 +339,7 @@ def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], 
 def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
     """Refuse a tension that both a rise and [targets] find."""
     for rise in rises:
-        areas = [area.name for area in plan.patches] or ["patch 1"]
-        own = areas if rise.patch is None else [rise.patch]
+        own = ([area.name for area in plan.patches] or ["patch 1"]) if rise.patch is None else [rise.patch]
         both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
         if not both:
             continue
@@ -363,8 +361,7 @@ def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:
     if others:
         raise OptionError(f"{flag} and {others[0]}: give one of them, the other follows", what=flag)
     if project.targets or (project.mesh is not None and project.mesh.rises):
-        text = f"{flag}: {project.path.name} has targets already; change them there"
-        raise OptionError(text, what=flag)
+        raise OptionError(f"{flag}: {project.path.name} has targets already; change them there", what=flag)
     if project.mesh is not None:
         if rises[0].kind not in RISES:
             raise OptionError(f"{flag}: is for a plan, and here is a mesh; give --rise or --apex", what=flag)

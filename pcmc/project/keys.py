@@ -334,8 +334,7 @@ def sections() -> tuple[Section, ...]:
     >>> [key.name for key in sections()[0].keys]
     ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'pattern', 'output']
     """
-    solve = (solve_section(method) for method in METHODS)
-    return (*main_sections(), *solve, *target_sections(), CURVE)
+    return (*main_sections(), *map(solve_section, METHODS), *target_sections(), CURVE)
 
 
 def reference() -> str:

@@ -351,8 +351,7 @@ class Outcome:
                 return found.check
             given = self.result if self.result is not None and not self.unfold else self.shown.surface
             try:
-                callback = _reporter("mesh check", progress)
-                return check_mesh(given, meshes or 3, callback=callback)
+                return check_mesh(given, meshes or 3, callback=_reporter("mesh check", progress))
             except PcmcError as error:  # the roof is good without it
                 if meshes is not None:
                     raise

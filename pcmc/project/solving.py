@@ -171,10 +171,8 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
 
     _newton_alone(project, "reach an accuracy")
     report("solving to the accuracy")
-    wanted = vars(project.wanted) | dict(project.options)
-    accurate = solve_to_accuracy(surface, callback=callback, **wanted)
-    stopped = accurate.status is AccuracyStatus.STOPPED
-    return _certified(accurate.result, report, stopped, accurate=accurate)
+    accurate = solve_to_accuracy(surface, callback=callback, **vars(project.wanted), **project.options)
+    return _certified(accurate.result, report, accurate.status is AccuracyStatus.STOPPED, accurate=accurate)
 
 
 def _newton_alone(project: Project, act: str) -> None:

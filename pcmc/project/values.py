@@ -126,8 +126,7 @@ def data_with_values(
                     mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
                     _drop(mesh, RISES if kind == "tensions" else ())
         else:  # walls that a project leaves open follow its patches, so they come last
-            writer = _Writer(data["plan"], project, start, asked)
-            writer.write(first or missing, shared=len(tried) == 1)
+            _Writer(data["plan"], project, start, asked).write(first or missing, shared=len(tried) == 1)
 
 
 class Source(NamedTuple):

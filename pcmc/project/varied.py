@@ -162,8 +162,7 @@ class _Source(NamedTuple):
                 keys = [k for k, at in self.keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
                 near = get_close_matches(name, self.keys, n=1, cutoff=0.8)  # a coordinate, perhaps
                 names = tuple(dict.fromkeys([*known, *keys, *near]))
-                text = f"{self.path}: {unknown('number', name, names)}"
-                raise OptionError(text, what=name, expected=names)
+                raise OptionError(f"{self.path}: {unknown('number', name, names)}", what=name, expected=names)
             kind, part = known[name]
             given[kind][part] = values[name]
         with in_file(self.path, OptionError):

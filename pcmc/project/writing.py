@@ -72,8 +72,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         if output.report is not None:
             listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
             listed |= {project.path.name: "project"} | {path.name: what for what, (path, _) in made}
-            report = outcome.report(output, files=listed, anyway=anyway)
-            add("report", [(Path(output.report), report.write)])
+            add("report", [(Path(output.report), outcome.report(output, files=listed, anyway=anyway).write)])
     return [job for _, job in made]
 
 
@@ -168,8 +167,7 @@ def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
     """The table and the picture of ``FewerFamilies.costs``, with the functions that write them."""
     from ..plot import lines  # needs the extra plot
 
-    best = costs[costs["cheapest"]]
-    curves = {"surfaces on the way": costs, "the cheapest": best}
+    curves = {"surfaces on the way": costs, "the cheapest": costs[costs["cheapest"]]}
     pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
     look: dict[str, Any] = {"x": "change of shape, length", "y": "cost", "markers": True}
     draw = partial(lines, pairs, **look)
@@ -187,10 +185,8 @@ def analysis_jobs(outcome: Outcome, path: Path, analysis: Analysis) -> FileJobs:
 
     pictures: dict[str, Any] = {"cases": under_load}
     pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
-    tables = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
-    jobs = tables | {
-        f"{name}.png": partial(draw, analysis, mark=outcome.mark) for name, draw in pictures.items()
-    }
+    jobs = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
+    jobs |= {f"{name}.png": partial(draw, analysis, mark=outcome.mark) for name, draw in pictures.items()}
     return [(path.with_name(f"{path.stem}-{name}"), write) for name, write in jobs.items()]
 
 

@@ -37,7 +37,6 @@ SIGNS = (
     "the factor on the forces along a member at which it buckles alone, without the sheets that hold it."
 )
 
-AT_REST = "These are the forces under the form-finding load alone; no load cases were run."
 
 ABOUT_COLUMNS = (
     "They follow from the forces of the supports by statics; N is above 0 in tension. A stay that would be "
@@ -87,7 +86,7 @@ def at_rest_chapter(model: StructuralModel, units: Units) -> Iterator[Block]:
     rest = model.steps[0].name, members_at_rest(model)
     if model.beams or model.bars:
         yield Heading("Members at rest", new_page=True)
-        yield AT_REST
+        yield "These are the forces under the form-finding load alone; no load cases were run."
     yield from _members(model, member_tables([rest])[0], units)
     yield from _columns(model, columns_at_rest(model), units)
 
@@ -126,8 +125,7 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
         columns[f"I {where}, {length}⁴"] = [f"{profile.moments[k]:.4g}" for profile in profiles]
     columns[f"E, {units.pressure}"] = [f"{line.member.material.young:.4g}" for line in beams]
     yield text_table("Members", words, columns)
-    kinds = {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length}
-    columns = columns_in(table, kinds)
+    columns = columns_in(table, {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length})
     columns["span over it"] = [f"{over:.3g}" if over < 1e3 else f"{over:.0f}" for over in table["span_over"]]
     columns["buckling"] = ["" if math.isnan(factor) else f"{factor:.4g}" for factor in table["buckling"]]
     yield text_table("Forces of members", table[["case", "member"]], columns)

@@ -90,8 +90,7 @@ class RoofReport:
         yield from verdict_sentences(certificate, self.mesh_check, self.theorem, units)
         yield from (f"The roof {margin.text(units)}." for margin in self.margins)
         yield tables.key_figures(surface, self.figures, units)
-        roof = draw(surface, view="diagonal", legend=True, width=PIXELS)
-        yield Picture("View from above", png(roof))
+        yield Picture("View from above", png(draw(surface, view="diagonal", legend=True, width=PIXELS)))
         yield Heading(f"Plan, scale {self.plan.scale}, lengths in {units.length}", new_page=True)
         yield self.plan
         yield LEGEND

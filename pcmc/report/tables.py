@@ -84,8 +84,7 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
 
 def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
-    heads = {"net": "net_pressure", "mean_H": "mean_curvature"}
-    table = certificate.patches.rename(columns=heads)
+    table = certificate.patches.rename(columns={"net": "net_pressure", "mean_H": "mean_curvature"})
     pressures = " ".join(key for key in ("pressure", "snow", "net_pressure") if key in table)
     kinds = {"tension": units.tension, pressures: units.pressure, "area": units.area}
     columns = columns_in(table, kinds | {"mean_curvature": f"1/{units.length}"})
@@ -207,5 +206,4 @@ def small(value: float) -> str:
 
 def _bar(value: float) -> str:
     """An error bar, to two digits; nothing for one without bound, and "given" where the value is given."""
-    text = f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"
-    return text if value else "given"
+    return (f"± {column([value], 2)[0]}" if math.isfinite(value) else "–") if value else "given"
