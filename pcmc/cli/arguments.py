@@ -6,6 +6,7 @@ import ast
 import inspect
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -132,8 +133,9 @@ class Loads:
         names |= {"weight": sheets, "snow": [name for name in loaded if name in out]}
         names |= {key: [cable.name for cable in surface.cables] for key in ("cable", "cable_weight")}
         names |= {"volume": [room.name for room in surface.rooms]}
-        flags = {key: f"--{key.replace('_', '-')}" for key in names}
-        given = {f"{key}s": by_name(own, getattr(self, key), flags[key]) for key, own in names.items()}
+        given = {}
+        for key, own in names.items():
+            given[f"{key}s"] = by_name(own, getattr(self, key), f"--{key.replace('_', '-')}")
         return with_loads(surface, given)
 
 
@@ -171,8 +173,7 @@ class Build:
 
 def with_groups(function: Callable[..., int]) -> Callable[..., int]:
     """A command as typer reads it: a parameter of a dataclass becomes an option for each of its fields."""
-    parameters: list[inspect.Parameter] = []
-    groups: dict[str, Any] = {}
+    parameters, groups = list[inspect.Parameter](), dict[str, Any]()
     for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
         if is_dataclass(group := parameter.annotation):
             groups[name], kinds = group, get_type_hints(group, include_extras=True)
@@ -222,10 +223,9 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
     values: dict[bool, dict[str, float]] = {False: {}, True: {}}  # by whether each is named
     for text in given or ():
         name, sign, value = text.rpartition("=")
-        try:
+        amount = math.nan
+        with suppress(ValueError):
             amount = validate.parsed(value)
-        except ValueError:
-            amount = math.nan
         if (sign and not name) or math.isnan(amount):
             validate.refuse(flag, text, "NAME=NUMBER or NUMBER")
         if not (name or names):
@@ -252,14 +252,10 @@ def named_values(text: str) -> tuple[str, list[Any]]:
 
 
 def _value(text: str) -> Any:
-    words = {"true": True, "false": False, "none": None}
-    if text.lower() in words:
-        return words[text.lower()]
-    try:
-        number = ast.literal_eval(text)
-    except (ValueError, SyntaxError):
-        return text
-    return number if isinstance(number, int | float) else text
+    with suppress(ValueError, SyntaxError):
+        value = ast.literal_eval(text.capitalize() if text.lower() in ("true", "false", "none") else text)
+        return value if isinstance(value, int | float | None) else text
+    return text
 
 
 def check_start(start: bool, file: Path) -> None:
@@ -273,21 +269,18 @@ def numbers(
     text: str, flag: str, expected: str = "numbers, with commas between them", size: int = 0
 ) -> list[float]:
     """The numbers in X,Y,..., which must be ``size`` if that is not 0."""
-    try:
+    with suppress(ValueError):
         found = [validate.parsed(part) for part in text.split(",")]
-    except ValueError:
-        found = []
-    if not found or (size and len(found) != size):
-        validate.refuse(flag, text, expected)
-    return found
+        if not size or len(found) == size:
+            return found
+    validate.refuse(flag, text, expected)
 
 
 def parsed_view(text: str, picture: Path | None) -> Any:
     """The name of a view of a picture, or (azimuth, elevation)."""
     if picture is None and text != "diagonal":
         raise OptionError("--view: is of the picture; give --picture, too, or leave it out", what="--view")
-    try:
+    with suppress(ValueError):
         azimuth, elevation = map(validate.parsed, text.split(","))
-    except ValueError:
-        return text
-    return azimuth, elevation
+        return azimuth, elevation
+    return text

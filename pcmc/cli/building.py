@@ -128,26 +128,26 @@ def panels_(
         outputs += schedule_paths(path) if suffix == CSV else [path]
         outputs += cost_paths(path) if suffix == CSV and prices is not None else []
     check_outputs(outputs, inputs=files_of(file))
-    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
-    options["anyway"] = build.allow_uncertified
+    how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": build.allow_uncertified}
     with working() as progress:
         roof = build.roof(arguments.load_project(file), progress)
         progress("sorting panels")
         if change is None:
-            schedule = roof.panels(tolerance, **options)
+            schedule = roof.panels(tolerance, **how)
         else:
 
             def callback(made: int, count: int) -> None:
                 progress(f"round {made}: {count} families")
 
-            fewer = roof.fewer_families(tolerance, change, callback=callback, **options)
+            fewer = roof.fewer_families(tolerance, change, callback=callback, **how)
             schedule = fewer.after
         works: list[Any] = []
-        writing = partial(write, surface=schedule.surface, units=roof.units)
         for path in files:
-            is_table = path.suffix.lower() == CSV
-            works += schedule_jobs(path, schedule) if is_table else [(path, writing)]
-            works += cost_jobs(path, fewer.costs(*prices)) if is_table and prices is not None else []
+            if path.suffix.lower() == CSV:
+                works += schedule_jobs(path, schedule)
+                works += cost_jobs(path, fewer.costs(*prices)) if prices is not None else []
+            else:
+                works.append((path, partial(write, surface=schedule.surface, units=roof.units)))
         if picture is not None:
             works.append((picture, partial(families, schedule, view=seen)))
         written = write_all(works, progress)
@@ -156,8 +156,8 @@ def panels_(
         print(f"\n{fewer}")
     if prices is not None:
         table = fewer.costs(*prices)
-        marked = table.assign(cheapest=table["cheapest"].map({True: "cheapest", False: ""}))
-        print(f"\n{marked.rename(columns={'cheapest': ''}).to_string(index=False, float_format='%.6g')}")
+        table[""] = table.pop("cheapest").map({True: "cheapest", False: ""})
+        print(f"\n{table.to_string(index=False, float_format='%.6g')}")
     return reports.ended(schedule.certificate.certified and roof.good, written)
 
 
@@ -212,14 +212,13 @@ def draw_(
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
     arguments.output_of(file, drawings=output)
-    heights = None if height is None else [parsed_number(text) for text in height]
     points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
-    lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
+    options: dict[str, Any] = {"scale": scale, "heights": height and [parsed_number(text) for text in height]}
+    options["lines"] = line and [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
         documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets or None)
-        options = {"scale": scale, "heights": heights, "lines": lines}
         drawings = roof.drawing_set(documents, anyway=build.allow_uncertified, **options)
         written = write_all(drawings.files(*output), progress)
     print(f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}", end="; ")
@@ -248,12 +247,12 @@ def report_(
     anyway = build.allow_uncertified
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
-        if force and roof.units.force not in ("", force):
-            own = roof.units.force
+        own = roof.units.force
+        if force and own not in ("", force):
             text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
             raise OptionError(text, what="--force", found=force, expected=own)
         progress("certifying")
-        roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
+        roof = replace(roof, units=Units(roof.units.length, force or own))
         require_certified(roof.shown.certificate, anyway)
     reports.mesh_check(roof, mesh_check)
     reports.margins(roof)
@@ -332,8 +331,8 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
-        lines = [*cable_notes(model), *sentences(model, model.units), *cable_offers(model)]
-        print(*lines, sep="\n", end="\n" * bool(lines))
+        for line in (*cable_notes(model), *sentences(model, model.units), *cable_offers(model)):
+            print(line)
         if model.bars:
             print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")

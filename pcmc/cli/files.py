@@ -69,8 +69,7 @@ def convert(
       pcmc convert roof.pcmc roof.glb --colour error
     """
     arguments.output_of(file, files=[output])
-    roof = _good(file, what, whole, units)
-    if roof is None:
+    if (roof := _good(file, what, whole, units)) is None:
         return NOT_CERTIFIED
     written = write_all(surface_files(roof, [output], colour))
     print(*(f"{note}\n" for note in metres_note([output], roof.units.length)), sep="", end="")
@@ -108,8 +107,7 @@ def plot(
     """
     seen = arguments.parsed_view(view, picture)
     arguments.output_of(file, picture=picture, view=seen, colour=colour)
-    roof = _good(file, what, whole)
-    if roof is None:
+    if (roof := _good(file, what, whole)) is None:
         return NOT_CERTIFIED
     return reports.ended(True, write_all([picture_job(roof, picture, [seen], colour)]))
 
@@ -171,8 +169,8 @@ def _example(name: str, parameters: dict[str, Any]) -> Surface:
     from ..sweep.case_script import resolve
 
     try:
-        known: Any = () if ":" in name else resolve("generators:__all__")
-        if ":" not in name and name not in known:
+        known: Any = [name] if ":" in name else resolve("generators:__all__")
+        if name not in known:
             raise OptionError(unknown("example", name, known), what="--example", found=name)
         build = resolve(name if ":" in name else f"generators:{name}")
         inspect.signature(build).bind(**parameters)
@@ -211,8 +209,7 @@ def plan(
     """
     suffix_of(output, (TOML,), "a project")
     if output.exists():
-        text = f"{output}: is there already; delete it, or name another file"
-        raise FileError(text, what=str(output))
+        raise FileError(f"{output}: is there already; delete it, or name another file", what=str(output))
     check_outputs([output])
     if refer:
         drawing_reference(file, output)  # refuses a drawing elsewhere

@@ -87,9 +87,10 @@ def mesh_check(
     """Check the mesh of a roof at rest, if that is wanted, and look for advice; print why not, or what is
     to be ``shown``, "brief" or "text", and what to type."""
     if not roof.wants_mesh_check(wanted):
-        if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
+        asked, at_rest = roof.mesh_check_wanted(wanted), roof.certificate.index is not None
+        if at_rest and asked is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
-        elif roof.mesh_check_wanted(wanted) and roof.certificate.index is None:
+        elif asked and not at_rest:
             print("no mesh check: the surface is not at rest")
         return
     print(end="", flush=True)
@@ -131,11 +132,8 @@ def working() -> Iterator[Callable[[str], None]]:
     from rich import progress
     from rich.console import Console
 
-    columns = (
-        progress.BarColumn(20),
-        progress.TimeElapsedColumn(),
-        progress.TextColumn("{task.description}", markup=False),
-    )
+    step = progress.TextColumn("{task.description}", markup=False)
+    columns = (progress.BarColumn(20), progress.TimeElapsedColumn(), step)
     with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda step: bar.update(task, description=step)

@@ -289,46 +289,35 @@ def sweep(
         raise OptionError("--retry-failed: is of stored cases; name their --store", what="--retry-failed")
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
-    options = {"mesh_check": mesh_check, "search": search}
 
     def resume(kept: int, missing: int) -> None:
         if kept:
             print(f"{store}: {kept} cases are finished, {missing} to run")
 
+    how: dict[str, Any] = {"scheduler": scheduler, "workers": workers, "time_limit": time_limit}
     with sweeping() as draw:
-        cases = _cases(what, values, method, options)
-        table = run(
-            cases,
-            store,
-            scheduler=scheduler,
-            workers=workers,
-            time_limit=time_limit,
-            retry_failed=retry_failed,
-            on_record=draw,
-            on_resume=resume,
-        )
+        cases = _cases(what, values, method, {"mesh_check": mesh_check, "search": search})
+        table = run(cases, store, retry_failed=retry_failed, on_record=draw, on_resume=resume, **how)
     if table.empty:
         return INTERRUPTED
-    first = short_table(table, list(cases.grid), show or ())
+    shown, grid = show or (), list(cases.grid)
+    first = short_table(table, grid, shown)
     if csv is not None:
         write_table(csv, table if every else first)
     labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, table))
     if plot is not None:
-        draw_sweep(table, list(cases.grid), plot, labels, *(show or ())[:1])
+        draw_sweep(table, grid, plot, labels, *shown[:1])
     print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}", na_rep=""))
-    for name in show or ():
-        if not columns_of(table, name, list(cases.grid)):
-            print(f"no case has {name}")
+    for name in (name for name in shown if not columns_of(table, name, grid)):
+        print(f"no case has {name}")
     failed = table[table["status"].isin(FAILED)]
     for message, alike in failed.groupby("message", sort=False):  # each reason once
         others = f" and {len(alike) - 1} more" if len(alike) > 1 else ""
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"])
-    for wish in ("targets_met", "accuracy_reached"):
-        good &= table.get(wish, True)
-    return OK if good.all() else NOT_CERTIFIED
+    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    return OK if (good & table.get("accuracy_reached", True)).all() else NOT_CERTIFIED
 
 
 def _cases(what: str, values: list[str], method: str | None, options: dict[str, bool]) -> Sweep:

@@ -53,28 +53,27 @@ def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
         mended = Mended(plan, True) if certified else _mended(project, plan, outcome)
-        better, targets = mended.plan, project.targets
+        better, targets, met, reached = mended.plan, project.targets, False, ""
         if mended.sail and project.rises:
             targets = targets[: -len(project.rises)]
-        met, reached = False, ""
         if mended.rests and targets:
             better, met, reached = _with_targets(project, better, outcome.surface, targets)
         lines = changes(plan, better, project.rises if mended.sail else ())
     if not (lines or mended.rings):
         return []
     tried = "which was tried and comes to rest" if mended.rests else "as a first step"
-    if mended.rings:
-        tried += ", on finer meshes, too"
+    tried += ", on finer meshes, too" if mended.rings else ""
     if met:
         tried = "which was tried, comes to rest and meets the targets"
     elif mended.rests and targets:
         tried = "which was tried without the targets and comes to rest"
     where = project.where_to_type
     if project.drawing is not None and mended.rings:
-        where = " and ".join([f"draw in {project.drawing.path.name}", *([where] if lines else [])])
+        where = f"draw in {project.drawing.path.name}" + (f" and {where}" if lines else "")
     ending = [f"with them, the targets are {reached}"] if reached else []
-    causes = ["edges that nothing holds"] if mended.sail else []
-    causes += ["a roof held at a single point"] if mended.rings else []
+    causes = ["edges that nothing holds"] * mended.sail + ["a roof held at a single point"] * bool(
+        mended.rings
+    )
     cause = f"the cause is {' and '.join(causes)}; " if causes else ""
     return [f"{cause}{where}, {tried}:", *lines, *mended.rings, *ending]
 
@@ -167,11 +166,7 @@ def _found(outcome: Outcome, changed: Changed | None, step: OnStep) -> str:
 
 
 def _tried(
-    project: Project,
-    plan: Plan,
-    surface: Surface,
-    changed: Changed | None = None,
-    step: OnStep = ignore,
+    project: Project, plan: Plan, surface: Surface, changed: Changed | None = None, step: OnStep = ignore
 ) -> Outcome | None:
     """How a plan ends on a mesh that is not fine; None if it has none, as with a patch inside a ring."""
     try:

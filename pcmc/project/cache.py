@@ -76,9 +76,9 @@ def cached(project: Project) -> Outcome | None:
         return None
     with suppress(PcmcError, OSError, KeyError, ValueError, TypeError):
         data = io.load(path)
-        values, surface = data.certificate, to_surface(data)
+        values, design = data.certificate, None
         solve = {name: values[name] for name in NUMBERS}
-        result, design = Result(surface, Status[values["status"]], rows=(), **solve), None
+        result = Result(to_surface(data), Status[values["status"]], rows=(), **solve)
         if given := values.get("design"):
             from ..design import Design, DesignStatus
 
@@ -97,10 +97,13 @@ def keep(project: Project, outcome: Outcome) -> None:
     path = _path(project)
     if path is None or not outcome.good:
         return
-    result, design, surface = outcome.solved, outcome.design, outcome.surface
+    result, design, surface, units = outcome.solved, outcome.design, outcome.surface, outcome.units
     values: dict[str, Any] = {name: getattr(result, name) for name in NUMBERS}
-    values |= {"status": result.status.name, "notes": list(outcome.notes)}
-    values["units"] = [outcome.units.length, outcome.units.force]
+    values |= {
+        "status": result.status.name,
+        "notes": list(outcome.notes),
+        "units": [units.length, units.force],
+    }
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}

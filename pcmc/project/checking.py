@@ -137,12 +137,13 @@ def line_with(path: Path, found: object) -> int:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError):
         return 0
-    if isinstance(found, str):
-        has = re.compile(rf"""["']{re.escape(found)}["']""").search
-        numbers = [number for number, line in enumerate(lines, 1) if has(line)]
-    else:
-        values = ((number, VALUE.findall(line.split("#")[0])) for number, line in enumerate(lines, 1))
-        numbers = [number for number, texts in values if any(float(text) == found for text in texts)]
+
+    def has(line: str) -> bool:
+        if isinstance(found, str):
+            return f'"{found}"' in line or f"'{found}'" in line
+        return any(float(text) == found for text in VALUE.findall(line.split("#")[0]))
+
+    numbers = [number for number, line in enumerate(lines, 1) if has(line)]
     return numbers[0] if len(numbers) == 1 else 0
 
 

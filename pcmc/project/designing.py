@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..advice.advice import check_apexes, chosen_values
 from ..base.errors import BalanceWarning, OptionError
@@ -28,9 +27,6 @@ from .solving import solve_and_swap, solve_project
 from .start import start_of
 from .writing import check_outputs, project_files, write_all
 
-if TYPE_CHECKING:
-    pass
-
 
 def opened(
     path: Project | PathLike,
@@ -43,8 +39,8 @@ def opened(
 ) -> Outcome:
     """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
 
-    ``units`` is the unit of length that the roof is to be in; with ``start`` a project has its start shape,
-    not solved. The others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
+    ``units`` is the unit of length wanted; with ``start`` a project has its start shape, not solved. The
+    others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
 
     >>> roof = opened("notebooks/roof.toml", start=True)
     >>> roof.result is None, roof.certificate.certified
@@ -88,11 +84,9 @@ def designed(
     >>> roof.good, [f"{area:.0f}" for area in roof.certificate.patches["area"][:3]]
     (True, ['78', '174', '150'])
     """
-    if not isinstance(project, Project):
-        project = load(project)
+    project = project if isinstance(project, Project) else load(project)
     use_cache = use_cache and changed is None
-    known = cache.cached(project) if use_cache else None
-    if known is not None:
+    if use_cache and (known := cache.cached(project)) is not None:
         return replace(known, unfold=project.output.whole, project=project)
     outcome = solve_from_start(project, progress or ignore, changed)
     if use_cache:
@@ -137,8 +131,7 @@ def run(
     (True, 'STABLE', ['hall.pcmc'])
     """
     project = load(path)
-    project = project if out_dir is None else project.in_folder(out_dir)
-    return run_project(project, progress, anyway=anyway)
+    return run_project(project if out_dir is None else project.in_folder(out_dir), progress, anyway=anyway)
 
 
 def run_project(
@@ -188,11 +181,10 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
     _check_wishes(project, surface, start.units)
-    swapped = False
     if project.swap:
         solved, swapped = solve_and_swap(project, surface, report)
     else:
-        solved = solve_project(project, surface, report)
+        solved, swapped = solve_project(project, surface, report), False
     notes = [*solved.notes]
     starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
     if starts:
@@ -216,13 +208,13 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
     with in_file(project.path):
         structure, output = project.structure, project.output
         check_apexes(project.plan, surface, project.targets, units)
-        if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
+        if output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")
         if structure is not None and (output.structure is not None or structure.run):
             structure.check(surface, project.plan, output.whole)
-        if structure is not None and structure.run:
-            expect_program()
+            if structure.run:
+                expect_program()
         if project.pattern is not None and (output.pattern or output.report):
             of_material(project.pattern, structure, surface)
         if project.verify:

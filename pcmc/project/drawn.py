@@ -76,10 +76,8 @@ class Chosen:
         labelled = {label.name for label in drawing.labels if label.tension is not None}
         labelled |= {name for name, values in given.get("patches", {}).items() if "tension" in values}
         patches = {} if "tension" in given else full["patches"]
-        dividers = [
-            e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers
-        ]
-        walls = {e["name"]: e["wall"] for e in dividers if e["wall"] is not False}
+        own = (e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers)
+        walls = {entry["name"]: entry["wall"] for entry in own if entry["wall"] is not False}
         cables = {e["name"]: e["tension"] for e in full.get("cables", []) if e.get("name") in drawing.cables}
         outline = {"": full["cable"]} if "cable" in full and "cable" not in given else {}
         return cls(
@@ -113,9 +111,8 @@ class Chosen:
         if self.edge_length is not None:
             parts.append(f"edges of {self.edge_length:g}")
             keys.append("edge_length = ... under [plan]")
-        if not parts:
-            return ""
-        return f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
+        text = f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
+        return text if parts else ""
 
 
 def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
@@ -141,9 +138,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
         lines = proposed(drawing, plan)
     except OptionError as error:
         raise error.in_file(path, FileError) from None
-    full = {**data, "plan": lines}
-    if drawing.units:
-        full["units"] = drawing.units
+    full = {**data, "plan": lines} | ({"units": drawing.units} if drawing.units else {})
     if len(drawing.heights) and "targets" not in data:
         full["targets"] = {"meet": height_targets(drawing), "vary": list(lines["patches"])}
     return full, drawing, Chosen.of(plan, lines, drawing)
@@ -188,6 +183,5 @@ def _read(path: Path, units: str, gap: float | None, time: int, size: int) -> Dr
     from ..plan.drawing import read_drawing
 
     drawing = read_drawing(path, units, gap)
-    if drawing.units and drawing.units not in LENGTHS:
-        return read_drawing(path, FALLBACK, gap)
-    return drawing
+    unknown = drawing.units not in ("", *LENGTHS)
+    return read_drawing(path, FALLBACK, gap) if unknown else drawing

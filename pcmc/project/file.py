@@ -70,18 +70,18 @@ class Project:
 
     def __post_init__(self) -> None:
         order, output = self.options.get("order"), self.output
-        flat = {
-            "solve.accuracy": self.wanted.accuracy,
-            "solve.margin": self.margin,
-            "solve.verify": self.verify,
+        flat: dict[str, Any] = {
+            "accuracy": self.wanted.accuracy,
+            "margin": self.margin,
+            "verify": self.verify,
         }
+        flat = {f"solve.{key}": wanted for key, wanted in flat.items()}
         flat |= {f"output.{key}": getattr(output, key) for key in ("net", "structure", "tolerance")}
         flat |= {"pattern": self.pattern, "structure.run": self.structure is not None and self.structure.run}
         for key in (key for key, wanted in flat.items() if wanted and order not in (None, 1)):
             text = f"the elements are curved, of order {order}, and {key} is for flat triangles alone; type"
-            raise OptionError(
-                f"{text} order = 1 under [solve], or leave it out", what="solve.order", found=order
-            )
+            text += " order = 1 under [solve], or leave it out"
+            raise OptionError(text, what="solve.order", found=order)
 
     @property
     def inputs(self) -> list[Path]:
@@ -297,10 +297,9 @@ def _solving(table: Mapping[str, Any]) -> dict[str, Any]:
     """What [solve] says, as values of a Project; bad ones are refused before the plan is meshed."""
     given = {name: table[name] for name in ("method", "mesh_check", "margin", "verify") if name in table}
     accuracy = {name: table[name] for name in vars(AccuracyWanted()) if name in table}
-    given["wanted"] = section_of(AccuracyWanted, "solve", accuracy)
-    given["options"] = {name: v for name, v in table.items() if name not in given and name not in accuracy}
-    find_method(given.get("method", "newton")).options(**given["options"])
-    return given
+    options = {name: v for name, v in table.items() if name not in given and name not in accuracy}
+    find_method(given.get("method", "newton")).options(**options)
+    return given | {"wanted": section_of(AccuracyWanted, "solve", accuracy), "options": options}
 
 
 def _output(table: Mapping[str, Any]) -> Output:

@@ -65,19 +65,18 @@ def under_load_chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield from map(sentence, analysis.answers(units))
     for what in ("deflection", "least force"):
         yield Picture("", png(under_load(analysis, what=what, units=units, width=PIXELS)))
-    table, kinds = analysis.patches, {"least_force mean_force largest_force": units.tension}
-    columns = columns_in(table, kinds | {"slack_area": units.area})
-    yield text_table("Membrane forces by patch", table[["case", "patch"]], columns)
+    kinds = {"least_force mean_force largest_force": units.tension, "slack_area": units.area}
+    columns = columns_in(analysis.patches, kinds)
+    yield text_table("Membrane forces by patch", analysis.patches[["case", "patch"]], columns)
     table = analysis.supports.rename(columns={"support": "", "name": "of"})
     columns = {f"length, {units.length}": column(table["length"].where(table["length"] > 0.0))}
     columns |= vectors_of(table, "force", "F", force)
     yield text_table("Forces of the supports on the roof", table[["case", "", "of", "kind"]], columns)
-    table = analysis.cables
-    if len(table):
+    if len(table := analysis.cables):
         columns = columns_in(table, {"least largest": force})
         yield text_table("Forces of cables", table[["case", "cable"]], columns)
-    pictures = [member_forces(analysis, units=units, width=PIXELS)] if len(analysis.members) else []
-    yield from _members(analysis.model, analysis.members, units, *map(png, pictures))
+    pictures = [png(member_forces(analysis, units=units, width=PIXELS))] if len(analysis.members) else []
+    yield from _members(analysis.model, analysis.members, units, *pictures)
     yield from _columns(analysis.model, analysis.columns, units)
 
 
@@ -98,12 +97,11 @@ def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Itera
     profiles = {bar.name: bar.member.profile for bar in model.bars}
     sections = {name: p.label if p.shape else f"A = {p.area:.4g}" for name, p in profiles.items()}
     words: Columns = dict(table[["case", "member", "kind"]])
-    words[f"section, {units.length}"] = [sections[name] for name in table["member"]]
+    words[f"section, {units.length}"] = table["member"].map(sections)
     kinds = {"length": units.length, "N euler": units.force or "force", "stress": units.pressure}
     columns = columns_in(table, kinds)
-    for key, title in (("utilisation", "of its strength, %"), ("euler_over", "Euler over thrust")):
-        values = table[key] * (100.0 if key == "utilisation" else 1.0)
-        columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
+    shares = {"of its strength, %": 100.0 * table["utilisation"], "Euler over thrust": table["euler_over"]}
+    columns |= {title: ["" if math.isnan(v) else f"{v:.3g}" for v in own] for title, own in shares.items()}
     yield text_table("Forces of columns and stays", words, columns)
     yield ABOUT_COLUMNS
     yield from map(sentence, column_answers(model, table, units))

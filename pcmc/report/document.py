@@ -28,13 +28,12 @@ from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
 from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
 
-SUFFIXES = (".pdf",)
-
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
     from ..cloth import CuttingPattern
     from ..structure import Analysis, StructuralModel
 
+SUFFIXES = (".pdf",)
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 
 
@@ -66,22 +65,19 @@ class RoofReport:
         FileError for another suffix than .pdf, or a file that cannot be written.
         """
         suffix_of(path, SUFFIXES, "a report")
-        path = Path(path)
         content = self.pdf()
         with writing(path), atomic_write(path) as temporary:
             temporary.write_bytes(content)
-        return path
+        return Path(path)
 
     def pdf(self) -> bytes:
         """The bytes of the PDF file."""
         from .pages import pdf  # needs reportlab
 
         title = f"Report on the roof {self.name}" if self.name else "Report on a roof"
-        mark = self.certificate.mark
-        if not mark and self.targets is not None and not self.targets["met"].all():
-            mark = MISSED
+        missed = self.targets is not None and not self.targets["met"].all()
         foot = ", ".join(filter(None, (f"pcmc {version('pcmc-surfaces')}", self.date)))
-        return pdf(list(self._blocks()), title, foot, mark)
+        return pdf(list(self._blocks()), title, foot, self.certificate.mark or MISSED * missed)
 
     def _blocks(self) -> Iterator[Block]:
         """All that the pages hold, in order."""
@@ -96,8 +92,8 @@ class RoofReport:
         yield LEGEND
         yield Picture("Elevation", png(draw(surface, view="elevation", width=PIXELS)))
         if len(certificate.supports):
-            acting = reactions(surface, units=units, width=PIXELS)
-            yield Picture("Reactions of the supports on the roof", png(acting))
+            acting = png(reactions(surface, units=units, width=PIXELS))
+            yield Picture("Reactions of the supports on the roof", acting)
         yield Heading("Forces")
         yield about_forces(units)
         if self.targets is not None:
@@ -105,13 +101,13 @@ class RoofReport:
         yield tables.table_of_patches(surface, certificate, units)
         yield from tables.line_tables(certificate, units)
         yield from tables.cable_tables(certificate, units)
-        if self.mesh_check is not None:
-            parts = (self.mesh_check.verdict.value, self.mesh_check.detail, self.mesh_check.advice)
+        if self.mesh_check is not None or self.mesh_failure:
             yield Heading("Mesh check")
-            yield f"{sentence('; '.join(filter(None, parts)))} {ERROR_BARS}"
-            yield tables.mesh_table(self.mesh_check, units)
+        if (check := self.mesh_check) is not None:
+            parts = filter(None, (check.verdict.value, check.detail, check.advice))
+            yield f"{sentence('; '.join(parts))} {ERROR_BARS}"
+            yield tables.mesh_table(check, units)
         elif self.mesh_failure:
-            yield Heading("Mesh check")
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
             yield from under_load_chapter(self.analysis, units)

@@ -74,9 +74,8 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
     width, depth, _ = np.ptp(surface.vertices, axis=0).tolist()
     rows = [["size in the plan", f"{one(width)} × {one(depth)} {units.length}"]]
     for (quantity, owner), label in LISTED.items():
-        found = [f.value for f in figures if (f.quantity, f.owner) == (quantity, owner)]
-        values = [value for value in found if value is not None]
-        if values:
+        found = (f.value for f in figures if (f.quantity, f.owner) == (quantity, owner))
+        if values := [value for value in found if value is not None]:
             rows.append([label, f"{one(sum(values))} {units.behind(dimension_of(quantity)).strip()}"])
     rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
     return Table("Key figures", [], rows)
@@ -97,19 +96,17 @@ def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -
 
 def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     """Junctions and supports with their reactions, numbered as in the plan, and how far walls lean."""
-    table, force = certificate.junctions, units.force or "force"
-    if len(table):
+    force = units.force or "force"
+    if len(table := certificate.junctions):
         columns = columns_in(table, {f"length {MIDDLE}": units.length})
         columns[f"force left, {units.tension}"] = map(small, table["force_left"])
         numbers = [f"J{k + 1}" for k in range(len(table))]
         yield text_table("Junctions", {"": numbers, "between": table["junction"]}, columns)
-    table = certificate.leaning
-    if len(table):
-        leans: Columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
-        columns = leans | columns_in(table, {"x y z": units.length})
+    if len(table := certificate.leaning):
+        columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
+        columns |= columns_in(table, {"x y z": units.length})
         yield text_table("Walls: the largest angle from the vertical", table[["wall"]], columns)
-    table = certificate.supports
-    if len(table):
+    if len(table := certificate.supports):
         own = table["name"].where(table["name"] != table["support"], "")
         columns = columns_in(table, {"x y z": units.length})
         columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
@@ -129,14 +126,11 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
         weights = {"weight": units.tension} if "weight" in table else {}
         columns = columns_in(table, {"force": force, **weights, f"length {MIDDLE}": units.length})
         yield text_table("Cables", table[["cable"]], columns)
-    table = certificate.cable_ends
-    if len(table):
-        ends = ["held" if held else "free" for held in table["held"]]
+    if len(table := certificate.cable_ends):
+        words = {"cable": table["cable"], "end": ["held" if held else "free" for held in table["held"]]}
         columns = columns_in(table, {"x y z": units.length}) | vectors_of(table, "force", "F", force)
-        words = {"cable": table["cable"], "end": ends}
         yield text_table("Ends of cables, and the forces on them", words, columns)
-    table = certificate.rooms
-    if len(table):
+    if len(table := certificate.rooms):
         columns = columns_in(table, {"volume prescribed": units.volume, "pressure": units.pressure})
         yield text_table("Rooms of prescribed volume", table[["room"]], columns)
 
@@ -199,9 +193,7 @@ def columns_in(table: pd.DataFrame, units: Mapping[str, str]) -> Columns:
 
 def small(value: float) -> str:
     """The size of an error."""
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:.0e}" if value else "0"
+    return (f"{value:.0e}" if value else "0") if math.isfinite(value) else "–"
 
 
 def _bar(value: float) -> str:

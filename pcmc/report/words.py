@@ -79,16 +79,12 @@ def verdict_sentences(
         sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
     if theorem is not None:
         sentences.append(sentence(theorem.text(units)))
-    if certificate.symmetric_in:
-        planes = ", ".join(certificate.symmetric_in)
-        sentences.append(
-            f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
-            " changes of shape that are symmetric in them."
-        )
+    if planes := ", ".join(certificate.symmetric_in):
+        text = f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
+        sentences.append(f"{text} changes of shape that are symmetric in them.")
     if certificate.cuts_itself:
         sentences.append(f"It cannot be built as it is: {certificate.cuts_itself}.")
-    if len(certificate.pinched):
-        count = len(certificate.pinched)
+    if count := len(certificate.pinched):
         sentences.append(f"The ridge rests on the plane at {count} {'vertex' if count == 1 else 'vertices'}.")
     return sentences
 
@@ -101,22 +97,21 @@ def sentence(text: str) -> str:
 def about_forces(units: Units) -> str:
     """How the signs and units of the tables are meant."""
     force = units.force or "the unit of force of the tensions"
-    return (
+    text = (
         f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on the"
-        " roof: z is up, so a negative z holds the roof down."
     )
+    return f"{text} roof: z is up, so a negative z holds the roof down."
 
 
 def panel_text(schedule: Panels, units: Units) -> str:
     """How many panels and families there are, how large, and how they meet."""
     total, angles = schedule.edge_totals, schedule.edges["dihedral"].dropna()
+    largest, smallest = (one(float(panel["area"])) for panel in (schedule.largest, schedule.smallest))
     text = (
         f"{len(schedule.panels)} flat triangles in {schedule.count} families. Panels of a family differ"
-        f" by at most {schedule.tolerance:g} {units.length} in the length of each edge."
-        f" Together they have an area of {one(schedule.area)} {units.area}, and edges of"
-        f" {one(float(total['length'].sum()))} {units.length}."
-        f" The largest has {one(float(schedule.largest['area']))} {units.area}, the smallest"
-        f" {one(float(schedule.smallest['area']))} {units.area}."
+        f" by at most {schedule.tolerance:g} {units.length} in the length of each edge. Together they have an"
+        f" area of {one(schedule.area)} {units.area}, and edges of {one(float(total['length'].sum()))}"
+        f" {units.length}. The largest has {largest} {units.area}, the smallest {smallest} {units.area}."
     )
     if len(angles):
         text += f" The angle between neighbours is from {angles.min():.1f}° to {angles.max():.1f}°."
