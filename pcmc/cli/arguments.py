@@ -28,55 +28,10 @@ from ..project.varied import with_loads
 from ..project.writing import check_outputs
 from ..surface import Surface
 from ..surface.values import in_the_open, sheets_below
+from .options import by_part, option, parsed_unit, switch
 
 TOML, DXF = ".toml", ".dxf"
-
-
-def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
-    """An option of a command: what stands for its value, and its help."""
-    return typer.Option(*names, metavar=metavar, help=meaning, **more)
-
-
-def amount(metavar: str, meaning: str) -> Any:
-    """An option with a number."""
-    return option(metavar, meaning, parser=parsed_number)
-
-
-def count(meaning: str) -> Any:
-    """An option with a whole number."""
-    return option("NUMBER", meaning, parser=parsed_integer)
-
-
-def by_part(meaning: str) -> Any:
-    """An option with a value for each of some parts; see ``by_name``."""
-    return option("NAME=VALUE", meaning)
-
-
-def switch(name: str, meaning: str) -> Any:
-    """An option without a value."""
-    return typer.Option(name, help=meaning)
-
-
-def parsed_number(text: str | float) -> float:
-    """The number in an option. The error shows the text, which typer's own parser does not."""
-    try:
-        return validate.parsed(str(text))
-    except ValueError:
-        raise typer.BadParameter(f"expected a number, found {text!r}") from None
-
-
-def parsed_integer(text: str | int) -> int:
-    """The whole number in an option; see ``parsed_number``."""
-    try:
-        validate.parsed(str(text))  # which refuses 1_000
-        return int(text)
-    except ValueError:
-        raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
-
-
-def parsed_unit(text: str) -> str:
-    """A unit of length in an option; empty for none."""
-    return validate.choice("--units", text, LENGTHS) if text else text
+READ = (TOML, *FORMATS, *READ_ONLY, DXF)  # suffixes of what commands read
 
 
 EVERY = "A bare VALUE applies to every patch that is not named"
@@ -96,6 +51,7 @@ ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,
 Start = Annotated[bool, switch("--start", START)]
 Cache = Annotated[bool, switch("--cache/--no-cache", CACHE)]
 Whole = Annotated[bool, switch("--whole", WHOLE)]
+Uncertified = Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)]
 MeshCheck = Annotated[bool | None, switch("--mesh-check/--no-mesh-check", MESH_CHECK)]
 FileUnits = Annotated[str, option("NAME", UNITS, parser=parsed_unit)]
 SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
@@ -160,7 +116,7 @@ class Build:
 
     whole: Whole = False
     cache: Cache = True
-    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False
+    allow_uncertified: Uncertified = False
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
@@ -208,10 +164,9 @@ def output_of(file: Path, **output: Any) -> Output:
 
 def check_suffix(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
-    suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
-    if suffix not in known:
+    if (suffix := file.suffix.lower()) not in READ:
         check_regular(file)
-        raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
+        raise FileError(f"{file}: {unknown('suffix', suffix, READ)}", what=str(file))
 
 
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:

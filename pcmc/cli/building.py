@@ -27,21 +27,8 @@ from ..structure.calculix import expect_program
 from ..structure.columns import column_text, columns_at_rest
 from ..structure.member_forces import cable_notes, cable_offers, sentences
 from . import arguments, reports
-from .arguments import (
-    MANY_FILES,
-    OUTPUT,
-    Build,
-    FileUnits,
-    Input,
-    MeshCheck,
-    SheetFormat,
-    ViewName,
-    amount,
-    count,
-    option,
-    parsed_number,
-    switch,
-)
+from .arguments import MANY_FILES, OUTPUT, Build, FileUnits, Input, MeshCheck, SheetFormat, ViewName
+from .options import amount, count, option, parsed_number, switch
 from .reports import working
 
 CSV = ".csv"

@@ -15,7 +15,8 @@ from ..project import start_of
 from ..project.settings import of_material
 from ..project.writing import write_all
 from . import arguments, reports
-from .arguments import MANY_FILES, Build, FileUnits, Input, SheetFormat, ViewName, amount, count, option
+from .arguments import MANY_FILES, Build, FileUnits, Input, SheetFormat, ViewName
+from .options import amount, count, option
 from .reports import working
 
 WIDTH = "Width of the cloth: no strip is wider, with its allowances."

@@ -24,23 +24,8 @@ from ..project.settings import check_names
 from ..project.writing import check_outputs, picture_job, surface_files, write_all
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments, reports
-from .arguments import (
-    OUTPUT,
-    TOML,
-    Cache,
-    FileUnits,
-    Input,
-    Shown,
-    Start,
-    ViewName,
-    Whole,
-    amount,
-    count,
-    load_project,
-    option,
-    parsed_unit,
-    switch,
-)
+from .arguments import OUTPUT, TOML, Cache, FileUnits, Input, Shown, Start, ViewName, Whole, load_project
+from .options import amount, count, option, parsed_unit, switch
 from .reports import working
 
 OUT = "File to write; its suffix selects the format."

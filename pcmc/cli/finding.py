@@ -12,7 +12,8 @@ from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
 from . import arguments, reports
-from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, count, load_project, option, switch
+from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, load_project
+from .options import count, option, switch
 from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."

@@ -14,34 +14,16 @@ from ..base import validate
 from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.libraries import require
-from ..io import FORMATS, READ_ONLY
+from ..io import FORMATS
 from ..project import Outcome, Project
 from ..project.drawn import files_of
 from ..project.file import with_rise
 from ..project.planning import proposal_text
 from ..project.settings import check_names
 from ..project.writing import check_outputs, surface_files, write_all
-from . import INTERRUPTED, NOT_CERTIFIED, OK, reports
-from .arguments import (
-    DXF,
-    MANY_FILES,
-    TOML,
-    UNCERTIFIED,
-    Cache,
-    FileUnits,
-    Input,
-    Loads,
-    MeshCheck,
-    Shown,
-    Whole,
-    amount,
-    count,
-    load_project,
-    named_values,
-    option,
-    output_of,
-    switch,
-)
+from . import INTERRUPTED, NOT_CERTIFIED, OK, arguments, reports
+from .arguments import MANY_FILES, READ, Cache, FileUnits, Input, Loads, MeshCheck, Shown, Uncertified, Whole
+from .options import amount, count, option, switch
 from .reports import sweeping, working
 
 if TYPE_CHECKING:
@@ -81,7 +63,7 @@ def solve_(
     apex: Annotated[float | None, amount("LENGTH", "The same, over the plane.")] = None,
     span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
-    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False,
+    allow_uncertified: Uncertified = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY)] = None,
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF)] = None,
     most_triangles: Annotated[int | None, count(MOST_TRIANGLES)] = None,
@@ -104,7 +86,7 @@ def solve_(
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
-    project = load_project(file, units).in_folder(file.parent if folder is None else folder)
+    project = arguments.load_project(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
     if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
@@ -169,7 +151,7 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        project = load_project(file)
+        project = arguments.load_project(file)
         if margin:  # unknown names are refused before the work
             from ..accuracy.varied import Varied  # takes long to import
 
@@ -207,9 +189,9 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
-    written = output_of(file, files=output)
+    written = arguments.output_of(file, files=output)
     with working() as progress:
-        project = load_project(file, units)
+        project = arguments.load_project(file, units)
         project = replace(project, output=replace(written, whole=project.output.whole))
         if solve:
             check = bool(project.mesh_check)
@@ -327,14 +309,14 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
     from ..sweep.solving import digest_of
 
     given: dict[str, list[Any]] = {}
-    for name, listed in map(named_values, values):
+    for name, listed in map(arguments.named_values, values):
         if name in given:
             raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
         given[name] = listed
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
     grid = grid or given  # one case, whose names are checked as those of any other
     fixed = {name: listed[0] for name, listed in given.items() if name not in grid}
-    if Path(what).suffix.lower() in (TOML, DXF, *FORMATS, *READ_ONLY):
+    if Path(what).suffix.lower() in READ:
         return project_sweep(what, grid, fixed, method=method, **options)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
