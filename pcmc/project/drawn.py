@@ -5,15 +5,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
-from ..base.arrays import toml
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
 from ..base.files import PathLike, as_path, check_name, check_regular
 from ..base.units import LENGTHS
+from ..plan.plan import Chosen
 from .checking import in_file
 
 if TYPE_CHECKING:
@@ -56,65 +55,6 @@ def files_of(path: PathLike) -> list[Path]:
     return [path]
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """What neither a project nor its drawing says: tensions of patches, walls and cables, edge length."""
-
-    tensions: Mapping[str, float] = field(default_factory=dict)
-    walls: Mapping[str, float] = field(default_factory=dict)
-    edge_length: float | None = None
-    cables: Mapping[str, float] = field(default_factory=dict)  # that of the outline has no name
-
-    @classmethod
-    def of(cls, given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing) -> Chosen:
-        """What the ``full`` plan of a drawing has beyond the ``given`` one and the drawing."""
-
-        def named(key: str, has: str) -> set[str]:
-            entries = (entry for entry in given.get(key, []) if isinstance(entry, Mapping))
-            return {entry["name"] for entry in entries if has in entry and "name" in entry}
-
-        labelled = {label.name for label in drawing.labels if label.tension is not None}
-        labelled |= {name for name, values in given.get("patches", {}).items() if "tension" in values}
-        patches = {} if "tension" in given else full["patches"]
-        own = (e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers)
-        walls = {entry["name"]: entry["wall"] for entry in own if entry["wall"] is not False}
-        cables = {e["name"]: e["tension"] for e in full.get("cables", []) if e.get("name") in drawing.cables}
-        outline = {"": full["cable"]} if "cable" in full and "cable" not in given else {}
-        return cls(
-            {name: patch["tension"] for name, patch in patches.items() if name not in labelled},
-            {name: wall for name, wall in walls.items() if name not in named("dividers", "wall")},
-            None if "edge_length" in given else full["edge_length"],
-            outline | {name: t for name, t in cables.items() if name not in named("cables", "tension")},
-        )
-
-    @property
-    def text(self) -> str:
-        """All of it in a line, with what to type to choose; empty if nothing was proposed.
-
-        >>> Chosen({"nave": 5.4}, {"chancel": 1.6}).text.split(" (")[0]
-        "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
-        """
-        named = next(iter(self.cables), "")  # the outline's cable has none
-        cable = "[[plan.cables]] name = {}, tension = ..." if named else "cable = ... under [plan]"
-        kinds = {
-            "tension": (self.tensions, "{} = {{tension = ...}} under [plan.patches]"),
-            "wall": (self.walls, "[[plan.dividers]] name = {}, wall = ..."),
-            "cable": (self.cables, cable),
-        }
-        parts, keys = [], []
-        for what, (values, key) in kinds.items():
-            groups: dict[float, list[str]] = {}  # the names of each value
-            for name, value in values.items():
-                groups.setdefault(value, []).append(repr(name) if name else "the outline")
-            parts += [f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items()]
-            keys += [key.format(toml(name)) for name in list(values)[:1]]
-        if self.edge_length is not None:
-            parts.append(f"edges of {self.edge_length:g}")
-            keys.append("edge_length = ... under [plan]")
-        text = f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
-        return text if parts else ""
-
-
 def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
     """The data of a project with its drawing's lines and what is proposed; the drawing; what was chosen.
 
@@ -135,13 +75,13 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     from ..plan.proposal import proposed
 
     try:
-        lines = proposed(drawing, plan)
+        lines, chosen = proposed(drawing, plan)
     except OptionError as error:
         raise error.in_file(path, FileError) from None
     full = {**data, "plan": lines} | ({"units": drawing.units} if drawing.units else {})
     if len(drawing.heights) and "targets" not in data:
         full["targets"] = {"meet": height_targets(drawing), "vary": list(lines["patches"])}
-    return full, drawing, Chosen.of(plan, lines, drawing)
+    return full, drawing, chosen
 
 
 def height_targets(drawing: Drawing) -> list[dict[str, Any]]:

@@ -19,8 +19,8 @@ from pcmc.advice.advice import changes, firmer_walls, flatter, lower_lines
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.explore.roof import ShownRoof
 from pcmc.plan import Divider, PatchSpec, Plan
+from pcmc.plan.plan import Chosen
 from pcmc.project import firmer, load, run_project
-from pcmc.project.drawn import Chosen
 
 HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
 SEAM = "curve = [[6, 0], [6, 6]]\n"
