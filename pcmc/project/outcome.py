@@ -163,10 +163,8 @@ class Outcome:
         """How the solver ended, and the verdict's detail; without the hint for a strained junction that the
         advice takes the place of."""
         message, detail = self.solved.message, self.certificate.detail
-        if self.advice:
-            strained = strained_junction(self.surface)
-            if strained is not None:
-                message, detail = (text.replace(strained.hint, "") for text in (message, detail))
+        if self.advice and (strained := strained_junction(self.surface)) is not None:
+            message, detail = (text.replace(strained.hint, "") for text in (message, detail))
         return message, detail
 
     @property
@@ -192,7 +190,7 @@ class Outcome:
 
     @property
     def name(self) -> str:
-        """The name of the roof: of its file, without suffix."""
+        """The name of its file, without suffix."""
         return "" if self.project is None else self.project.path.stem
 
     @property
@@ -214,9 +212,9 @@ class Outcome:
         from ..panelling import panels
 
         surface, certificate = self.shown
-        options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
-        sort = partial(panels, surface, tolerance, **options, certificate=certificate)
-        return self._once(("panels", tolerance, mirror_images, walls), sort)
+        how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
+        sort = partial(panels, surface, tolerance, **how, anyway=anyway, certificate=certificate)
+        return self._once(("panels", tolerance, *how.values()), sort)
 
     def fewer_families(self, tolerance: float, change: float, **options: Any) -> FewerFamilies:
         """What is shown with fewer families of panels; see ``pcmc.fewer_families``."""
@@ -296,14 +294,15 @@ class Outcome:
         from ..cloth import cutting_pattern_of
 
         surface, certificate = self.shown
-        project = self.project
+        project, cloth = self.project, wanted
         structure = None if project is None else project.structure
-        own, cloth = project is not None and wanted is project.pattern, wanted
         if self.unfold:
             cloth = wanted.of_whole(self.surface, surface)
             structure = structure and structure.of_whole(self.surface, surface, None)
-        cloth = of_material(cloth, structure, surface)
-        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
+        cut = partial(
+            cutting_pattern_of, surface, of_material(cloth, structure, surface), anyway, certificate
+        )
+        own = project is not None and wanted is project.pattern
         return self._once("cutting pattern", cut) if own else cut()
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:

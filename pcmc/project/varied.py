@@ -136,14 +136,15 @@ class _Source(NamedTuple):
         data: Any = deepcopy(self.data)
         shifts: dict[str, dict[str, float]] = {}
         for name, value in values.items():
-            stem, _, last = name.rpartition(".")
             if name in self.keys:
+                *steps, key = self.keys[name]
                 table = data
-                for step in self.keys[name][:-1]:
+                for step in steps:
                     table = table.setdefault(step, {}) if isinstance(step, str) else table[step]
-                table[self.keys[name][-1]] = value
+                table[key] = value
             elif not self.is_load(name):
-                shifts.setdefault(stem, {})[last] = value
+                stem, _, axis = name.rpartition(".")
+                shifts.setdefault(stem, {})[axis] = value
         return project_of(self.path, data, self.text, partial(shifted, shifts=shifts))
 
     def loaded(self, surface: Surface, values: Mapping[str, float]) -> Surface:
@@ -157,10 +158,9 @@ class _Source(NamedTuple):
             known |= {f"{name}.{KINDS[kind][1]}": (kind, name) for name in named}
         given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for name in filter(self.is_load, values):
-            if name not in known:
-                # no coordinates, and patches have shorter names
+            if name not in known:  # shows no coordinates but one that is near; patches have shorter names
                 keys = [k for k, at in self.keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
-                near = get_close_matches(name, self.keys, n=1, cutoff=0.8)  # a coordinate, perhaps
+                near = get_close_matches(name, self.keys, n=1, cutoff=0.8)
                 names = tuple(dict.fromkeys([*known, *keys, *near]))
                 raise OptionError(f"{self.path}: {unknown('number', name, names)}", what=name, expected=names)
             kind, part = known[name]

@@ -83,9 +83,10 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     members of the project.
     """
     paths = [*map(Path, files)]
-    members = members_filed(outcome) if any(map(_holds_members, paths)) else {}
+    holding = {path: io.FORMATS[path.suffix.lower()].members for path in paths}
+    members = members_filed(outcome) if any(holding.values()) else {}
     for held in (True, False):
-        if some := [path.name for path in paths if _holds_members(path) == held]:
+        if some := [path.name for path in paths if holding[path] == held]:
             warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
         return certified_files(*outcome.shown, paths, outcome.units, colour, members, outcome.mark)
@@ -96,14 +97,8 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         place = {half.m: unfold.face, half.n: unfold.vertex}
         carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
         about |= {"scalars": carried, "certificate": None}
-    writes = {path: partial(io.write, surface=outcome.shown.surface, **about) for path in paths}
-    return [
-        (path, partial(write, **members) if _holds_members(path) else write) for path, write in writes.items()
-    ]
-
-
-def _holds_members(path: Path) -> bool:
-    return io.FORMATS[path.suffix.lower()].members
+    write = partial(io.write, surface=outcome.shown.surface, **about)
+    return [(path, partial(write, **members) if holding[path] else write) for path in paths]
 
 
 def certified_files(
@@ -169,8 +164,7 @@ def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
 
     curves = {"surfaces on the way": costs, "the cheapest": costs[costs["cheapest"]]}
     pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
-    look: dict[str, Any] = {"x": "change of shape, length", "y": "cost", "markers": True}
-    draw = partial(lines, pairs, **look)
+    draw = partial(lines, pairs, x="change of shape, length", y="cost", markers=True)
     return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), draw), strict=True))
 
 
@@ -232,14 +226,12 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: It
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
         check_name(path)
-        place = os.path.normcase(path.resolve())
-        folder = path.parent
+        place, folder, problem = os.path.normcase(path.resolve()), path.parent, None
         try:
             is_folder = path.is_dir()
             there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
         except OSError as error:  # a name that is too long
             raise system_error(path, "written", error) from None
-        problem = None
         if is_folder:
             problem = "is a folder; give the name of a file"
         elif path.exists() and any(path.samefile(one) for one in read):

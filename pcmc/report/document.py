@@ -26,10 +26,11 @@ from . import tables
 from .chapters import PIXELS, at_rest_chapter, cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
+from .words import ERROR_BARS, LEGEND, about_forces, panel_text, sentence, verdict_sentences
 
 if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
+    from ..accuracy import Margin, MeshCheck
+    from ..certificate.theorem import Theorem
     from ..cloth import CuttingPattern
     from ..structure import Analysis, StructuralModel
 
@@ -51,9 +52,9 @@ class RoofReport:
     date: str = ""  # in their foot
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
-    theorem: Statement | None = None
+    theorem: Theorem | None = None
     targets: pd.DataFrame | None = None
-    margins: Sequence[Statement] = ()
+    margins: Sequence[Margin] = ()
     analysis: Analysis | None = None
     model: StructuralModel | None = None
     pattern: CuttingPattern | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
@@ -12,13 +12,7 @@ from .tables import MOST_FAMILIES, one, small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-
-
-class Statement(Protocol):
-    """A statement about a roof in one sentence, such as a theorem or a margin."""
-
-    def text(self, units: Units) -> str:
-        """The sentence."""
+    from ..certificate.theorem import Theorem
 
 
 VERDICTS = {
@@ -50,7 +44,7 @@ ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes
 def verdict_sentences(
     certificate: Certificate,
     check: MeshCheck | None = None,
-    theorem: Statement | None = None,
+    theorem: Theorem | None = None,
     units: Units = NO_UNITS,
 ) -> list[str]:
     """The verdict, its reason, and how exactly the roof keeps what it promises.
