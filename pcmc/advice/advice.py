@@ -247,6 +247,5 @@ def _shown(value: Any) -> str:
 
 
 def _is_wall_of(divider: Divider, name: str) -> bool:
-    """Whether a patch is the wall of a divider, or a part of it."""
     stem, dash, number = name.rpartition("-")
     return name == divider.name or (bool(dash) and stem == divider.name and number.isdigit())

@@ -148,7 +148,6 @@ def net_pressures(plan: Plan) -> dict[str, float]:
 
 
 def _retensioned(plan: Plan, patch: str | None, least: float, rise: float) -> Plan:
-    """The plan with the first tension for a rise, of a patch or of all."""
     if plan.tension is not None:
         return replace(plan, tension=first_tension(least, net_pressures(plan)[""], rise))
     first = {name: first_tension(least, pressure, rise) for name, pressure in net_pressures(plan).items()}

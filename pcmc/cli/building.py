@@ -158,7 +158,6 @@ def _net(
     build: Build,
     wanted: tuple[float, str, float],
 ) -> int:
-    """Lay out quads or hexagons and write them."""
     for path in files:
         suffix_of(path, NETS, "a net of panels")
     size, pattern, direction = wanted

@@ -150,7 +150,6 @@ def explore(
 
 
 def _example(name: str, parameters: dict[str, Any]) -> Surface:
-    """The surface of a generator, named 'two_caps' or 'package.module:function'."""
     from ..sweep.case_script import resolve
 
     try:

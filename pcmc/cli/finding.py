@@ -84,5 +84,4 @@ def equilibria_(
 
 
 def _numbered(path: Path, number: int) -> Path:
-    """The file of an equilibrium."""
     return path.with_name(f"{path.stem}-{number}{path.suffix}")

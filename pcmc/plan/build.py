@@ -149,7 +149,6 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
 
 
 def _supports(draft: Draft) -> tuple[Bools, Bools]:
-    """(n,) fixed and sliding vertices."""
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
     lines = [c.vertices for c in draft.drawn.chains if draft.lines[c.line].kind is Kind.SUPPORT]
     for vertices in (draft.edges.vertices("fixed", "held", "inside"), draft.drawn.required, *lines):
@@ -192,7 +191,6 @@ def _warn_of_free_edges(draft: Draft, held: Bools) -> None:
 
 
 def _cables(draft: Draft, held: Bools) -> list[Cable]:
-    """The cables of the edges, and those along dividers."""
     numbers = count(1)
     cables = edge_cables(draft.edges, held, numbers)
     for number, d in enumerate(draft.plan.dividers):
@@ -235,7 +233,6 @@ def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
 
 
 def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> Ints:
-    """(p,) the patch that each part of the plan belongs to."""
     owner = np.full(len(centroid), -1)
     for number, spec in enumerate(specs):
         points = np.atleast_2d(np.array(spec.at, dtype=float))

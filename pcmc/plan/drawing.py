@@ -98,7 +98,6 @@ class _Reader:
         self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= ON * self.size else 0.0
 
     def layers_of(self, role: str) -> list[tuple[Layer, list[Stroke]]]:
-        """The layers of a role with their strokes."""
         parsed = [(layer_of(name), strokes) for name, strokes in self.by_layer.items()]
         return [(layer, strokes) for layer, strokes in parsed if layer is not None and layer.role == role]
 
@@ -121,7 +120,6 @@ class _Reader:
         return PlanError(text, what="outline", found=counts, expected=reading.UNDERSTOOD)
 
     def drawing(self, path: Path) -> Drawing:
-        """All parts, each checked."""
         loops = self._loops(self.edge)
         if len(loops) > 1:
             ends = ", ".join(f"{listed(loop.labels)} at {point_text(loop.ends[0])}" for loop in loops[:3])
@@ -182,7 +180,6 @@ class _Reader:
         )
 
     def _joined(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
-        """The paths of a layer; what was changed is noted."""
         paths, notes = join_strokes(strokes, self.gap)
         self.notes += notes
         return paths
@@ -241,7 +238,6 @@ class _Reader:
         return list(curves)[before:]
 
     def _masts(self, holes: dict[str, Curve]) -> list[Floats]:
-        """The tops of masts; rings are added to the holes."""
         tops: list[Floats] = []
 
         def rings(strokes: Sequence[Stroke]) -> list[JoinedPath]:

@@ -252,7 +252,6 @@ def edge_cable(part: Any, what: str) -> dict[str, Any]:
 
 
 def _cable(part: Any, what: str) -> dict[str, Any]:
-    """The tension and the weight of the cable along a line, checked."""
     given, weight = part.cable, validate.number("cable_weight", part.cable_weight, where=what)
     cable = None if given is None else validate.number("cable", given, least=0.0, where=what)
     if weight and not cable:

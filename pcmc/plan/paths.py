@@ -91,7 +91,6 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
 
 
 def _ends(curve: Curve) -> Floats:
-    """(2,3) the first and the last point."""
     return curve.at([0.0, float(len(curve.pieces))])
 
 

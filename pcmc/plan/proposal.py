@@ -304,7 +304,6 @@ def _as_points(at: Any) -> list[Any]:
 
 
 def _parts_at(parts: Sequence[Part], at: Any) -> list[Part]:
-    """The parts that have one of the points of a patch."""
     inside = [shapely.contains_xy(part.area, *np.transpose(_as_points(at))).any() for part in parts]
     return list(compress(parts, inside))
 

@@ -97,7 +97,6 @@ def _with_blocks(entities: Any, layer: str | None, depth: int) -> Iterator[tuple
 
 
 def _dxf_pieces(kind: str, entity: Any) -> list[tuple[Any, ...]] | None:
-    """The pieces of a curve; None for another entity."""
     from ezdxf.entities import Ellipse
 
     if kind == "LINE":

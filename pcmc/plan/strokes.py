@@ -114,7 +114,6 @@ def _coordinates(points: Any, layer: str, place: str) -> Floats:
 
 
 def _pieces(raw: tuple[Any, ...], layer: str, place: str) -> list[Piece]:
-    """The pieces of a raw piece of ``reading_drawings``."""
     kind, *values = raw
     if kind != "nurbs":
         return [Piece(_coordinates(values[0], layer, place), float(values[1]) if kind == "arc" else 0.0)]

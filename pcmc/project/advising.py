@@ -179,6 +179,5 @@ def _tried(
 
 
 def _holds(roof: Outcome, step: OnStep = ignore) -> bool:
-    """Whether finer meshes hold a roof."""
     check = roof.check_mesh(step)
     return check is not None and check.persists

@@ -137,7 +137,6 @@ def _path(project: Project) -> Path | None:
 
 @cache
 def _program() -> str:
-    """The version of pcmc, and the time of its newest file for those who change it."""
     newest = max(path.stat().st_mtime_ns for path in Path(__file__).parents[1].rglob("*.py"))
     return f"pcmc {version('pcmc-surfaces')} {newest}\n"
 

@@ -54,7 +54,6 @@ def check_project_keys(text: str, data: Mapping[str, Any]) -> None:
 
 
 def _check_range(text: str, value: Any, place: Place) -> None:
-    """Refuse integers beyond the range of floats, wherever they are."""
     if isinstance(value, Mapping):
         for name, item in value.items():
             _check_range(text, item, (*place, name))

@@ -315,7 +315,6 @@ def _output(table: Mapping[str, Any]) -> Output:
 
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], list[Parameter]]:
-    """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
     if "tolerance" in table:
@@ -336,7 +335,6 @@ def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], 
 
 
 def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
-    """Refuse a tension that both a rise and [targets] find."""
     for rise in rises:
         own = ([area.name for area in plan.patches] or ["patch 1"]) if rise.patch is None else [rise.patch]
         both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]

@@ -372,7 +372,6 @@ def json_schema() -> Schema:
 
 
 def _table(name: str) -> Schema:
-    """The schema of a section, with those below it."""
     known = [section for section in sections() if section.name == name]
     keys = [*(key for section in known for key in section.keys), *(CURVE.keys if name in OR_CURVE else ())]
     properties: Schema = {}
@@ -390,7 +389,6 @@ def _table(name: str) -> Schema:
 
 
 def _filled(schema: Schema, table: Schema) -> Schema:
-    """The schema of a kind, with the keys of the tables in it."""
     if schema == TABLE:
         return table
     parts: Schema = {key: _filled(value, table) for key, value in schema.items() if key == "items"}

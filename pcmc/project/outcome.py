@@ -199,7 +199,6 @@ class Outcome:
         return Output() if self.project is None else self.project.output
 
     def _once(self, key: Any, compute: Callable[[], Finding]) -> Finding:
-        """A finding about what is shown, computed the first time."""
         key = (self.unfold, key)
         if key not in self._known:
             self._known[key] = compute()
@@ -266,7 +265,6 @@ class Outcome:
         )
 
     def _about(self, output: Output, anyway: bool) -> dict[str, Any]:
-        """What drawings and report have in common."""
         tolerance = output.tolerance
         return {
             "name": self.name,
@@ -386,8 +384,6 @@ class Outcome:
 
 
 def _reporter(what: str, progress: OnStep | None) -> Callable[[Progress], None]:
-    """A solver's callback that reports its mesh and step."""
-
     def callback(state: Progress) -> None:
         if progress is not None:
             progress(f"{what}: {state.surface().m} triangles, step {state.iteration}")

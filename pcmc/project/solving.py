@@ -163,7 +163,6 @@ def _certified(result: Result, report: OnStep, stopped: bool, **found: Any) -> O
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    """Solve on finer and finer meshes, and certify."""
     from ..accuracy import AccuracyStatus, solve_to_accuracy
 
     def callback(row: Mapping[str, Any]) -> None:

@@ -115,7 +115,6 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
 
 
 def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
-    """(n,) the vertices that the supports of a project fix."""
     X, boundary = surface.vertices, np.zeros(surface.n, dtype=bool)
     outer = surface.topology.boundary_edge & ~surface.mirror_edge  # at a mirror the roof goes on
     boundary[surface.topology.edges[outer]] = True

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..advice.rises import RISES, WHOLE
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
@@ -37,7 +37,7 @@ def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
     rooms of given volume and of walls, snow of walls.
     """
     values, lower = all_values(surface), {*sheets_below(surface).values()}
-    computed = lower | _names(surface, surface.room_signs.any(axis=0) | surface.walls)
+    computed = lower | {p.name for p in surface.patches if p.wall} | _of_rooms(surface)
     points = surface.vertices[single_points(surface)].tolist()
     return {
         **values,
@@ -71,20 +71,16 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
     }
 
 
-def _names(surface: Surface, chosen: Bools) -> set[str]:
-    """The names of the patches (k,) chosen."""
-    return {surface.patches[k].name for k in np.flatnonzero(chosen)}
+def _of_rooms(surface: Surface) -> set[str]:
+    """The names of the patches whose pressure keeps a volume."""
+    return {surface.patches[k].name for k in np.flatnonzero(surface.room_signs.any(axis=0))}
 
 
 def _by_name(surface: Surface) -> dict[Name, float]:
     """Every value by kind and name, also the pressures of walls; not the pressures that are results."""
-    computed = _names(surface, np.asarray(surface.room_signs.any(axis=0)))  # of rooms with a volume
-    values = {
-        (kind, name): value
-        for kind, named in all_values(surface).items()
-        for name, value in named.items()
-        if kind != "pressures" or name not in computed
-    }
+    values = {(kind, name): v for kind, own in all_values(surface).items() for name, v in own.items()}
+    for name in _of_rooms(surface):
+        del values["pressures", name]
     for name, place in changeable_values(surface)["points"].items():
         values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
     return values
@@ -198,7 +194,6 @@ class _Writer(NamedTuple):
                 self.write_patches(KEYS[kind], wanted, shared)
 
     def write_points(self, names: Collection[str]) -> None:
-        """Points that hold the roof, in all lines through them."""
         for name in names:
             places = (changeable_values(surface)["points"][name] for surface in (self.start, self.asked))
             old, new = (self.asked.plane.to_local(np.array([place]))[0] for place in places)

@@ -198,7 +198,6 @@ def numbers_by_name(data: Mapping[str, Any]) -> dict[str, KeyPath]:
 
 
 def _items(value: Any, names: tuple[str, ...], path: KeyPath) -> Iterator[Item]:
-    """All that is in a table or list."""
     for key, item in value.items() if isinstance(value, Mapping) else enumerate(value):
         named = item.get("name") if isinstance(item, Mapping) and isinstance(key, int) else None
         own = key if isinstance(key, str) else named if isinstance(named, str) else str(key + 1)

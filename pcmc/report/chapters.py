@@ -91,7 +91,6 @@ def at_rest_chapter(model: StructuralModel, units: Units) -> Iterator[Block]:
 
 
 def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Iterator[Block]:
-    """The forces of columns and stays, and what they leave to others."""
     if not len(table):
         return
     profiles = {bar.name: bar.member.profile for bar in model.bars}
@@ -108,7 +107,6 @@ def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Itera
 
 
 def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *pictures: bytes) -> Iterator[Block]:
-    """What the members are, the forces along them, and what they carry at rest."""
     if not len(table):
         return
     force, length, beams = units.force or "force", units.length, model.beams

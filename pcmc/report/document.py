@@ -81,7 +81,6 @@ class RoofReport:
         return pdf(list(self._blocks()), title, foot, self.certificate.mark or MISSED * missed)
 
     def _blocks(self) -> Iterator[Block]:
-        """All that the pages hold, in order."""
         surface, certificate, units = self.surface, self.certificate, self.units
         yield Heading("Verdict")
         yield from verdict_sentences(certificate, self.mesh_check, self.theorem, units)

@@ -83,7 +83,6 @@ def _draw_frame(canvas: Any, title: str, foot: str, mark: str, number: str) -> N
 
 
 def _cut(text: str, width: float) -> str:
-    """The text, shortened to a width in points."""
     end = len(text)
     while end and stringWidth(text[:end] + "…", FONT, 8.0) > width:
         end -= 1
@@ -91,7 +90,6 @@ def _cut(text: str, width: float) -> str:
 
 
 def _flowables(block: Block) -> list[Any]:
-    """What reportlab lays out for a block."""
     if isinstance(block, Heading):
         return [*([PageBreak()] if block.new_page else []), _paragraph(block.text, HEADING)]
     if isinstance(block, str):
