@@ -222,10 +222,8 @@ def point_masts(plan: Plan) -> list[Mast]:
         return []
     curves = [s for s in plan.supports if isinstance(s, Curve)]
     curves += [part.curve for parts in (plan.holes, plan.dividers) for part in parts]
-    lines, mirrors = (
-        [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in some]
-        for some in (curves, plan.mirrors)
-    )
+    every = [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in (*curves, *plan.mirrors)]
+    lines, mirrors = every[: len(curves)], every[len(curves) :]
     points = np.array([plan.plane.to_local(p) if len(p) == 3 else np.append(p, 0.0) for p in given.values()])
     snap, places = SNAP * plan.edge_length, shapely.points(points[:, :2])
     rim = PlanLine("outline", Kind.OUTLINE, plan.outline.local(plan.plane)).shape

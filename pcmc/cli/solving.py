@@ -98,16 +98,11 @@ def solve_(
         options["target"] = target
     given: dict[str, Any] = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
     given["accuracy"] = ", ".join(accuracy) if accuracy else None
-    project = replace(
-        project,
-        method=method or project.method,
-        options=options,
-        wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
-        mesh_check=project.mesh_check if mesh_check is None else mesh_check,
-        verify=verify or project.verify,
-        swap=swap or (),
-        output=own,
-    )
+    wanted = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
+    asked: dict[str, Any] = {"method": method or project.method, "options": options, "wanted": wanted}
+    asked |= {"verify": verify or project.verify, "swap": swap or (), "output": own}
+    asked["mesh_check"] = project.mesh_check if mesh_check is None else mesh_check
+    project = replace(project, **asked)
     if project.specified and not project.has_file:  # a drawing alone
         print(proposal_text(project))
     with working() as progress:

@@ -158,26 +158,15 @@ class _Reader:
         heights = reading.heights_of(texts, self.content.unit, self.units)
         labels = reading.labels_of(self.layers_of("patch"))
         self._note_rest(outline)
-        return Drawing(
-            path=path,
-            unit=self.content.unit,
-            units=self.units,
-            outline=self._on_plane(outline),
-            dividers={name: _projected(curve) for name, curve in dividers.items()},
-            holes={name: self._on_plane(curve) for name, curve in holes.items()},
-            supports=[s if isinstance(s, np.ndarray) else self._on_plane(s) for s in places],
-            heights=heights,
-            labels=labels,
-            level=self.level,
-            gap=self.gap,
-            layers=self.layers,
-            upright=upright,
-            ridges=ridges,
-            cables={name: _projected(curve) for name, curve in cables.items()},
-            mirrors=[_projected(curve) for curve in mirrors.values()],
-            loose=loose,
-            notes=tuple(self.notes),
-        )
+        parts: dict[str, Any] = {"outline": self._on_plane(outline), "upright": upright, "ridges": ridges}
+        parts["dividers"] = {name: _projected(curve) for name, curve in dividers.items()}
+        parts["cables"] = {name: _projected(curve) for name, curve in cables.items()}
+        parts["mirrors"] = [_projected(curve) for curve in mirrors.values()]
+        parts["holes"] = {name: self._on_plane(curve) for name, curve in holes.items()}
+        parts["supports"] = [s if isinstance(s, np.ndarray) else self._on_plane(s) for s in places]
+        parts |= {"heights": heights, "labels": labels, "layers": self.layers, "loose": loose}
+        parts |= {"level": self.level, "gap": self.gap, "notes": tuple(self.notes)}
+        return Drawing(path, self.content.unit, self.units, **parts)
 
     def _joined(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
         paths, notes = join_strokes(strokes, self.gap)

@@ -108,11 +108,9 @@ def least_tensions(plan: Plan, whole: float) -> dict[str, float]:
 
 def plan_area(plan: Plan) -> Any:
     """The whole plan on Π without its holes, as a polygon; small level holes are filled."""
-    holes, mirrors = (
-        [curve.local(plan.plane) for curve in curves]
-        for curves in ([hole.curve for hole in plan.holes], plan.mirrors)
-    )
-    return _unfolded(_roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE), mirrors)
+    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
+    area = _roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
+    return _unfolded(area, [mirror.local(plan.plane) for mirror in plan.mirrors])
 
 
 def _unfolded(area: Any, mirrors: Sequence[Curve]) -> Any:

@@ -243,26 +243,19 @@ class Outcome:
         from ..report import roof_report
         from .members import model_with_members, warn_of_members
 
-        analysis, project = self.analysis(anyway), self.project
-        wanted = None if project is None else project.pattern
-        if analysis is None:
+        about, project = self._about(output, anyway), self.project
+        about |= {"mesh_check": self.mesh_check, "mesh_failure": self.mesh_failure, "margins": self.margins}
+        about |= {"files": files, "date": output.date, "figures": self.figures}
+        if self.design is not None:
+            about["targets"] = self.design.targets
+        if project is not None and project.verify:
+            about["theorem"] = self.theorem
+        if project is not None and project.pattern is not None:
+            about["pattern"] = self.cutting_pattern(project.pattern, anyway)
+        if (analysis := self.analysis(anyway)) is None:
             warn_of_members(self, "report", held=True)
-        return roof_report(
-            self.shown.surface,
-            self.units,
-            **self._about(output, anyway),
-            mesh_check=self.mesh_check,
-            mesh_failure=self.mesh_failure,
-            margins=self.margins,
-            analysis=analysis,
-            model=model_with_members(self) if analysis is None else None,
-            pattern=None if wanted is None else self.cutting_pattern(wanted, anyway),
-            theorem=self.theorem if project is not None and project.verify else None,
-            targets=None if self.design is None else self.design.targets,
-            files=files,
-            date=output.date,
-            figures=self.figures,
-        )
+            about["model"] = model_with_members(self)
+        return roof_report(self.shown.surface, self.units, **about, analysis=analysis)
 
     def _about(self, output: Output, anyway: bool) -> dict[str, Any]:
         tolerance = output.tolerance

@@ -97,14 +97,9 @@ def _text(drawing: Drawing, values: Mapping[str, Any], name: str, gap: float | N
     if len(drawing.heights) and not name:
         lines += ["", "[targets]", f"meet = {_list(height_targets(drawing))}"]
         lines.append(f"vary = {toml(list(values['patches']))} # the tensions that may change for it")
-    stem = drawing.path.stem
-    lines += [
-        "",
-        "[output]",
-        f"files = {toml([f'{stem}-roof.3dm'])}",
-        f"picture = {toml(f'{stem}-roof.png')}",
-    ]
-    return "\n".join([*lines, ""])
+    roof = f"{drawing.path.stem}-roof"
+    lines += ["", "[output]", f"files = {toml([f'{roof}.3dm'])}", f"picture = {toml(f'{roof}.png')}", ""]
+    return "\n".join(lines)
 
 
 def proposal_text(project: Project) -> str:

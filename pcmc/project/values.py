@@ -64,11 +64,8 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
         text = f"the project makes other parts than the surface has: {', '.join(names[:5])}"
         raise OptionError(text, what="surface", found=names)
     most = {kind: max(abs(theirs[key]) for key in theirs if key[0] == kind) for kind, _ in theirs}
-    return {
-        key: value
-        for key, value in theirs.items()
-        if key not in left and abs(value - ours[key]) > SAME * most[key[0]]
-    }
+    asked_for = ((key, value) for key, value in theirs.items() if key not in left)
+    return {key: value for key, value in asked_for if abs(value - ours[key]) > SAME * most[key[0]]}
 
 
 def _of_rooms(surface: Surface) -> set[str]:
@@ -174,11 +171,8 @@ class _Writer(NamedTuple):
     def write(self, values: Mapping[Name, float], shared: bool) -> None:
         """Write values; if ``shared``, one for all patches where all have the same."""
         walls = {p.name for p in self.asked.patches if p.wall}
-        lines = {
-            key: value
-            for key, value in values.items()
-            if key[0] in ("cables", "cable_weights") or key[1] in walls
-        }
+        kinds = ("cables", "cable_weights")
+        lines = {key: value for key, value in values.items() if key[0] in kinds or key[1] in walls}
         if lines:
             self.write_lines(lines)
         for kind in dict.fromkeys(kind for kind, _ in values):

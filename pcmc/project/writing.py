@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from .. import io
-from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, PcmcError
 from ..base.files import PathLike, atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
@@ -113,11 +112,8 @@ def certified_files(
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
     relative curvature error, size of the reactions at supports (force), and ``members_filed``; with the
     ``mark`` where the certificate has none."""
-    scalars: dict[str, Floats] = {
-        "mean curvature": mean_curvature(surface),
-        "error": curvature_error(surface),
-        "reaction": np.linalg.norm(certificate.reactions, axis=1),
-    }
+    scalars = {"mean curvature": mean_curvature(surface), "error": curvature_error(surface)}
+    scalars["reaction"] = np.linalg.norm(certificate.reactions, axis=1)
     jobs: FileJobs = []
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]

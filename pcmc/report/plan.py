@@ -53,11 +53,9 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
         curves = zip(certificate.acting.standing.topology.junctions, middles, strict=True)
         labels = [(f"J{k}", at, curve.vertices, "PCMC-RIDGE") for k, (curve, at) in enumerate(curves, 1)]
     labels += [(name, at, on, "PCMC-SUPPORT") for (name, on), at in zip(own, supports, strict=True)]
-    names = [
-        Text(factor * _beside(surface, at, on) + shift, name, layer=layer, align="C")
-        for name, at, on, layer in labels
-    ]
-    texts += place_labels(names, texts)
+    places = [factor * _beside(surface, at, on) + shift for _, at, on, _ in labels]
+    named = zip(labels, places, strict=True)
+    texts += place_labels([Text(at, name, layer=layer, align="C") for (name, *_, layer), at in named], texts)
     return on_paper(sheet.scale, lines, texts)
 
 

@@ -137,25 +137,18 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
 
 def target_table(targets: pd.DataFrame, units: Units) -> Table:
     """What was wanted, and what is reached."""
-    columns: Columns = {
-        "wanted": map(one, targets["wanted"]),
-        "reached": map(one, targets["value"]),
-        "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
-        "met": ["yes" if met else "no" for met in targets["met"]],
-    }
+    columns: Columns = {"wanted": map(one, targets["wanted"]), "reached": map(one, targets["value"])}
+    columns["unit"] = [units.behind(dimension).strip() for dimension in targets["dimension"]]
+    columns["met"] = ["yes" if met else "no" for met in targets["met"]]
     return text_table("Targets", {"quantity": targets.index}, columns)
 
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
     table = check.table
-    columns: Columns = {
-        "on this mesh": map(one, table["value"]),
-        "error bar": map(_bar, table["error"]),
-        "limit": map(one, table["limit"]),
-        "its error bar": map(_bar, table["limit_error"]),
-        "unit": [units.behind(dimension_of(quantity)).strip() for quantity in table["quantity"]],
-    }
+    columns: Columns = {"on this mesh": map(one, table["value"]), "error bar": map(_bar, table["error"])}
+    columns |= {"limit": map(one, table["limit"]), "its error bar": map(_bar, table["limit_error"])}
+    columns["unit"] = [units.behind(dimension_of(quantity)).strip() for quantity in table["quantity"]]
     return text_table("", {"quantity": table["quantity"], "of": table["of"]}, columns)
 
 
