@@ -256,8 +256,7 @@ def project_of(
         structure = Structure(**data["structure"]) if "structure" in data else None
         pattern = section_of(CuttingOptions, "pattern", data["pattern"]) if "pattern" in data else None
         output.check(units, structure, pattern)
-        values |= {"output": output, "units": units, "drawing": drawing}
-        values |= {"structure": structure, "pattern": pattern}
+        values |= {"output": output, "units": units, "structure": structure, "pattern": pattern}
         stages = stages if isinstance(stages, list) else [stages]
         values["remeshing"] = [section_of(Remeshing, "remesh", stage) for stage in stages]
         plan, targets, vary = None, list["Target"](), list["Parameter"]()
@@ -289,7 +288,7 @@ def project_of(
                 _check_sought_once(rises, sought, plan)
             targets, vary = [*own, *targets], [*sought, *vary]
             values["target_tolerance"] = data["targets"].get("tolerance")
-        values |= {"targets": targets, "vary": vary, "rises": rises, "chosen": chosen}
+        values |= {"targets": targets, "vary": vary, "rises": rises, "chosen": chosen, "drawing": drawing}
         return Project(path, plan, mesh, text, given, **values)
 
 
@@ -324,29 +323,27 @@ def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], 
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     points, targets = {} if plan is None else plan.points, []
     for entry in table["meet"]:
-        name, place = entry.get("of"), {}
+        name = entry.get("of")
         if entry["quantity"] == "height" and isinstance(name, str):
             if name not in points:
                 text = f"targets.meet: {unknown('point', name, points)}; name it in [plan.points]"
                 raise OptionError(text, what="targets.meet", found=name)
-            place = {"of": points[name], "name": name}
-        targets.append(Target(**{**entry, **place}))
+            entry = {**entry, "of": points[name], "name": name}
+        targets.append(Target(**entry))
     return targets, [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]]
 
 
 def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
     for rise in rises:
         own = ([area.name for area in plan.patches] or ["patch 1"]) if rise.patch is None else [rise.patch]
-        both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
-        if not both:
-            continue
-        left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
-        others = [replace(parameter, patch=names).plain for parameter, names in left if names]
-        change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
-        where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
-        text = f"targets.vary: the tension of {both[0]!r} is found for the {rise.kind} of {where}, too;"
-        text += f" {change}, or give {where} tension = instead of {rise.kind} ="
-        raise OptionError(text, what="targets.vary", where=both[0], found=both[0])
+        for both in (n for p in vary if p.kind == "tension" for n in p.names if n in own):
+            left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
+            others = [replace(parameter, patch=names).plain for parameter, names in left if names]
+            change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
+            where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
+            text = f"targets.vary: the tension of {both!r} is found for the {rise.kind} of {where}, too;"
+            text += f" {change}, or give {where} tension = instead of {rise.kind} ="
+            raise OptionError(text, what="targets.vary", where=both, found=both)
 
 
 def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:

@@ -145,10 +145,9 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     from ..design import DesignStatus, meet  # needed by projects with targets only
 
     _newton_alone(project, "meet targets")
-    solves, options = count(1), dict(project.options)
+    solves, tolerance = count(1), project.target_tolerance
+    options = {**project.options} | ({} if tolerance is None else {"tolerance": tolerance})
     options["callback"] = lambda row: report(f"meeting the targets: solve {next(solves)}")
-    if project.target_tolerance is not None:
-        options["tolerance"] = project.target_tolerance
     design = meet(surface, project.targets, project.vary, **options)
     return _certified(design.result, report, design.status is DesignStatus.STOPPED, design=design)
 
@@ -175,9 +174,9 @@ def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Ou
 
 
 def _newton_alone(project: Project, act: str) -> None:
-    if project.method != "newton":
-        message = f"only method 'newton' can {act}, found {project.method!r}"
-        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
+    if (found := project.method) != "newton":
+        message = f"only method 'newton' can {act}, found {found!r}"
+        raise OptionError(message, what="solve.method", found=found, expected="newton")
 
 
 def reporter(report: OnStep) -> Callable[[Progress], None]:

@@ -86,14 +86,13 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     start = start_of(project) if project.mesh is not None else None
     project = (start and start.project) or project
     found_by_search: dict[str, str] = {}  # with what each is
+    table = "mesh" if project.plan is None else "plan"
     for parameter in project.vary:
         parts, kind, _ = KINDS[parameter.key]
-        cable, table = parts == "cables", "mesh" if project.plan is None else "plan"
         for one in parameter.names:
-            bare = one.removeprefix(CABLE) if cable else one
+            bare = one.removeprefix(CABLE) if parts == "cables" else one
             names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]
-            if project.plan is None or not project.plan.patches:
-                names.append(f"{table}.{kind}")
+            names += [f"{table}.{kind}"] if project.plan is None or not project.plan.patches else []
             found_by_search |= dict.fromkeys(names, parameter.label)
     for name, given in values.items():
         if label := found_by_search.get(name):
@@ -245,9 +244,8 @@ def _moved(part: Any, by: Floats, plane: Plane) -> Any:
             if plane != Plane():
                 raise OptionError("give it three coordinates, as the plane is not z = 0", what="z")
             points = np.pad(points, ((0, 0), (0, 1)))
-        shifts = np.tile(by[: points.shape[1]], (len(points), 1))
-        shifts[1:] *= not of_arc  # vectors follow an arc's centre
-        return points + shifts
+        shift = by[: points.shape[1]]
+        return np.concatenate([points[:1] + shift, points[1:] + shift * (not of_arc)])  # vectors stay
 
     if not isinstance(part, Curve):
         return moved(np.array([part]))[0].tolist()
@@ -264,9 +262,8 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
     """
     shown = {}
     for name in names if units else ():
-        stem, _, quantity = name.rpartition(".")
-        if quantity == "margin_value":
-            quantity = stem.partition(" of ")[0]
+        stem, _, last = name.rpartition(".")
+        quantity = stem.partition(" of ")[0] if last == "margin_value" else last
         cable = OF_CABLES.get(quantity) if stem in cables or stem.startswith("plan.cables.") else None
         with suppress(OptionError):
             dimension = cable or DIMENSIONS.get(quantity) or dimension_of(quantity)
@@ -276,11 +273,9 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
 
 def digest(path: PathLike) -> str:
     """SHA-256, hexadecimal, of a project with its drawing, or of the surface that any other file holds."""
-    if is_project(path):
-        text, _ = read_data(Path(path))
-        sha = hashlib.sha256(text.encode())
-        for drawing in files_of(path)[1 if text else 0 :]:
-            sha.update(read_bytes(drawing))
-        return sha.hexdigest()
-    surface = io.read_bare(path)[0]
-    return hashlib.sha256(plain_bytes([getattr(surface, name) for name in FIELDS])).hexdigest()
+    if not is_project(path):
+        surface = io.read_bare(path)[0]
+        return hashlib.sha256(plain_bytes([getattr(surface, name) for name in FIELDS])).hexdigest()
+    text, _ = read_data(Path(path))
+    others = map(read_bytes, files_of(path)[1 if text else 0 :])
+    return hashlib.sha256(b"".join([text.encode(), *others])).hexdigest()
