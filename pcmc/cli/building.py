@@ -95,7 +95,7 @@ def panels_(
         if pattern is None or size is None:
             text = "--pattern: needs a --size, and --size a --pattern: planar-quads, quads or hexagons"
             raise OptionError(text, what="--size", expected="a length")
-        return _net(file, units, files, picture, seen, sheet, build, (size, pattern, direction))
+        return _net(file, files, picture, seen, build, (size, pattern, direction, units, sheet))
     if tolerance is None:
         text = "--tolerance: panels of triangles need it; quads and hexagons need --pattern and --size"
         raise OptionError(text, what="--tolerance", expected="a length")
@@ -149,18 +149,11 @@ def panels_(
 
 
 def _net(
-    file: Path,
-    units: str,
-    files: list[Path],
-    picture: Path | None,
-    seen: Any,
-    sheet: str | None,
-    build: Build,
-    wanted: tuple[float, str, float],
+    file: Path, files: list[Path], picture: Path | None, seen: Any, build: Build, about: tuple[Any, ...]
 ) -> int:
     for path in files:
         suffix_of(path, NETS, "a net of panels")
-    size, pattern, direction = wanted
+    size, pattern, direction, units, sheet = about
     check_grid(pattern, direction)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, TABLES)]

@@ -121,13 +121,11 @@ def explore(
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
-    for flag, given, wanted, needs in (
-        ("--watch", watch, file, "a file"),
-        ("--start", start_shape, file, "a file"),
-        ("--set", parameter, example, "an --example"),
-    ):
+    needs: dict[str, Any] = {"--watch": (watch, file, "a file"), "--start": (start_shape, file, "a file")}
+    needs["--set"] = parameter, example, "an --example"
+    for flag, (given, wanted, need) in needs.items():
         if given and wanted is None:
-            raise OptionError(f"explore: {flag} needs {needs}", what=flag)
+            raise OptionError(f"explore: {flag} needs {need}", what=flag)
     again = None
     with working() as progress:
         progress("building")

@@ -18,8 +18,8 @@ from ..surface.curves import Curve
 BOTTOMS = ("sliding", "held", "sloped")
 WALL = 'a number, "balanced" or false'  # what a wall's tension may be
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
+# how many of its parts a plan may have; its dividers cut it into no more parts than patches
 MOST = {"dividers": 1000, "holes": 2000, "cables": 2000, "mirrors": 100, "supports": 10_000, "patches": 2000}
-"""How many of its parts a plan may have; its dividers cut it into no more parts than patches."""
 
 
 def check_count(key: str, count: int, kind: type[PcmcError] = PlanError) -> None:

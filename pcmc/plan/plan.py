@@ -73,17 +73,13 @@ class Plan:
 
     Raises
     ------
-    OptionError
-        For a value that an attribute may not have.
-    MissingExtra
-        From ``surface``, without the library shapely.
-    PlanError
-        From ``surface``, if the lines do not divide the plan properly; names the line.
+    OptionError : for a value that an attribute may not have.
+    MissingExtra : from ``surface``, without the library shapely.
+    PlanError : from ``surface``, if the lines do not divide the plan properly; names the line.
 
     Warns
     -----
-    PlanWarning
-        From ``surface``, if an edge is free and has no cable.
+    PlanWarning : from ``surface``, if an edge is free and has no cable.
 
     Examples
     --------

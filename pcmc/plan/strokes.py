@@ -25,8 +25,7 @@ from ..base.validate import checked_name
 from ..surface.curves import Curve
 from ..surface.pieces import Piece, point_text
 
-LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
-"""The suffixes of drawings, and the libraries that read them."""
+LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}  # that read drawings, by suffix
 READERS = {".dxf": "dxf_entities", ".3dm": "rhino_entities"}
 LARGEST = 1e12  # of a coordinate; beyond, the digits of a double are too few for a roof
 HIGHEST_DEGREE = 11  # of a NURBS curve, in Rhino
@@ -159,7 +158,7 @@ def bezier_spans(degree: int, knots: Floats, points: Floats, weights: Floats) ->
     return list(zip(homogeneous[:, :, :-1] / weight[:, :, None], weight, strict=True))
 
 
-MEANINGS = {
+MEANINGS = {  # of the layers that a drawing of a plan may have
     "outline": "the closed edge of the roof",
     "divider NAME": "a line between patches; a wall stands below it",
     "hole NAME": "a closed edge of an opening, held at its height",
@@ -172,7 +171,6 @@ MEANINGS = {
     "height": "points through which the roof should pass, or texts such as 4.5",
     "patch NAME": "a point or a text inside a part of the plan: its name, or its name = its tension",
 }
-"""The layers that a drawing of a plan may have."""
 
 ROLES = tuple(key.split()[0] for key in MEANINGS)
 UNDERSTOOD = ", ".join(MEANINGS)

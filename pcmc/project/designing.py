@@ -62,24 +62,13 @@ def designed(
     """The roof that a project describes: solved, its targets met, remeshed, as accurate as asked for.
 
     Nothing is written but the cache: a good roof is kept there, and comes from there the next time. A roof
-    that is not certified, or misses a target, is solved again each time.
-
-    Parameters
-    ----------
-    project : a Project, or the path of its file.
-    progress : called with a few words at each step.
-    changed : applied to the initial surface; such a roof is neither kept nor taken from the cache.
-    use_cache : False solves in any case, and keeps nothing.
-
-    Returns
-    -------
-    Outcome : ``surface`` is the roof, ``good`` whether it is what the project asks for. With ``whole = true``
-        ``shown`` is the whole roof.
+    that is not certified, or misses a target, is solved again each time. ``progress`` is called with a few
+    words at each step; ``changed`` is applied to the initial surface, and such a roof is neither kept nor
+    taken from the cache; with ``use_cache`` False no other is. ``surface`` of the outcome is the roof,
+    ``good`` whether it is what the project asks for; with ``whole = true`` ``shown`` is the whole roof.
 
     Errors and warnings as of ``run``; KeyboardInterrupt for Ctrl-C, and nothing is kept.
 
-    Examples
-    --------
     >>> roof = designed("notebooks/roof.toml")
     >>> roof.good, [f"{area:.0f}" for area in roof.certificate.patches["area"][:3]]
     (True, ['78', '174', '150'])
@@ -99,27 +88,13 @@ def run(
 ) -> Outcome:
     """Mesh, solve, meet the targets, certify, and write all output of a project.
 
-    Parameters
-    ----------
-    path : the project file.
-    out_dir : folder for the output, made if it is missing; by default that of the project file.
-    progress : called with a few words at each step.
-    anyway : write the output even if the surface is not certified or misses a target.
+    ``out_dir`` is the folder for the output, made if it is missing; by default that of the project file.
+    ``progress`` is called with a few words at each step. If the surface is not certified or misses a target,
+    nothing is written and ``files`` is empty, unless ``anyway``.
 
-    Returns
-    -------
-    Outcome : ``files`` is empty, and nothing is written, if the surface is not certified or misses a target.
-
-    Raises
-    ------
     FileError, PlanError, OptionError : one line that names the file. Nothing is written.
-
-    Warns
-    -----
     BalanceWarning : before solving, if the tensions at a junction cannot balance.
 
-    Examples
-    --------
     >>> import tempfile
     >>> from pathlib import Path
     >>> plan = "[plan]\\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\\ntension = 3.0\\n"

@@ -127,18 +127,11 @@ def load(path: PathLike, *, units: str = "") -> Project:
     ``units`` is the unit of length of a drawing's or a mesh's project: a file in another one is converted, a
     file without a unit is taken to be in it. A project file says itself which it has.
 
-    Raises
-    ------
     FileError : the file is no TOML, or a key is unknown, missing or bad; ``what`` is the key.
     PlanError : a drawing is no plan; ``what`` is its layer.
-
-    Warns
-    -----
     FileWarning : for what was changed and left out of a drawing, a plan whose size is unlikely in its unit,
-        and a roof held at single points inside.
+    and a roof held at single points inside.
 
-    Examples
-    --------
     >>> import tempfile
     >>> text = 'units = "mm"\\n[plan]\\noutline = [[0, 0], [6000, 0], [6000, 4000]]\\ntension = 3.0'
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -70,7 +70,7 @@ def _list_of(*schemas: Schema) -> Schema:
     return {"type": "array", "items": _any_of(*schemas)}
 
 
-KINDS: dict[str, Schema] = {
+KINDS: dict[str, Schema] = {  # what the value of a key may be, in words and as a JSON Schema
     "a value": {},
     "a number": _NUMBER,
     WALL: _any_of(_NUMBER, {"enum": [BALANCED, False]}),
@@ -100,7 +100,6 @@ KINDS: dict[str, Schema] = {
     "a list of views": _list_of(_NAME, _LIST),
     "a name or two angles": _any_of(_NAME, _LIST),
 }
-"""What the value of a key may be, in words and as a JSON Schema."""
 
 _TYPES: dict[str, Any] = {"number": int | float, "integer": int, "boolean": bool, "string": str}
 _TYPES |= {"array": list, "object": Mapping}

@@ -101,15 +101,12 @@ class Outcome:
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""
         (surface, certificate), design, units = self.shown, self.design, self.units
-        lines = [
-            certificate.verdict.value,
-            certificate.cuts_itself if certificate.certified else certificate.detail,
-            "" if design is None else f"targets {design.text(units)}",
-            f"written: {', '.join(map(str, self.files))}" if self.files else "",
-            "\n  ".join(self.advice),
-            units.sentence if units else "",
-        ]
-        return "\n".join([*filter(None, lines), repr(surface)])
+        lines = [certificate.verdict.value]
+        lines += [certificate.cuts_itself if certificate.certified else certificate.detail]
+        lines += [f"targets {design.text(units)}"] if design is not None else []
+        lines += [f"written: {', '.join(map(str, self.files))}"] if self.files else []
+        lines += ["\n  ".join(self.advice), units.sentence if units else "", repr(surface)]
+        return "\n".join(filter(None, lines))
 
     @property
     def solved(self) -> Result:
@@ -258,14 +255,9 @@ class Outcome:
         return roof_report(self.shown.surface, self.units, **about, analysis=analysis)
 
     def _about(self, output: Output, anyway: bool) -> dict[str, Any]:
-        tolerance = output.tolerance
-        return {
-            "name": self.name,
-            "tolerance": tolerance,
-            "schedule": None if tolerance is None else self.panels(tolerance, anyway=anyway),
-            "certificate": self.shown.certificate,
-            "anyway": anyway,
-        }
+        tolerance, certificate = output.tolerance, self.shown.certificate
+        about = {"name": self.name, "tolerance": tolerance, "certificate": certificate, "anyway": anyway}
+        return about | ({} if tolerance is None else {"schedule": self.panels(tolerance, anyway=anyway)})
 
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""

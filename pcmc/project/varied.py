@@ -62,13 +62,8 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
         what is meant before it: ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider
         1``, ``wall 1``, ``hole 1``, ``support 1``, …
 
-    Raises
-    ------
-    FileError, PlanError, OptionError
-        As in ``load`` and ``build``; for an unknown name.
+    Errors as in ``load`` and ``build``; OptionError for an unknown name.
 
-    Examples
-    --------
     >>> project, surface = varied("notebooks/roof.toml", {"plan.edge_length": 2, "corner.tension": 9})
     >>> project.plan.edge_length, surface.patches[0].tension
     (2, 9.0)

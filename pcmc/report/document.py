@@ -149,8 +149,8 @@ def roof_report(
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
         of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``, or the
-        structural ``model``, for the forces of its members at rest;
-        ``pattern``, of ``pcmc.cutting_pattern``; ``files``, the name of each file and what it is.
+        structural ``model``, for the forces of its members at rest; ``pattern``, of ``pcmc.cutting_pattern``;
+        ``files``, the name of each file and what it is.
 
     Raises
     ------

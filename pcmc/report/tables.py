@@ -48,8 +48,7 @@ class Table(NamedTuple):
 
 
 Columns = dict[str, Iterable[Any]]
-Block = str | Heading | Picture | Table | PaperPlan
-"""What the pages of a report are made of; a text alone is a paragraph."""
+Block = str | Heading | Picture | Table | PaperPlan  # of the pages of a report; a text is a paragraph
 
 
 def one(value: float) -> str:
@@ -57,7 +56,7 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
-LISTED = {
+LISTED = {  # the key figures of a report; those of several walls are added
     ("apex", "roof"): "highest point above the plane",
     ("area", "roof"): "area of the roof",
     ("area", "wall"): "area of walls",
@@ -66,7 +65,6 @@ LISTED = {
     ("reaction", "roof"): "all reactions, upwards",
     ("reaction per length", "roof"): "largest reaction per length",
 }
-"""The key figures of a report; those of several walls are added."""
 
 
 def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Table:

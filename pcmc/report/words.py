@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..certificate.theorem import Theorem
 
 
-VERDICTS = {
+VERDICTS = {  # what each verdict means for those who build
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
     " everywhere, and after any small disturbance the roof returns to this shape.",
     Verdict.NEUTRAL: "The roof is in equilibrium, but some change of shape needs almost no force. Hold the"
@@ -30,14 +30,12 @@ VERDICTS = {
     Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
     Verdict.DEGENERATE: "Triangles of the mesh have collapsed: the shape says nothing about a roof.",
 }
-"""What each verdict means for those who build."""
 
-LEGEND = (
+LEGEND = (  # of the plan
     "J1, J2 and so on number the junctions, B1, B2 and so on the supports along lines, S1, S2 and so on those"
     " at points, C1, C2 and so on the ends of cables on lines, as in the tables. Black: rims. Red: ridges."
     " Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels, and mirrors."
 )
-"""How to read the plan."""
 ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes may be from the number."
 
 
