@@ -133,9 +133,8 @@ class Plan:
             object.__setattr__(self, key, value)
         for key in ("pressure", "weight", "snow"):
             validate.number(key, getattr(self, key))
-        validate.positive("edge_length", self.edge_length)
-        for key in ("rise", "cushion"):
-            if getattr(self, key) is not None:
+        for key in ("edge_length", "rise", "cushion"):
+            if key == "edge_length" or getattr(self, key) is not None:
                 validate.positive(key, getattr(self, key))
         if self.patches and self.tension is not None:
             problem = f"the plan has tension = {validate.shown(self.tension)} and patches with their own"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress, product
+from itertools import compress, filterfalse, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -233,20 +233,12 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> tuple[
             raise PlanError(f"{text} {own:g}; give it one", what="patch", where=name)
         if same is not spec:  # several parts of one name are one patch
             same["at"] = [*_as_points(same["at"]), *_as_points(spec["at"])]
-    plan: dict[str, Any] = {
-        "outline": drawing.outline,
-        "edge_length": edge_length,
-        "holes": _changed(drawing.holes, values.pop("holes", []), "hole", Hole),
-        "dividers": dividers,
-        "supports": [*drawing.supports, *values.pop("supports", [])],
-        "patches": patches,
-    }
-    if cables:
-        plan["cables"] = cables
-    if drawing.mirrors:
-        plan["mirrors"] = [*drawing.mirrors, *values.pop("mirrors", [])]
-    if drawing.level != 0.0:
-        plan["plane"] = {"point": [0.0, 0.0, drawing.level]}
+    plan: dict[str, Any] = {"outline": drawing.outline, "edge_length": edge_length}
+    plan["holes"] = _changed(drawing.holes, values.pop("holes", []), "hole", Hole)
+    plan |= {"dividers": dividers, "supports": [*drawing.supports, *values.pop("supports", [])]}
+    plan |= {"patches": patches} | ({"cables": cables} if cables else {})
+    plan |= {"mirrors": [*drawing.mirrors, *values.pop("mirrors", [])]} if drawing.mirrors else {}
+    plan |= {"plane": {"point": [0.0, 0.0, drawing.level]}} if drawing.level != 0.0 else {}
     return plan | values, chosen
 
 
@@ -274,11 +266,10 @@ def _patches(parts: Sequence[Part], drawing: Drawing, given: Mapping[str, Any]) 
         specs.append({"name": name, "tension": drawn.get(name), "at": point})
     for name, attributes in given.items():
         check_keys(attributes, PatchSpec, f"patch {name!r}")
-        if attributes.get("at") is None:
-            chosen = [spec for spec in specs if spec["name"] == name]
-        else:
-            at = _parts_at(parts, attributes["at"])
-            chosen = [spec for part, spec in zip(parts, specs, strict=True) if part in at]
+        at = attributes.get("at")
+        owned = parts if at is None else _parts_at(parts, at)
+        pairs = [(part, spec) for part, spec in zip(parts, specs, strict=True) if part in owned]
+        chosen = [spec for _, spec in pairs if at is not None or spec["name"] == name]
         if not chosen:
             known = dict.fromkeys(str(spec["name"]) for spec in specs)
             problem = unknown("patch of the drawing", name, known)
@@ -327,18 +318,15 @@ def _labels(parts: Sequence[Part], drawing: Drawing) -> tuple[dict[int, str], di
 
 def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: Any) -> list[Any]:
     """The drawn curves by name with the values given for them, and further entries."""
-    entries: dict[str, dict[str, Any]] = {
-        name: {"curve": curve, "name": name} for name, curve in drawn.items()
-    }
-    more = []
-    for entry in given:
-        if not isinstance(entry, Mapping) or "name" not in entry or "curve" in entry:
-            more.append(entry)
-            continue
-        name = entry["name"]
-        if name not in entries:
+    entries: dict[str, Any] = {name: {"curve": curve, "name": name} for name, curve in drawn.items()}
+
+    def changes_drawn(entry: Any) -> bool:
+        return isinstance(entry, Mapping) and "name" in entry and "curve" not in entry
+
+    for entry in filter(changes_drawn, given):
+        if (name := entry["name"]) not in entries:
             problem = f"{unknown(f'{what} of the drawing', name, entries)}; add one with curve = ..."
             raise OptionError(problem, what=f"{what}s", found=name, expected=tuple(entries))
         check_keys(entry, kind, f"{what} {name!r}")
         entries[name] |= entry
-    return [*entries.values(), *more]
+    return [*entries.values(), *filterfalse(changes_drawn, given)]
