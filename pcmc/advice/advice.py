@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,16 +21,16 @@ from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
 from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
+from ..design import Parameter, Target
 from ..plan import Divider, Plan
 from ..plan.edges import usual_cable
+from ..plan.lines import SNAP, is_straight
 from ..plan.parts import BALANCED
+from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
 from .rises import Rise, net_pressures, outline_heights
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
 NO_LOADS = ("distance", "tensions")  # a fold on these ways says nothing of the loads
@@ -135,7 +135,6 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
 
 def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
-    from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area  # needs shapely
 
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(map(abs, net_pressures(plan).values())))
     folds = [1.0 / a.value for a in certificate.tried if a.folds and a.way not in NO_LOADS and a.value]
@@ -196,7 +195,6 @@ def _scaled(plan: Plan, factor: float) -> Plan:
 
 def with_upright(plan: Plan) -> Plan | None:
     """The plan with all walls upright that can be, those under straight lines; None if they are already."""
-    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
 
     near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None and not d.upright]
     leaning = {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}

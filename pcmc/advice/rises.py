@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,18 +19,17 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..base.libraries import require
 from ..base.tolerances import ON
+from ..design import Parameter, Target
 from ..plan import Hole, Plan, patch_names
+from ..plan.draft import part_count
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
 from ..plan.parts import BALANCED
+from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
 from ..surface import checks
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
 
 RISES = ("rise", "apex")  # of a patch
 WHOLE = (*RISES, "span_ratio")  # of all patches together
@@ -92,14 +91,8 @@ def taken(
 
 def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], list[Parameter]]:
     """The plan with a first tension for each rise, the targets, and the tensions that are to be found."""
-    from ..design import Parameter, Target
-
     if not rises:
         return plan, [], []
-    require("shapely", extra="plan")
-    from ..plan.draft import part_count
-    from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
-
     part_count(plan)  # refuses lines that do not fit together, which have no area
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
@@ -245,7 +238,6 @@ def point_masts(plan: Plan) -> list[Mast]:
 
 def _dome(plan: Plan) -> float:
     """The height to which pressure lifts the middle of a plan, about: of the flattest cap over its circle."""
-    from ..plan.proposal import least_tension, plan_area
 
     loads, tensions = net_pressures(plan).values(), [area.tension for area in plan.patches]
     if min(loads) <= 0.0:

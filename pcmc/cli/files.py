@@ -16,6 +16,8 @@ from ..base.errors import FileError, FileWarning, OptionError, unknown
 from ..base.files import atomic_write, suffix_of
 from ..base.interrupts import defer_interrupts
 from ..base.units import LENGTHS
+from ..explore import open_and_wait, start
+from ..explore.roof import ShownRoof, read_roof
 from ..io import metres_note, write
 from ..io.repairing import HOLES, repair
 from ..project import Outcome, cache
@@ -23,6 +25,7 @@ from ..project.planning import drawing_reference
 from ..project.settings import check_names
 from ..project.writing import check_outputs, picture_job, surface_files, write_all
 from ..surface import Surface
+from ..sweep.case_script import resolve
 from . import NOT_CERTIFIED, OK, arguments, reports
 from .arguments import OUTPUT, TOML, Cache, FileUnits, Input, Shown, Start, ViewName, Whole, load_project
 from .options import amount, count, option, parsed_unit, switch
@@ -116,8 +119,6 @@ def explore(
       pcmc explore roof.toml --watch
       pcmc explore --example two_caps --set edge_length=1.2
     """
-    from ..explore import open_and_wait, start
-    from ..explore.roof import ShownRoof, read_roof
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
@@ -148,7 +149,6 @@ def explore(
 
 
 def _example(name: str, parameters: dict[str, Any]) -> Surface:
-    from ..sweep.case_script import resolve
 
     try:
         known: Any = [name] if ":" in name else resolve("generators:__all__")

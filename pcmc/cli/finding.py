@@ -8,6 +8,9 @@ from typing import Annotated, Any
 
 from .. import project as projects
 from ..base.errors import OptionError
+from ..equilibria import find_equilibria
+from ..plot import equilibria as diagram
+from ..plot.uses import BRANCH_VALUES
 from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
@@ -49,9 +52,6 @@ def equilibria_(
       pcmc equilibria roof.toml -o diagram.svg
       pcmc equilibria roof.toml --along pressure --along "tension of hall" -o table.csv -o roof.pcmc
     """
-    from ..equilibria import find_equilibria
-    from ..plot import equilibria as diagram
-    from ..plot.uses import BRANCH_VALUES
 
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..certificate.tables import lean_texts
+from ..plan.lines import SNAP, is_straight
 from ..project.advising import Changed, firmer
 from ..project.outcome import MOST_CHECKED, Outcome
 from . import NOT_CERTIFIED, OK
@@ -67,7 +68,6 @@ def _against_lean(outcome: Outcome) -> str:
     plan = None if outcome.project is None else outcome.project.plan
     if plan is None:
         return limit
-    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
 
     table = outcome.certificate.leaning
     far = set(table["wall"][table["lean"] >= FAR])

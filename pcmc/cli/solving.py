@@ -4,31 +4,35 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from .. import project as projects
 from ..accuracy.adaptive import TRIANGLES
+from ..accuracy.varied import Varied
 from ..base import validate
 from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.libraries import require
+from ..certificate.quantities import dimension_of
 from ..io import FORMATS
 from ..project import Outcome, Project
+from ..project.advising import Changed
 from ..project.drawn import files_of
 from ..project.file import with_rise
 from ..project.planning import proposal_text
 from ..project.settings import check_names
 from ..project.writing import check_outputs, surface_files, write_all
+from ..sweep import Sweep, draw_sweep, run, short_table, solve_case, write_table
+from ..sweep.projects import column_labels, project_sweep
+from ..sweep.solving import digest_of
+from ..sweep.store import FAILED
+from ..sweep.tables import TABLES, columns_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK, arguments, reports
 from .arguments import MANY_FILES, READ, Cache, FileUnits, Input, Loads, MeshCheck, Shown, Uncertified, Whole
 from .options import amount, count, option, switch
 from .reports import sweeping, working
-
-if TYPE_CHECKING:
-    from ..project.advising import Changed
-    from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
@@ -148,8 +152,6 @@ def certify_(
     with working() as progress:
         project = arguments.load_project(file)
         if margin:  # unknown names are refused before the work
-            from ..accuracy.varied import Varied  # takes long to import
-
             start = what.of(projects.surface_of(project))
             for name in margin:
                 Varied.of(start, name)
@@ -249,11 +251,6 @@ def sweep(
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-    from ..certificate.quantities import dimension_of
-    from ..sweep import draw_sweep, run, short_table, write_table
-    from ..sweep.projects import column_labels
-    from ..sweep.store import FAILED
-    from ..sweep.tables import TABLES, columns_of
 
     inputs = files_of(what) if Path(what).exists() else ()
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
@@ -299,9 +296,6 @@ def sweep(
 
 def _cases(what: str, values: list[str], method: str | None, options: dict[str, bool]) -> Sweep:
     """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
-    from ..sweep import Sweep, solve_case
-    from ..sweep.projects import project_sweep
-    from ..sweep.solving import digest_of
 
     given: dict[str, list[Any]] = {}
     for name, listed in map(arguments.named_values, values):

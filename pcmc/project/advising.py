@@ -7,21 +7,19 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..advice.advice import changes, coarse, firmer_walls, flatter, improved, loosened, lower_lines
 from ..advice.rises import SHARES, as_sail, point_masts, ring_lines, take_rises, with_rings, with_rises
 from ..base.errors import PcmcError
 from ..certificate.balance import strained_junction
+from ..design import Target
 from ..plan import Plan
 from ..surface import Surface
 from .file import Project
 from .outcome import OnStep, Outcome, ignore
 from .settings import AccuracyWanted
 from .solving import solve_project
-
-if TYPE_CHECKING:
-    from ..design import Target
 
 Changed = Callable[[Surface], Surface]
 TRIES = 3  # plans tried

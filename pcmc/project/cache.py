@@ -26,6 +26,7 @@ from .. import io
 from ..base.errors import FileError, LostWarning, PcmcError
 from ..base.files import atomic_write, read_bytes
 from ..base.units import Units
+from ..design import Design, DesignStatus
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
 from ..surface.surface import FIELDS
@@ -80,8 +81,6 @@ def cached(project: Project) -> Outcome | None:
         solve = {name: values[name] for name in NUMBERS}
         result = Result(to_surface(data), Status[values["status"]], rows=(), **solve)
         if given := values.get("design"):
-            from ..design import Design, DesignStatus
-
             targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
             status, history = DesignStatus[given["status"]], pd.DataFrame()
             design = Design(status, result, targets, parameters, given["solves"], history=history)

@@ -6,6 +6,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+from ..accuracy.varied import Varied
 from ..advice.advice import check_apexes, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
@@ -194,11 +195,8 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
             of_material(project.pattern, structure, surface)
         if project.verify:
             expect_flat(surface, "verify")
-        if project.margin:
-            from ..accuracy.varied import Varied  # takes long to import
-
-            for what in project.margin:
-                Varied.of(surface, what)
+        for what in project.margin:
+            Varied.of(surface, what)
     pinchable = standing_part(surface).walls.pinchable
     if imbalance := unbalanced(surface, pinchable):
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""

@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
 from ..base.files import PathLike, as_path, check_name, check_regular
 from ..base.units import LENGTHS
+from ..plan.drawing import Drawing, read_drawing
 from ..plan.plan import Chosen
+from ..plan.proposal import proposed
+from ..plan.strokes import layer_of, read_strokes
 from .checking import in_file
-
-if TYPE_CHECKING:
-    from ..plan.drawing import Drawing
 
 DXF, RHINO = ".dxf", ".3dm"
 FALLBACK = "m"  # the unit of a project whose drawing has one that projects do not have
@@ -27,7 +27,6 @@ def is_drawing(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix != RHINO:
         return suffix == DXF
-    from ..plan.strokes import layer_of, read_strokes
 
     with suppress(PcmcError, MissingExtra, OSError):  # the reader of surfaces has the better error
         for stroke in read_strokes(path).strokes:
@@ -72,7 +71,6 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
             raise FileError(text, what="plan.outline")
         check_beside(name, "drawing")
     drawing = drawing_of(path.parent / name, str(data.get("units", "")), gap)
-    from ..plan.proposal import proposed
 
     try:
         lines, chosen = proposed(drawing, plan)
@@ -120,7 +118,6 @@ def drawing_of(path: Path, units: str, gap: float | None) -> Drawing:
 
 @lru_cache(maxsize=8)  # a sweep loads its project for each case
 def _read(path: Path, units: str, gap: float | None, time: int, size: int) -> Drawing:
-    from ..plan.drawing import read_drawing
 
     drawing = read_drawing(path, units, gap)
     unknown = drawing.units not in ("", *LENGTHS)

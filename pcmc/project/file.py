@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +17,17 @@ from ..base import validate
 from ..base.arrays import toml
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
-from ..base.libraries import require
 from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
+from ..design import Parameter, Target
 from ..plan import Plan, plan_from
+from ..plan.drawing import Drawing
+from ..plan.proposal import edge_length_for
 from ..solvers import find_method
 from ..structure.section import Structure, check_members
 from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
-    from ..plan.drawing import Drawing
 
 TOML = ".toml"
 ELSEWHERE = "name files in it, and give --folder to write them elsewhere"
@@ -252,13 +250,10 @@ def project_of(
         values |= {"output": output, "units": units, "structure": structure, "pattern": pattern}
         stages = stages if isinstance(stages, list) else [stages]
         values["remeshing"] = [section_of(Remeshing, "remesh", stage) for stage in stages]
-        plan, targets, vary = None, list["Target"](), list["Parameter"]()
+        plan, targets, vary = None, list[Target](), list[Parameter]()
         if mesh is None:
             plan = plan_from(data["plan"])
             if "edge_length" not in data["plan"]:
-                require("shapely", extra="plan")
-                from ..plan.proposal import edge_length_for
-
                 plan = replace(plan, edge_length=edge_length_for(plan))
                 chosen = replace(chosen, edge_length=plan.edge_length)
             plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
@@ -307,7 +302,6 @@ def _output(table: Mapping[str, Any]) -> Output:
 
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], list[Parameter]]:
-    from ..design import Parameter, Target
 
     if "tolerance" in table:
         validate.positive("targets.tolerance", table["tolerance"])

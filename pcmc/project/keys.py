@@ -14,6 +14,9 @@ from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
 from ..cloth.settings import CuttingOptions
+from ..design import Parameter, Target
+from ..design.targets import KINDS as KINDS_OF_PARAMETER
+from ..design.targets import MEASURES, SHORT
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
@@ -275,9 +278,6 @@ def solve_section(method: str) -> Section:
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-    from ..design import Parameter, Target  # needed by projects with targets only
-    from ..design.targets import KINDS as KINDS_OF_PARAMETER
-    from ..design.targets import MEASURES, SHORT
 
     wanted = _of_class(Target, quantity=(*MEASURES, *SHORT), of="a name or a point [x, y]")
     changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)

@@ -6,30 +6,29 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
+from ..accuracy import AccurateResult, Margin, MeshCheck, check_mesh, margin
 from ..base.errors import OptionError, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
+from ..certificate.quantities import Figure, figures
+from ..certificate.theorem import Theorem, verify
+from ..cloth import CuttingOptions, CuttingPattern, cutting_pattern_of
+from ..design import Design
+from ..drawings import DrawingSet, drawing_set
+from ..drawings.sheet import MISSED
+from ..io.mesh_data import MeshData
+from ..panelling import FewerFamilies, PanelNet, Panels, fewer_families, panel_net, panels
+from ..report import RoofReport, roof_report
 from ..solvers.result import Progress, Result
+from ..structure import Analysis, StructuralModel, analyse
+from ..structure.section import Structure
 from ..surface import Surface, mirrored
+from .file import Project
+from .members import members_drawn, model_with_members, warn_of_members
 from .settings import Output, of_material
-
-if TYPE_CHECKING:
-    from ..accuracy import AccurateResult, Margin, MeshCheck
-    from ..certificate.quantities import Figure
-    from ..certificate.theorem import Theorem
-    from ..cloth import CuttingOptions, CuttingPattern
-    from ..design import Design
-    from ..drawings import DrawingSet
-    from ..io.mesh_data import MeshData
-    from ..panelling import FewerFamilies, PanelNet, Panels
-    from ..report import RoofReport
-    from ..structure import Analysis
-    from ..structure.model import StructuralModel
-    from ..structure.section import Structure
-    from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 EXTENSIVE = ("area", "volume", "length")  # targets of a part that are not those of the whole
@@ -144,14 +143,12 @@ class Outcome:
     @property
     def figures(self) -> list[Figure]:
         """The key figures of what is shown."""
-        from ..certificate.quantities import figures
 
         return self._once("figures", lambda: figures(*self.shown))
 
     @property
     def theorem(self) -> Theorem:
         """What ``pcmc.verify`` proves of what is shown."""
-        from ..certificate.theorem import verify
 
         return self._once("theorem", lambda: verify(self.shown.surface))
 
@@ -168,7 +165,6 @@ class Outcome:
     def mark(self) -> str:
         """What files, pictures and documents are marked with; empty where all is in order, and where
         nothing is known, as of a surface that another program wrote."""
-        from ..drawings.sheet import MISSED
 
         if self.result is None:
             return str(self.data.certificate.get("mark", "")) if self.data else ""
@@ -205,7 +201,6 @@ class Outcome:
         self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
     ) -> Panels:
         """The schedule of the panels of what is shown; see ``pcmc.panels``."""
-        from ..panelling import panels
 
         surface, certificate = self.shown
         how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
@@ -214,21 +209,17 @@ class Outcome:
 
     def fewer_families(self, tolerance: float, change: float, **options: Any) -> FewerFamilies:
         """What is shown with fewer families of panels; see ``pcmc.fewer_families``."""
-        from ..panelling import fewer_families
 
         return fewer_families(self.shown.surface, tolerance, change, **options)
 
     def panel_net(self, size: float, pattern: str, direction: float, anyway: bool = False) -> PanelNet:
         """Quads or hexagons on what is shown; see ``pcmc.panel_net``."""
-        from ..panelling import panel_net
 
         surface, certificate = self.shown
         return panel_net(surface, size, pattern, direction=direction, anyway=anyway, certificate=certificate)
 
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
-        from ..drawings import drawing_set
-        from .members import members_drawn, warn_of_members
 
         warn_of_members(self, "drawings", held=True)
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
@@ -237,8 +228,6 @@ class Outcome:
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
-        from ..report import roof_report
-        from .members import model_with_members, warn_of_members
 
         about, project = self._about(output, anyway), self.project
         about |= {"mesh_check": self.mesh_check, "mesh_failure": self.mesh_failure, "margins": self.margins}
@@ -274,7 +263,6 @@ class Outcome:
 
     def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
         """The cutting pattern of what is shown, of the cloth in [structure]; made once for [pattern]."""
-        from ..cloth import cutting_pattern_of
 
         surface, certificate = self.shown
         project, cloth = self.project, wanted
@@ -293,7 +281,6 @@ class Outcome:
         structure = None if self.project is None else self.project.structure
         if structure is None or not structure.run:
             return None
-        from ..structure import analyse
 
         return self._once("analysis", lambda: analyse(self.model(structure, anyway), progress=progress))
 
@@ -325,7 +312,6 @@ class Outcome:
     def check_mesh(self, progress: OnStep | None = None, meshes: int | None = None) -> MeshCheck | None:
         """The mesh check of what is shown, made once, by default on three ``meshes``; None where it fails,
         see ``mesh_failure``. With a number of ``meshes`` an error is raised."""
-        from ..accuracy import check_mesh  # takes long to import
 
         def check() -> MeshCheck | None:
             found = None if self.unfold else self.accurate
@@ -355,7 +341,6 @@ class Outcome:
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
-        from ..accuracy import margin  # takes long to import
 
         surface, certificate = self.shown
         callback = _reporter(f"margin of {what}", progress)

@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..accuracy import AccuracyStatus, solve_to_accuracy
 from ..base.errors import OptionError
 from ..certificate.diagnosis import VANISHED, vanished_films
+from ..design import DesignStatus, NoStart, Target, meet
+from ..design.targets import measure
 from ..solvers import solve, solve_once
 from ..solvers.neighbours import swap_neighbours
 from ..solvers.result import Progress, Result, Status
@@ -18,9 +21,6 @@ from .checking import in_file
 from .file import Project
 from .outcome import OnStep, Outcome, ignore
 from .settings import AccuracyWanted
-
-if TYPE_CHECKING:
-    from ..design import Target
 
 FLATTER = 2.0  # times the first tensions for heights, where these are too low
 
@@ -105,7 +105,6 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
     where = f"on the new one, {after.surface.m} triangles"
     if after.design is not None:
         return [met if after.good else f"{met}; {where}, {after.design.status.value}"]
-    from ..design.targets import measure  # needed by projects with targets only
 
     reached = ", ".join(f"{target.label} {measure(after.surface, target).value:.6g}" for target in targets)
     return [f"{met}; {where}, the surface does not come to rest with them; it has {reached}"]
@@ -119,7 +118,6 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     """
     if not project.targets:
         return _solve(project, surface, report)
-    from ..design import NoStart  # needed by projects with targets only
 
     starts = [surface]
     if project.rises:
@@ -142,7 +140,6 @@ def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
 
 
 def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    from ..design import DesignStatus, meet  # needed by projects with targets only
 
     _newton_alone(project, "meet targets")
     solves, tolerance = count(1), project.target_tolerance
@@ -162,7 +159,6 @@ def _certified(result: Result, report: OnStep, stopped: bool, **found: Any) -> O
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    from ..accuracy import AccuracyStatus, solve_to_accuracy
 
     def callback(row: Mapping[str, Any]) -> None:
         report(f"accuracy: {row['triangles']} triangles, error {row['excess']:.2g} of the accuracy wanted")

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..base.arrays import Bools
 from ..base.errors import FileWarning, OptionError, PlanError
 from ..base.files import PathLike
 from ..base.units import NO_UNITS, Units
+from ..design import Parameter, Target
 from ..io import read_bare
 from ..io.mesh_data import MeshData
 from ..surface import Surface
@@ -28,9 +29,6 @@ from .checking import in_file
 from .file import Project, load
 from .outcome import Outcome
 from .settings import BOUNDARY, GROUND, MeshFile
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
 
 NEAR = 1e-6  # of the size: vertices this near to a line or to the lowest level are on it
 
@@ -155,7 +153,6 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 
     The least tension of these caps is p times area over length of the boundary's projection.
     """
-    from ..design import Parameter, Target
 
     if not mesh.rises:
         return surface, [], []

@@ -22,6 +22,7 @@ from ..cloth.sheets import pattern_files
 from ..drawings.net_drawings import net_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
+from ..plot import draw, lines, member_forces, panel, reactions, under_load
 from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
@@ -156,12 +157,11 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
 
 def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
     """The table and the picture of ``FewerFamilies.costs``, with the functions that write them."""
-    from ..plot import lines  # needs the extra plot
 
     curves = {"surfaces on the way": costs, "the cheapest": costs[costs["cheapest"]]}
     pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
-    draw = partial(lines, pairs, x="change of shape, length", y="cost", markers=True)
-    return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), draw), strict=True))
+    picture = partial(lines, pairs, x="change of shape, length", y="cost", markers=True)
+    return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), picture), strict=True))
 
 
 def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
@@ -171,7 +171,6 @@ def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
 
 def analysis_jobs(outcome: Outcome, path: Path, analysis: Analysis) -> FileJobs:
     """The tables and pictures of an analysis beside the structural model."""
-    from ..plot import member_forces, under_load  # needs the extra plot
 
     pictures: dict[str, Any] = {"cases": under_load}
     pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
@@ -195,8 +194,6 @@ def draw_picture(
     mark: str = "",
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
-    # needs the extra plot, which a project without a picture does not
-    from ..plot import draw, panel, reactions
 
     check_picture(views, colour)
     if colour == "reactions":

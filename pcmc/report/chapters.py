@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from ..base.units import Units
+from ..cloth import CuttingPattern
+from ..cloth.sheets import seam_sheet
 from ..drawings.sheet import column
 from ..plot import member_forces, strains, under_load
 from ..plot.figure import png
+from ..structure import Analysis, StructuralModel
 from ..structure.columns import column_answers, columns_at_rest
 from ..structure.member_forces import member_tables, members_at_rest, sentences
 from .plan import FORMAT, on_paper
 from .tables import Block, Columns, Heading, Picture, columns_in, one, text_table, vectors_of
 from .words import sentence
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from ..cloth import CuttingPattern
-    from ..structure import Analysis
-    from ..structure.model import StructuralModel
 
 PIXELS = 1300  # width of a picture
 ABOUT = (
@@ -132,7 +129,6 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
 
 def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     """What is cut in sentences, the strips on the roof from above and coloured by strain, and their table."""
-    from ..cloth.sheets import seam_sheet
 
     table, sewn = pattern.table, pattern.seam_table.query("kind != 'rim'")
     sheet = seam_sheet(pattern, FORMAT, units.length)

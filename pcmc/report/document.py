@@ -7,19 +7,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
+from ..accuracy import Margin, MeshCheck
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate, quantities
 from ..certificate.certificate import certified
 from ..certificate.quantities import Figure
+from ..certificate.theorem import Theorem
+from ..cloth import CuttingPattern
 from ..drawings.sheet import MISSED, register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png
+from ..structure import Analysis, StructuralModel
 from ..surface import Surface, expect_surface
 from ..surface.images import expect_no_images
 from . import tables
@@ -27,12 +31,6 @@ from .chapters import PIXELS, at_rest_chapter, cutting_chapter, under_load_chapt
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
 from .words import ERROR_BARS, LEGEND, about_forces, panel_text, sentence, verdict_sentences
-
-if TYPE_CHECKING:
-    from ..accuracy import Margin, MeshCheck
-    from ..certificate.theorem import Theorem
-    from ..cloth import CuttingPattern
-    from ..structure import Analysis, StructuralModel
 
 SUFFIXES = (".pdf",)
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from ..accuracy import MeshCheck
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.quantities import Figure, dimension_of
@@ -16,9 +17,6 @@ from ..drawings.sheet import column
 from ..panelling import Panels
 from ..surface import Surface
 from .plan import PaperPlan
-
-if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
 
 MIDDLE = "middle_x middle_y middle_z"
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them

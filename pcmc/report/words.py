@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from ..accuracy import MeshCheck
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
 from ..certificate.supports import balance_sentence
+from ..certificate.theorem import Theorem
 from ..panelling import Panels
 from .tables import MOST_FAMILIES, one, small
-
-if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
-    from ..certificate.theorem import Theorem
-
 
 VERDICTS = {  # what each verdict means for those who build
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"

@@ -310,7 +310,7 @@ def test_a_target_that_needs_a_further_start_is_met(tmp_path, monkeypatch):
         return meet(surface, *args, **options)
 
     tried = []
-    monkeypatch.setattr("pcmc.design.meet", fails_once)
+    monkeypatch.setattr("pcmc.project.solving.meet", fails_once)
     targets = "[targets]\nmeet = [{quantity = 'apex', value = 1.0}]\nvary = ['patch 1']\n"
     outcome = outcome_of(tmp_path, f"{HALL}tension = 5.0\n{targets}")
     assert outcome.good

@@ -256,7 +256,7 @@ def test_curves_of_rhino_stay_exact(tmp_path):
     model.Objects.AddTextDot("nave", *at((4, 5, 0)), on("patch"))
     path = tmp_path / "hall.3dm"
     model.Write(str(path), 7)
-    with mock.patch("pcmc.plan.strokes.read_strokes", wraps=strokes.read_strokes) as reads:
+    with mock.patch("pcmc.project.drawn.read_strokes", wraps=strokes.read_strokes) as reads:
         loaded = project.load(path)
     assert reads.call_count == 1  # of the whole file: no second look at what kind it is
     assert loaded.specified
