@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
 import pcmc
 from pcmc.accuracy.quantities import readings
 from pcmc.design import Target
@@ -25,3 +28,16 @@ def test_two_courtyards_have_a_row_each():
 def test_two_heights_have_a_name_each():
     labels = [Target("height", (EAST + x, NORTH), 1.0).label for x in (0.1, 0.2)]
     assert labels == ["height at (512340.35, 5412340.75)", "height at (512340.45, 5412340.75)"]
+
+
+def test_a_roof_there_has_the_mesh_the_margin_and_the_cloth_of_the_same_roof_here():
+    roofs = []
+    for shift in (np.zeros(2), np.array([500000.0, 5812345.0])):
+        corners, line = np.array([[0, 0], [12, 0], [12, 8], [0, 8]]) + shift, np.array([[4, 0], [4, 8]]) + shift
+        hole = Hole({"circle": {"centre": (shift + [8, 4]).tolist(), "radius": 1.0}})
+        plan = Plan(corners, [line], edge_length=1.0, tension=2.6, holes=[hole])
+        roofs.append(pcmc.solve(plan.surface()).surface)
+    pressure = [pcmc.margin(roof, "pressure", meshes=1).factor for roof in roofs]
+    assert pressure[1] == pytest.approx(pressure[0], rel=0.01)
+    strain = [pcmc.cutting_pattern(roof, width=2.0).table["strain_rms"].max() for roof in roofs]
+    assert strain[1] == pytest.approx(strain[0], rel=0.2)  # the meshes differ a little
