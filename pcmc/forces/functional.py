@@ -27,12 +27,12 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
-from . import cable_weights, cables, flat_pieces
+from . import cables, flat_pieces
 from .elements import Elements, add_values, energy_mesh
 from .flat_pieces import add_plane_volumes
 from .triangles import add_weights, areas_and_volumes, moments, totals_and_gradient
 
-FORCES = (cables.elements, cable_weights.elements, flat_pieces.elements)
+FORCES = (cables.elements, flat_pieces.elements)
 Rates = Mapping[str, Floats]
 """Of change, by the kinds of ``pcmc.surface.values.KINDS``: one for each patch or cable."""
 
@@ -184,7 +184,7 @@ def _cables_by(surface: Surface, rates: Rates, X: Floats, gradient: Floats | Non
     none, elements = np.zeros(len(surface.cables)), list[Elements]()
     pulls, weights = rates.get("cables", none), rates.get("cable_weights", none)
     for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):
-        each = np.ones(len(cable.edges))
-        elements += [cables.lengths(X, cable.edges).times(pull * each)] if pull else []
-        elements += [cable_weights.height_integrals(surface, X, cable.edges, weight * each)] if weight else []
+        if pull or weight:
+            rates_each = np.full((2, len(cable.edges)), [[pull], [weight]])
+            elements.append(cables.line_integrals(surface, X, cable.edges, *rates_each))
     return add_values(elements, gradient)
