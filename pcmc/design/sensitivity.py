@@ -108,21 +108,18 @@ def slopes(
             if left := pressures_left_over(surface.retensioned(**{parameter.key: changed})):
                 message = f"{parameter.label}: where it changes, {left}, or hold these edges"
                 raise OptionError(message, what=parameter.label)
-    motions = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
-    return [_slopes(at.surface, measure(at.surface, t), parameters, rates, motions) for t in targets]
+    responses = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
+    changes = list(zip(parameters, rates, responses, strict=True))
+    return [_slopes(at.surface, measure(at.surface, target), changes) for target in targets]
 
 
 def _slopes(
-    surface: Surface,
-    quantity: Measurement,
-    parameters: Sequence[Parameter],
-    rates: Sequence[Floats],
-    responses: Sequence[tuple[Floats, Floats]],
+    surface: Surface, quantity: Measurement, changes: list[tuple[Parameter, Floats, tuple[Floats, Floats]]]
 ) -> tuple[Floats, Floats, Floats]:
-    """``slopes`` of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) for each parameter."""
-    slope = np.einsum("pnd,nd->p", np.stack([motion for motion, _ in responses]), quantity.by_position)
-    falling, growing = np.zeros((2, len(parameters)))
-    for k, (parameter, own, (motion, pressures)) in enumerate(zip(parameters, rates, responses, strict=True)):
+    """``slopes`` of a quantity; ``changes`` are a parameter, its rates, dX/dλ (n,3) and dδ/dλ (r,) each."""
+    slope = np.array([(motion * quantity.by_position).sum() for _, _, (motion, _) in changes])
+    falling, growing = np.zeros((2, len(changes)))
+    for k, (parameter, own, (motion, pressures)) in enumerate(changes):
         if parameter.key in quantity.by:
             slope[k] += quantity.by[parameter.key] @ own
         if "pressures" in quantity.by and surface.rooms:

@@ -59,8 +59,7 @@ def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpac
 
 def resting_vertices(surface: Surface, walls: Walls) -> Bools:
     """(n,) junction vertices that rest on Π, by their positions."""
-    X, held = surface.vertices, walls.held
-    gap = surface.plane.height(X)
+    X, held, gap = surface.vertices, walls.held, surface.plane.height(surface.vertices)
     gap[held] = np.linalg.norm(X[held] - X[walls.foot[held]], axis=1)
     return walls.top_free & lying(gap, X)
 

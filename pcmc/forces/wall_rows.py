@@ -114,24 +114,22 @@ def wall_rows(
         whole = top**2
     stands = np.abs(top) > ON * surface.size
     relative = np.clip(np.divide(share, whole, out=zero, where=stands), 0.0, 1.0)
-    if not stands.all():
-        relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges, bottom))
+    if not stands.all():  # steps to the foot, over those to the foot and to the top
+        inner = np.zeros(surface.n, dtype=bool)
+        inner[vertices] = True
+        tops = np.unique(wall_edges[~(inner | surface.pinned)[wall_edges]])
+        # a corner is foot and top at once: no path may lead through it
+        links = wall_edges[(inner | np.isin(np.arange(surface.n), tops))[wall_edges].all(axis=1)]
+        goals = vertices[bottom[vertices]], tops
+        down, up = (_steps(links, goal, surface.n, nearest=True)[vertices] for goal in goals)
+        reached = np.isfinite(down + up)
+        steps = np.where(reached, down / np.where(reached, down + up, 1.0), 0.5)
+        relative = np.where(stands, relative, steps)
     relative[bottom[vertices]] = 0.0
     straight = WallRows(vertices, ends, fraction, relative, none, feet).places(surface, X)
     offset = np.divide(X[vertices] - straight, top[:, None], out=none, where=stands[:, None])
     offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
     return WallRows(vertices, ends, fraction, relative, offset, feet)
-
-
-def join_rows(parts: list[WallRows]) -> WallRows:
-    """The rows of several walls as one; a vertex that two walls share belongs to the first."""
-    if not parts:
-        none = np.empty(0, dtype=int)
-        pairs = np.empty((0, 2), dtype=int)
-        return WallRows(none, pairs, np.empty(0), np.empty(0), np.empty((0, 3)), pairs)
-    columns = [np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(WallRows)]
-    first = np.unique(columns[0], return_index=True)[1]
-    return WallRows(*(values[first] for values in columns))
 
 
 def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Floats]:
@@ -148,20 +146,6 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     fraction = fraction[row, best]
     fraction = np.where(fraction < SNAP, 0.0, np.where(fraction > 1.0 - SNAP, 1.0, fraction))
     return top_edges[near[row, best]], fraction
-
-
-def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom: Bools) -> Floats:
-    """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the top."""
-    inner = np.zeros(surface.n, dtype=bool)
-    inner[vertices] = True
-    top = np.unique(wall_edges[~(inner | surface.pinned)[wall_edges]])
-    foot = vertices[bottom[vertices]]
-    # a corner is foot and top at once: no path may lead through it
-    links = wall_edges[(inner | np.isin(np.arange(surface.n), top))[wall_edges].all(axis=1)]
-    steps = [_steps(links, goals, surface.n, nearest=True)[vertices] for goals in (foot, top)]
-    reached = np.isfinite(steps[0]) & np.isfinite(steps[1])
-    total = np.where(reached, steps[0] + steps[1], 1.0)
-    return np.where(reached, steps[0] / total, 0.5)
 
 
 def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
@@ -332,7 +316,10 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
             every.append((index, edges, top, feet))
     if every:
         expect_no_images(surface, "a wall that slides on the plane, or comes down to its held bottom")
-    rows = join_rows([wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every])
+    parts = [WallRows(none[:, 0], none, np.empty(0), np.empty(0), np.empty((0, 3)), none)]
+    parts += [wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every]
+    columns = [np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(WallRows)]
+    first = np.unique(columns[0], return_index=True)[1]  # what two walls share belongs to the first
     top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
     below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])
     on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
@@ -343,7 +330,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
     push = vertex_sums((force * (area_vectors(X[F]) @ np.array(surface.plane.normal)))[:, None], F, n)[:, 0]
     return Walls(
-        rows=rows,
+        rows=WallRows(*(values[first] for values in columns)),
         top_edges=top_edges,
         wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,
