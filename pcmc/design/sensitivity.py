@@ -23,7 +23,7 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import AT_REST
 from ..certificate.balance import pressures_left_over
 from ..certificate.measures import Measurement
-from ..forces.functional import gradient_by
+from ..forces.functional import by_rates
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
@@ -158,7 +158,7 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         return at.times(motion(z[:count]), z[count:])
 
     def response(of: dict[str, Floats]) -> tuple[Floats, Floats]:
-        right = np.append(-space.to_coordinates(gradient_by(surface, of)), units * of.get("volumes", 0.0))
+        right = np.append(-space.to_coordinates(by_rates(surface, of)[1]), units * of.get("volumes", 0.0))
         if not np.any(right):
             return np.zeros_like(at.X), np.zeros(len(units))
         z, residuals = solve_preconditioned(times, inverse.solve, right, ACCURACY, restart=40)

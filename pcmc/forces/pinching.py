@@ -197,8 +197,8 @@ class StandingPart:
     def hardly_moves(self, before: Floats, X: Floats) -> bool:
         """Whether no top edge moves by more than ``STILL`` of the height of its wall."""
         rows = self.walls.rows
-        moved = rows.top_places(X) - rows.top_places(before)
-        return bool((np.linalg.norm(moved, axis=1) <= STILL * rows.heights(self.surface, X)).all())
+        moved, drop = rows.top_places(X) - rows.top_places(before), rows.drops(self.surface, X)
+        return bool((np.linalg.norm(moved, axis=1) <= STILL * np.linalg.norm(drop, axis=1)).all())
 
     def landed(self, X: Floats, down: Bools, space: MotionSpace | None = None) -> Floats:
         """X (n,3) with the vertices ``down`` on Π or on their bottom, and the rows of walls below.

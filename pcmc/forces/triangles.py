@@ -38,7 +38,10 @@ from .elements import Mesh, energy_mesh
 def measure_block(
     mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats, gradient: Floats
 ) -> None:
-    """Add the areas, volumes and ∇(αA - pV) of triangles first..last to (k,), (k,) and gradient (n,3)."""
+    """Add the areas, volumes and ∇(αA - pV) of triangles first..last to (k,), (k,) and gradient (n,3).
+
+    A gradient of no rows is left out.
+    """
     F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
     current = patch[first]
     alpha, sixth_p = mesh.tension[current], mesh.pressure[current] / 6.0
@@ -58,6 +61,8 @@ def measure_block(
         area_sum += 0.5 * twice_area
         b_cross_c = cross(b, c)
         volume_sum += dot(a, b_cross_c)
+        if len(gradient) == 0:
+            continue
         half_alpha_nu = scaled(0.5 * alpha / twice_area if twice_area > 0.0 else 0.0, normal)
         e_a = sub(minus_e_b, e_c)
         accumulate(gradient, i, sub(cross(half_alpha_nu, e_a), scaled(sixth_p, b_cross_c)))
@@ -65,17 +70,6 @@ def measure_block(
         accumulate(gradient, k, sub(cross(half_alpha_nu, e_c), scaled(sixth_p, cross(a, b))))
     area[current] += area_sum
     volume[current] += volume_sum / 6.0
-
-
-@compiled
-def _measure_areas(mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats) -> None:
-    """The areas and volumes alone, for line searches that need no gradient."""
-    F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
-    for f in range(first, last):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
-        area[patch[f]] += 0.5 * norm(cross(sub(b, a), sub(c, a)))
-        volume[patch[f]] += dot(a, cross(b, c)) / 6.0
 
 
 def totals_and_gradient(
@@ -95,8 +89,6 @@ def totals_and_gradient(
         if mesh.curved:
             sums = area[part], volume[part], moment[part]
             measure_elements(weightless, X, first, last, *sums, gradient[part])
-        elif sums_alone:
-            _measure_areas(mesh, X, first, last, area[part], volume[part])
         else:
             measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
 

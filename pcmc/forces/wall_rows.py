@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -27,13 +27,11 @@ MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the li
 class WallRows:
     """Wall vertices below the top edges of their walls.
 
-    With X_i, X_j the ends of a top edge, n the normal of Π and z the height over Π, the vertex is at
+    With X_i, X_j the ends of a top edge, P = (1 - λ) X_i + λ X_j, n the normal of Π and z the height over it,
 
-        P + z(P) ((ρ - 1) n + o),   P = (1 - λ) X_i + λ X_j
+        P + (ρ - 1) D + |D| o,   D = z(P) n
 
-    or, where the bottom of the wall is held, with Q the place between the held vertices below i and j,
-
-        P + (ρ - 1) (P - Q) + |P - Q| o
+    is the place of a vertex; where the bottom is held, D = P - Q, Q between the held vertices below i and j.
     """
 
     vertices: Ints  # (w,) their indices
@@ -52,29 +50,16 @@ class WallRows:
 
     def places(self, surface: Surface, X: Floats) -> Floats:
         """(w,3) where the rows lie, with the top edges at X (n,3)."""
-        top = self.top_places(X)
-        places = top + surface.plane.height(top)[:, None] * self.directions(surface)
-        held = self.feet[:, 0] >= 0
-        if held.any():
-            drop = self.drops(X)[held]
-            length = np.linalg.norm(drop, axis=1)[:, None]
-            shift = (self.relative_height[held, None] - 1.0) * drop + length * self.offset[held]
-            places[held] = top[held] + shift
-        return places
+        drop = self.drops(surface, X)
+        aside = np.linalg.norm(drop, axis=1)[:, None] * self.offset
+        return np.asarray(self.top_places(X) + (self.relative_height[:, None] - 1.0) * drop + aside)
 
-    def heights(self, surface: Surface, X: Floats) -> Floats:
-        """(w,) the height of the top edge over the bottom at each row, length."""
-        drop = np.linalg.norm(self.drops(X), axis=1)
-        return np.where(self.feet[:, 0] >= 0, drop, np.abs(surface.plane.height(self.top_places(X))))
-
-    def drops(self, X: Floats) -> Floats:
-        """(w,3) P - Q, from the held bottom up to the top edge; without meaning where the bottom slides."""
-        return self.top_places(X) - self._between(X[self.feet[:, 0]], X[self.feet[:, 1]])
-
-    def directions(self, surface: Surface) -> Floats:
-        """(w,3) from the place on the top edge to the vertex, over the height there: (ρ - 1) n + o."""
-        normal = np.array(surface.plane.normal)
-        return (self.relative_height[:, None] - 1.0) * normal + self.offset
+    def drops(self, surface: Surface, X: Floats) -> Floats:
+        """(w,3) D, from the bottom up to the top edge."""
+        top, held = self.top_places(X), self.feet[:, 0] >= 0
+        drop = surface.plane.height(top)[:, None] * np.array(surface.plane.normal)
+        drop[held] = (top - self._between(X[self.feet[:, 0]], X[self.feet[:, 1]]))[held]
+        return np.asarray(drop)
 
 
 def wall_rows(
@@ -90,14 +75,10 @@ def wall_rows(
     """
     vertices = distinct(wall_edges, surface.n)
     vertices = vertices[~roof_vertex[vertices]]
-    X, height = surface.vertices, surface.plane.height(surface.vertices)
-    zero, none = np.zeros(len(vertices)), np.zeros((len(vertices), 3))
+    X, zero, none = surface.vertices, np.zeros(len(vertices)), np.zeros((len(vertices), 3))
     if foot is None:
-        flat = X - height[:, None] * np.array(surface.plane.normal)
-        ends, fraction = _nearest(flat, vertices, top_edges)
+        ends, fraction = _nearest(surface.plane.nearest(X), vertices, top_edges)
         feet, bottom = np.full_like(ends, -1), surface.on_ground
-        top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
-        share, whole = height[vertices], top
     else:
         edge, tops = np.empty(surface.n, dtype=np.int64), np.flatnonzero(foot >= 0)
         edge[top_edges.ravel()] = np.repeat(np.arange(len(top_edges)), 2)
@@ -107,13 +88,14 @@ def wall_rows(
         ends = top_edges[edge[above]]
         fraction = (ends[:, 1] == above).astype(float)
         feet, bottom = foot[ends], surface.pinned
-        rows = WallRows(vertices, ends, fraction, zero, none, feet)
-        drop = rows.drops(X)
-        top = np.linalg.norm(drop, axis=1)
-        share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
-        whole = top**2
-    stands = np.abs(top) > ON * surface.size
-    relative = np.clip(np.divide(share, whole, out=zero, where=stands), 0.0, 1.0)
+    rows = WallRows(vertices, ends, fraction, zero, none, feet)
+    drop = rows.drops(surface, X)
+    top = np.linalg.norm(drop, axis=1)
+    share, stands = (
+        np.einsum("ij,ij->i", X[vertices] - rows.places(surface, X), drop),
+        top > ON * surface.size,
+    )
+    relative = np.clip(np.divide(share, top**2, out=zero.copy(), where=stands), 0.0, 1.0)
     if not stands.all():  # steps to the foot, over those to the foot and to the top
         inner = np.zeros(surface.n, dtype=bool)
         inner[vertices] = True
@@ -126,10 +108,10 @@ def wall_rows(
         steps = np.where(reached, down / np.where(reached, down + up, 1.0), 0.5)
         relative = np.where(stands, relative, steps)
     relative[bottom[vertices]] = 0.0
-    straight = WallRows(vertices, ends, fraction, relative, none, feet).places(surface, X)
-    offset = np.divide(X[vertices] - straight, top[:, None], out=none, where=stands[:, None])
+    rows = replace(rows, relative_height=relative)
+    offset = np.divide(X[vertices] - rows.places(surface, X), top[:, None], out=none, where=stands[:, None])
     offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
-    return WallRows(vertices, ends, fraction, relative, offset, feet)
+    return replace(rows, offset=offset)
 
 
 def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Floats]:
