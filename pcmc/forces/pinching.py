@@ -70,13 +70,6 @@ def resting_links(walls: Walls, resting: Bools) -> Ints:
     return links[resting[links[:, 0]]]
 
 
-def beside_resting(walls: Walls, resting: Bools) -> Bools:
-    """(n,) standing junction vertices next to a resting one."""
-    mask = np.zeros(len(resting), dtype=bool)
-    mask[resting_links(walls, resting)[:, 1]] = True
-    return mask & walls.top_free & ~resting
-
-
 @dataclass(frozen=True, eq=False)
 class StandingPart:
     """The part of a surface that carries forces: without the walls that are pinched where junctions rest.
@@ -117,8 +110,10 @@ class StandingPart:
                 curves=(),
                 **rests.resolved(whole.plane, whole.on_planes),
             )
-        links, beside = resting_links(walls, resting), beside_resting(walls, resting)
-        return cls(whole, walls, resting, surface, vertex_classes(surface, links, beside))
+        links, beside = resting_links(walls, resting), np.zeros(whole.n, dtype=bool)
+        beside[links[:, 1]] = True
+        classes = vertex_classes(surface, links, beside & walls.top_free & ~resting)
+        return cls(whole, walls, resting, surface, classes)
 
     def keep(self) -> StandingPart:
         """The same, which ``standing_part`` of the whole surface gives from now on."""
