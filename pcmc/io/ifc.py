@@ -298,9 +298,7 @@ def assigned_units(add: Callable[..., Any], units: Units) -> Any:
     return add("IfcUnitAssignment", Units=listed)
 
 
-def _unit(
-    add: Callable[..., Any], kind: str, name: str, unit: str, powers: Sequence[int], size: float
-) -> Any:
+def _unit(add: Callable[..., Any], kind: str, name: str, unit: str, powers: list[int], size: float) -> Any:
     """A unit of the SI with its prefix, or one of this ``size`` in it, such as a foot."""
     prefix = NAMES[unit] if NAMES[unit].isupper() else None
     plain = add("IfcSIUnit", UnitType=kind, Prefix=prefix, Name=name)
