@@ -21,10 +21,9 @@ from ..base import validate
 from ..base.arrays import plain
 from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.forces import Forces
-from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
+from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of, to_surface
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
-from ..surface.topology import topology
 from . import mesh_arrays
 from .mesh_arrays import CABLE, GUIDE, KEY, PLANES, SLIDES, TENSION
 
@@ -171,22 +170,13 @@ def _surface(
     if unused:
         notes = (*notes, f"{unused} vertices that no face uses were left out")
     if not marked:
-        support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
         notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
-    notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, support if marked else None)))
-    surface = Surface(
-        X,
-        F,
-        patch,
-        patches,
-        support == FIXED,
-        support == SLIDING,
-        whole.plane,
-        tuple((one, guide == number) for number, one in enumerate(whole.guides)),
-        tuple(zip(whole.planes, on_planes, strict=True)),
-        mesh_arrays.read_cables(named, places, whole.cables),
-        whole.rooms,
-    )
+    lines = tuple((one, guide == number) for number, one in enumerate(whole.guides))
+    planes = tuple(zip(whole.planes, on_planes, strict=True))
+    about: dict[str, Any] = {"plane": whole.plane, "lines": lines, "planes": planes, "rooms": whole.rooms}
+    about["cables"] = mesh_arrays.read_cables(named, places, whole.cables)
+    data = MeshData(X, F, patch, patches, support if marked else None, **about)
+    surface, notes = to_surface(data), (*notes, *import_warnings(data))
     of_key = {key: k for of_mesh in places.values() for key, k in of_mesh.items()}
     try:
         drawn = [(curve, [of_key[key] for key in curve.vertices.tolist()]) for curve in whole.curves]

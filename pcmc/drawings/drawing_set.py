@@ -56,15 +56,14 @@ class DrawingSet:
         wanted = [(path, suffix_of(path, SUFFIXES, "a drawing")) for path in map(Path, paths)]
         document: Any = dxf.document(self) if any(suffix != ".pdf" for _, suffix in wanted) else None
         for path, suffix in wanted:
-            if suffix == ".dxf":
-                jobs.append((path, document.saveas))
-            elif suffix == ".pdf":
-                jobs.append((path, partial(write_pages, self.sheets)))
-            else:
-                many = len(self.sheets) > 1
-                for k in range(len(self.sheets)):
-                    one = path.with_name(f"{path.stem}-{k + 1}{path.suffix}") if many else path
-                    jobs.append((one, partial(dxf.write_svg, document, k)))
+            if suffix != ".svg":
+                write = partial(write_pages, self.sheets) if suffix == ".pdf" else document.saveas
+                jobs.append((path, write))
+                continue
+            for k in range(len(self.sheets)):
+                number = f"-{k + 1}" if len(self.sheets) > 1 else ""
+                one = path.with_name(f"{path.stem}{number}{path.suffix}")
+                jobs.append((one, partial(dxf.write_svg, document, k)))
         return jobs
 
     def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
@@ -196,12 +195,10 @@ def drawing_set(
     setting_out = zip(points["point"], points[[*"xyz"]].to_numpy(), strict=True)
     named += [(at, name, "PCMC-POINT") for name, at in setting_out]
     levels, profiles = _levels(surface, heights, replaced), _profiles(surface, lines, replaced)
-    drawn: dict[str, list[views.DrawnView]] = {
-        "Plan": [views.plan_view(surface, curves, named)],
-        "Elevations": views.elevations(surface, curves),
-        "Sections at heights": [views.contours(surface, curves, levels)] if levels else [],
-        "Sections along lines": [view for view, _ in profiles],
-    }
+    elevations = views.elevations(surface, curves)
+    drawn = {"Plan": [views.plan_view(surface, curves, named)], "Elevations": elevations}
+    drawn["Sections at heights"] = [views.contours(surface, curves, levels)] if levels else []
+    drawn["Sections along lines"] = [view for view, _ in profiles]
     size = sheet, millimetres, scale, decimals
     sheets = [views.placed(shown, title, *size) for title, shown in drawn.items() if shown]
     tables, flat = {"Setting-out points": points}, None

@@ -166,7 +166,7 @@ class _Model:
 
     def add_cable(self, cable: Cable, place: Any) -> Any:
         """The tendon of a cable: its axis as polylines, and its force."""
-        chains = self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool))
+        chains = self.surface.topology.chains(cable.edges)
         lines = [self.polyline(self.surface.vertices[c.vertices], c.closed) for c in chains]
         pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
         about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
