@@ -199,10 +199,10 @@ class PageHandler(BaseHTTPRequestHandler):
     def _send(self, body: bytes, kind: str, file: str = "", status: HTTPStatus = HTTPStatus.OK) -> None:
         """Answer with a body, which the browser saves under the name of a ``file`` if there is one."""
         headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
-        headers |= (
-            {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(file, safe='')}"} if file else {}
-        )
-        headers |= {"Connection": "close"} if self.close_connection else {}
+        if file:
+            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(file, safe='')}"
+        if self.close_connection:
+            headers["Connection"] = "close"
         self.server.limit(self.connection)
         self.send_response(status)
         for name, value in headers.items():
