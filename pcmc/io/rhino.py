@@ -69,13 +69,11 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         model.Objects.AddMesh(mesh, attributes)
     if content.walls is not None:
         model.Layers[0].SetUserString(WALLS, content.walls)  # of the whole model, so once
-    support = support_of(surface)
     for name, kind in HELD.items():
-        held = surface.vertices[support == kind]
+        held, cloud = surface.vertices[support_of(surface) == kind], rhino.PointCloud()
+        for point in held.tolist():
+            cloud.Add(rhino.Point3d(*point))
         if len(held):
-            cloud = rhino.PointCloud()
-            for point in held.tolist():
-                cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], content.metadata))
     _add_curves(rhino, model, surface, replaced, content)
     for member in content.members:
@@ -178,9 +176,8 @@ def read(path: Path) -> MeshData:
         held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)
     F, source, cut = cut_polygons(points, np.concatenate(corners), np.concatenate(counts))
-    notes = (*filter(None, (note,)), *cut)
-    if others:
-        notes = (*notes, f"{others} objects that are not meshes were left out")
+    left_out = f"{others} objects that are not meshes were left out" if others else ""
+    notes = [*filter(None, (note, *cut, left_out))]
     support = None
     if metadata.plane is not None or any(held.values()):
         support = np.full(len(points), FREE, dtype=np.int8)
