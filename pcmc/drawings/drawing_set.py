@@ -212,8 +212,8 @@ def drawing_set(
         tables["Supports"] = certificate.supports[SUPPORT]
     if schedule is not None:
         families = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
-        families = families.assign(family=[f"F{k}" for k in families["family"]])
-        tables["Families of panels"] = families.rename(columns={"count": "panels", "mirrored": "turned over"})
+        families = families.rename(columns={"count": "panels", "mirrored": "turned over"})
+        tables["Families of panels"] = families.assign(family=[f"F{k}" for k in families["family"]])
     heads = {"area": units.area, **dict.fromkeys(("force", *SUPPORT[-3:]), units.force)}
     for title, table in tables.items():
         sheets += table_sheets(title, table, sheet, decimals, heads)
@@ -231,10 +231,10 @@ def drawing_set(
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
     rows: dict[int, list[Any]] = {}
-    open_ended = [c for c in curves if not (c.closed or c.layer in ("PCMC-CABLE", MEMBERS))]
-    ends = [(c, k) for c in open_ended for k in (0, -1)]
-    along = [(c, k) for c in curves for k in range(len(c.vertices))]
-    for c, k in [*ends, *along]:
+    ends = [c for c in curves if not (c.closed or c.layer in ("PCMC-CABLE", MEMBERS))]
+    places = [(c, k) for c in ends for k in (0, -1)]
+    places += [(c, k) for c in curves for k in range(len(c.vertices))]
+    for c, k in places:
         on = c.layer.removeprefix("PCMC-").lower()
         rows.setdefault(c.vertices[k], [f"P{len(rows) + 1}", *c.points[k].tolist(), on])
     return pd.DataFrame(rows.values(), columns=["point", *"xyz", "on"])
@@ -259,13 +259,9 @@ def _profiles(
     surface: Surface, lines: Sequence[Ends] | None, without: Collection[str]
 ) -> list[tuple[views.DrawnView, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
-    given = lines is not None
-    if lines is None:
-        low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
-        x, y = map(float, 0.5 * (low + high))
-        lines = [((float(low[0]), y), (float(high[0]), y)), ((x, float(low[1])), (x, float(high[1])))]
-    profiles = []
-    for line in lines:
+    (left, front), (right, back) = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
+    x, y, profiles = 0.5 * (left + right), 0.5 * (front + back), []
+    for line in (((left, y), (right, y)), ((x, front), (x, back))) if lines is None else lines:
         ends = np.asarray(line, dtype=float)
         along = ends[1] - ends[0] if ends.shape == (2, 2) else np.zeros(2)
         length = float(np.linalg.norm(along))
@@ -275,7 +271,7 @@ def _profiles(
         normal = np.array([-along[1], along[0], 0.0])
         found = views.cut_lines(surface, np.append(ends[0], 0.0), normal, without)
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
-        if not found and given:
+        if not found and lines is not None:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
         if found:
             profiles.append((views.profile(title, ends[0], along, found), found))

@@ -116,11 +116,10 @@ def plan_view(surface: Surface, curves: Lines, points: Sequence[tuple[Floats, st
     """From above: panels, curves with names of cables and members, points, places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
-    middle = 0.5 * np.sum(view.box, axis=0)
     for curve in curves:
         if curve.layer in ("PCMC-CABLE", MEMBERS):
             at = curve.points[len(curve.points) // 2, :2]
-            away = at - middle
+            away = at - 0.5 * np.sum(view.box, axis=0)
             view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
     view.stations = outline_places(curves, (1.0, 0.0, 0.0)), outline_places(curves, (0.0, 1.0, 0.0))
     return view
@@ -194,8 +193,8 @@ def placed(
     origin = corner() + 0.5 * (np.array(drawing_area(name)) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
-        spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
-        shift = place + spare - factor * low
+        shift = place - factor * low
+        shift[0] += 0.5 * factor * (extent - (high - low))[0]
         sheet.places.append((factor, shift))
         _add_dimensions(sheet, view, factor, shift, decimals)
         if len(views) > 1:
@@ -248,8 +247,7 @@ def _add_dimensions(sheet: Sheet, view: DrawnView, factor: float, shift: Floats,
         mark = np.array([[x, y], [x + 1.2, y + 2.0], [x - 1.2, y + 2.0]])
         rule = np.array([[x - 2.0, y], [x + 18.0, y]])
         sheet.lines += [SheetLine(mark, "PCMC-DIM", True), SheetLine(rule, "PCMC-DIM")]
-        text = f"{z:+.{decimals}f}"
-        text = text if float(text) else f"±{abs(z):.{decimals}f}"
+        text = f"{z:+.{decimals}f}" if round(z, decimals) else f"±{abs(z):.{decimals}f}"
         sheet.texts.append(Text((x + 2.0, y + 0.7 * SMALL), text, layer="PCMC-DIM"))
 
 

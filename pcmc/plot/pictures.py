@@ -341,8 +341,7 @@ def cell_html(value: Any) -> str:
     """
     text = f"<pre>{html.escape(repr(value))}</pre>"
     try:
-        surface = value if isinstance(value, Surface) else value.surface
-        image = draw(surface, width=CELL_WIDTH, legend=True)
+        image = draw(value if isinstance(value, Surface) else value.surface, width=CELL_WIDTH, legend=True)
     except MissingExtra:
         return text
     return f'<img alt="surface" src="data:image/png;base64,{b64encode(png(image)).decode()}">{text}'
