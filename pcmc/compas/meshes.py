@@ -66,10 +66,9 @@ def to_meshes(surface: Surface) -> list[Any]:
         if field.name not in CARRIED and not empty:
             text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
             raise SurfaceError(text, what=field.name, found=value)
-    for cable in surface.cables:
-        if cable.weight:
-            text = f"cable {cable.name!r}: COMPAS meshes do not carry its weight; write the surface as .pcmc"
-            raise SurfaceError(text, what="weight", where=cable.name, found=cable.weight)
+    if heavy := next((cable for cable in surface.cables if cable.weight), None):
+        text = f"cable {heavy.name!r}: COMPAS meshes do not carry its weight; write the surface as .pcmc"
+        raise SurfaceError(text, what="weight", where=heavy.name, found=heavy.weight)
     rows, meshes = _vertex_attributes(surface), []
     for index, patch in enumerate(surface.patches):
         mesh = mesh_class(default_vertex_attributes=MARKS | QUANTITIES, name=patch.name)
@@ -137,8 +136,7 @@ def from_meshes(
     >>> from_meshes(floor).patches
     (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
-    named = mesh_arrays.named_meshes(meshes)
-    validate.flag("weld", weld)
+    named, weld = mesh_arrays.named_meshes(meshes), validate.flag("weld", weld)
     try:
         surface, notes = _surface(named, tensions, pressures, weld)
     except (TypeError, ValueError, LookupError, AttributeError, OverflowError) as error:
@@ -183,8 +181,10 @@ def _surface(
         curves = [replace(curve, vertices=np.array(own)) for curve, own in drawn]
         return surface.rebuilt(curves=curves), notes
     except (KeyError, SurfaceError):
-        lost = "the curves that held vertices were drawn on do not fit these meshes any more"
-        return surface, (*notes, f"{lost} and were left out")
+        lost = (
+            "the curves that held vertices were drawn on do not fit these meshes any more and were left out"
+        )
+        return surface, (*notes, lost)
 
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
@@ -231,16 +231,10 @@ def solve(
         warnings.simplefilter("always")
         start = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
         result = pcmc.solve(start, **options)
-        return {
-            "meshes": to_meshes(result.surface),
-            "converged": result.converged,
-            "status": result.status.name.lower(),
-            "message": result.message,
-            "energy": result.energy,
-            "iterations": result.iterations,
-            "certificate": _plain_certificate(result.certificate),
-            "warnings": [str(one.message) for one in caught],
-        }
+        answer = {key: getattr(result, key) for key in ("converged", "message", "energy", "iterations")}
+        answer |= {"meshes": to_meshes(result.surface), "status": result.status.name.lower()}
+        answer["certificate"] = _plain_certificate(result.certificate)
+        return answer | {"warnings": [str(one.message) for one in caught]}
 
 
 def certify(
@@ -297,5 +291,5 @@ def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **optio
 
 
 def _plain_certificate(found: pcmc.Certificate) -> dict[str, Any]:
-    tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries", "supports")}
-    return dict(plain({"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}))
+    told = ("certified", "detail", "patches", "junctions", "boundaries", "supports")
+    return dict(plain({**found.numbers(), **{name: getattr(found, name) for name in told}}))
