@@ -185,9 +185,8 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
         F, source, notes = cut_polygons(X, corners, np.array([len(loop) for loop in loops]))
     except FileError as error:
         at = int(str(error.where))
-        _refuse(
-            "faces", list(named)[mesh_of_face[at]], str(error).replace(f"face {at}", f"face {keys[at]}", 1)
-        )
+        text = str(error).replace(f"face {at}", f"face {keys[at]}", 1)
+        _refuse("faces", list(named)[mesh_of_face[at]], text)
     return F, np.array(mesh_of_face)[source], notes
 
 

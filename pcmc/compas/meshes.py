@@ -181,10 +181,8 @@ def _surface(
         curves = [replace(curve, vertices=np.array(own)) for curve, own in drawn]
         return surface.rebuilt(curves=curves), notes
     except (KeyError, SurfaceError):
-        lost = (
-            "the curves that held vertices were drawn on do not fit these meshes any more and were left out"
-        )
-        return surface, (*notes, lost)
+        lost = "the curves that held vertices were drawn on do not fit these meshes any more"
+        return surface, (*notes, f"{lost} and were left out")
 
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:

@@ -1,4 +1,5 @@
-"""The drawings of a roof: a model in three dimensions and sheets of paper, panels at true size too."""
+"""The drawings of a roof, or of a net of panels on it: a model in three dimensions and sheets of paper, with
+panels at true size."""
 
 from __future__ import annotations
 
@@ -19,17 +20,20 @@ from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.certificate import certified
-from ..panelling import Panels, panels
+from ..panelling import PanelNet, Panels, panels
 from ..surface import Surface, expect_surface
 from ..surface.images import expect_no_images
 from . import dxf, views
-from .panel_sheets import flat_panels, triangles_at_true_size
+from .panel_sheets import flat_panels, polygons_at_true_size, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
 from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, length_decimals, table_sheets
 from .sheet import write_pdf as write_pages
 
-SUFFIXES, CSV = (".dxf", ".pdf", ".svg"), ".csv"
+SUFFIXES, CSV, OBJ = (".dxf", ".pdf", ".svg"), ".csv", ".obj"
+NET_SUFFIXES = (*SUFFIXES, CSV, OBJ)
+NET_TABLES = ("", "nodes", "beams")  # of panels, nodes and beams
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
+Paths = Iterable[str | os.PathLike[str]]
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
 
@@ -86,7 +90,7 @@ def table_paths(path: Path, tables: Iterable[str]) -> list[Path]:
 
 
 def document_files(
-    paths: Iterable[str | os.PathLike[str]],
+    paths: Paths,
     draw: Callable[[], DrawingSet],
     tables: Mapping[str, pd.DataFrame],
     others: Mapping[str, Callable[[Path], None]],
@@ -276,3 +280,57 @@ def _profiles(
         if found:
             profiles.append((views.profile(title, ends[0], along, found), found))
     return profiles
+
+
+def net_drawings(
+    net: PanelNet, units: str | Units, *, sheet: str = "A1", name: str = "", mark: str = ""
+) -> DrawingSet:
+    """The plan of a net, tables of its nodes and panels, and each panel at true size, for .dxf, .pdf, .svg.
+
+    Parameters
+    ----------
+    units : of the lengths: "m", "cm", "mm", "ft" or "in".
+    sheet : format of the sheets, "A4" to "A0".
+    name, mark : of the roof, in the title strips and on every sheet.
+
+    >>> from generators import delaunay
+    >>> from pcmc import panel_net
+    >>> drawings = net_drawings(panel_net(delaunay(exact=True), 0.9, anyway=True), "m", sheet="A0")
+    >>> [page.title for page in drawings.sheets[:3]], drawings.sheets[3].title[7:]
+    (['Panels and nodes in plan', 'Nodes', 'Panels'], ' at true size, outside up')
+    """
+    validate.choice("sheet", sheet, tuple(FORMATS))
+    length = expect_length(as_units(units).length, "drawings of panels")
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, net.mesh.size)
+    curves = [
+        SheetLine(net.points[loop], "PCMC-PANEL", True, name=f"panel {k}")
+        for k, loop in enumerate(net.polygons, start=1)
+    ]
+    lines = [line._replace(points=line.points[:, :2]) for line in curves]
+    numbers = [(line.points.mean(axis=0), str(k), np.zeros(2)) for k, line in enumerate(lines, start=1)]
+    ends = [np.array([column.min(), column.max()]) for column in net.points[:, :2].T]
+    nodes = [(at, str(k), "PCMC-POINT") for k, at in enumerate(net.points[:, :2], start=1)]
+    plan = views.DrawnView("", lines, numbers, nodes, stations=(ends[0], ends[1]))
+    sheets = [views.placed([plan], "Panels and nodes in plan", sheet, millimetres, None, decimals)]
+    tables = [
+        ("Nodes", net.nodes[["node", *"xyz", "kind"]], dict.fromkeys("xyz", length)),
+        ("Panels", net.panels[["panel", "patch", "kind", "corners", "area"]], {"area": f"{length}²"}),
+    ]
+    for title, table, head in tables:
+        sheets += table_sheets(title, table, sheet, decimals, head)
+    panels = polygons_at_true_size(net, millimetres)
+    sheets += panels_at_true_size(panels, sheet)
+    add_frames(sheets, name, length, net.certificate, mark)
+    points = net.nodes[["node", *"xyz"]].rename(columns={"node": "point"}).astype({"point": str})
+    points = points.assign(on="panel")
+    about = net.mesh, length, net.certificate, curves
+    return DrawingSet(*about, (), points, (), None, flat_panels(panels), sheets, mark=mark)
+
+
+def net_files(
+    net: PanelNet, paths: Paths, units: str | Units, sheet: str, name: str, mark: str
+) -> list[tuple[Path, Callable[[Path], Any]]]:
+    """Each file of a net with the function that writes it; FileError for an unknown suffix."""
+    tables = dict(zip(NET_TABLES, (net.panels, net.nodes, net.beams), strict=True))
+    draw = partial(net_drawings, net, units, sheet=sheet, name=name, mark=mark)
+    return document_files(paths, draw, tables, {OBJ: partial(net.write_obj, mark=mark)}, "a net of panels")
