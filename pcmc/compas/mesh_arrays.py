@@ -138,7 +138,8 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
             given = [row.get(axis) for axis in "xyz"]
             point = [validate.real(x) for x in given]
             if not all(map(math.isfinite, point)):
-                _refuse("vertices", name, f"vertex {key} is at {given}; set its x, y and z to finite numbers")
+                at = validate.shown(given)
+                _refuse("vertices", name, f"vertex {key} is at {at}; set its x, y and z to finite numbers")
             vertices.append(Vertex(name, key, point, support, -1 if guide is None else guide, planes))
     if not vertices:
         validate.refuse("meshes", list(named), "meshes with faces", error=SurfaceError)
