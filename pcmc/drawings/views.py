@@ -170,12 +170,7 @@ def profile(name: str, start: Floats, along: Floats, lines: Lines) -> DrawnView:
 
 
 def placed(
-    views: Sequence[DrawnView],
-    title: str,
-    name: str,
-    millimetres: float,
-    scale: int | None,
-    decimals: int,
+    views: Sequence[DrawnView], title: str, name: str, millimetres: float, scale: int | None, decimals: int
 ) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 

@@ -104,12 +104,12 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
 
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, by kind and name; walls follow the pressures of their rooms."""
-    given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
+    given: dict[str, Any] = {kind: values.get(kind) for kind in KINDS}
     changed, points = surface.retensioned(**given), values.get("points") or {}
     known = dict(zip(changeable_values(surface)["points"], single_points(surface).tolist(), strict=True))
     X = surface.vertices.copy()
     for name, place in points.items():
-        X[known[validate.choice("point", name, tuple(known))]] = place
+        X[known[validate.choice("point", name, tuple(known))]] = validate.triple(f"point {name!r}", place)
     return changed if np.array_equal(X, surface.vertices) else changed.moved(X)
 
 

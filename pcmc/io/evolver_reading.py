@@ -51,20 +51,11 @@ def read(path: Path) -> MeshData:
         of_patch[patch_of_face] = sides
         signs = tuple((patches[k].name, int(of_patch[k])) for k in np.flatnonzero(of_patch))
         rooms.append(Room(names.get(number, f"body {number}"), signs, volume))
-    unset = file.names("bare").values()
-    return MeshData(
-        X + origin,
-        F,
-        patch_of_face[source],
-        patches,
-        support,
-        plane,
-        notes=(*notes, *more),
-        planes=planes,
-        rooms=tuple(rooms),
-        cables=_cables(file.names("cable"), edges, ends, edge_rest),
-        bare=tuple(p.name for p in patches if p.name in unset and p.tension == p.pressure == 1.0),
-    )
+    unset, cables = file.names("bare").values(), _cables(file.names("cable"), edges, ends, edge_rest)
+    bare = tuple(p.name for p in patches if p.name in unset and p.tension == p.pressure == 1.0)
+    about: dict[str, Any] = {"planes": planes, "rooms": tuple(rooms), "cables": cables, "bare": bare}
+    mesh = X + origin, F, patch_of_face[source], patches, support, plane
+    return MeshData(*mesh, notes=(*notes, *more), **about)
 
 
 class _Datafile(dict[str, TextSection]):

@@ -214,18 +214,10 @@ def with_parts(data: MeshData) -> MeshData:
         on_planes = () if off in lost else tuple((Plane(*row), own) for row, own in planes)
     except DAMAGED:
         raise _damaged(str(dict(parts))) from None
-    return replace(
-        data,
-        vertices=X,
-        support=support,
-        cables=tuple(cables),
-        rooms=rooms,
-        lines=guides,
-        planes=on_planes,
-        order=order,
-        images=images,
-        notes=(*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else [])),
-    )
+    notes = (*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else []))
+    found: dict[str, Any] = {"cables": tuple(cables), "rooms": rooms, "lines": guides, "planes": on_planes}
+    found |= {"order": order, "images": images}
+    return replace(data, vertices=X, support=support, notes=notes, **found)
 
 
 WALLS = "pcmc walls"  # the key of their text in a file
@@ -304,16 +296,11 @@ def restore_walls(data: MeshData) -> MeshData:
     number = {p.name: k for k, p in enumerate(patches)}
     patch = np.array([number.get(p.name, -1) for p in walls.patches])[walls.patch_of_face]
     beside = cKDTree(data.vertices).query(walls.vertices[below])[1]
-    whole = replace(
-        data,
-        vertices=X,
-        faces=np.concatenate([data.faces[~is_wall], place[walls.faces]]),
-        patch_of_face=np.concatenate([data.patch_of_face[~is_wall], patch]),
-        patches=tuple(patches),
-        support=support,
-        scalars={k: np.concatenate([v, v[beside]]) for k, v in data.scalars.items()},
-        walls=None,
-    )
+    F = np.concatenate([data.faces[~is_wall], place[walls.faces]])
+    of_face = np.concatenate([data.patch_of_face[~is_wall], patch])
+    scalars = {k: np.concatenate([v, v[beside]]) for k, v in data.scalars.items()}
+    mesh: dict[str, Any] = {"vertices": X, "faces": F, "patch_of_face": of_face, "patches": tuple(patches)}
+    whole = replace(data, **mesh, support=support, scalars=scalars, walls=None)
     return replace(without_unused(whole), notes=data.notes)
 
 

@@ -59,9 +59,6 @@ def write(path: Path, surface: Surface, content: Content) -> None:
             file.write(np.rec.fromarrays(list(columns.values()), dtype=np.dtype(dtype)).tobytes())
 
 
-# Reading
-
-
 @dataclass(frozen=True)
 class _Element:
     """An element of the header; a property is (name, type), at most one is (name, type, type of items)."""

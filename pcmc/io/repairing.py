@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -119,16 +120,10 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
             text = f"{text}; use {1.01 * least:.2g} or more"
             raise OptionError(text, what="edge_length", found=edge_length, expected=least)
     with tempfile.TemporaryDirectory() as folder:
-        request = Path(folder) / "mesh.npz"
-        np.savez(
-            request,
-            points=X,
-            faces=F,
-            patch=data.patch_of_face,
-            weld=WELD * size if weld is None else weld,
-            holes=holes,
-            edge_length=0.0 if edge_length is None or several else edge_length,
-        )
+        request, patch, near = Path(folder) / "mesh.npz", data.patch_of_face, WELD * size
+        options: dict[str, Any] = {"weld": near if weld is None else weld, "holes": holes}
+        options["edge_length"] = 0.0 if edge_length is None or several else edge_length
+        np.savez(request, points=X, faces=F, patch=patch, **options)
         answer = read_arrays("io/reading_scripts.py", "repaired_arrays", request)
     kept, patch = np.unique(answer["patch"], return_inverse=True)  # one may have vanished
     patches = tuple(data.patches[k] for k in kept)
