@@ -6,7 +6,7 @@ Where following leads nowhere, the walls or the start shape of the surface's pro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -144,9 +144,10 @@ class ProjectFallback:
         if way.failed is None or stop() or not self.data:
             return way, "", self
         moved = {name for name, tension in _walls(asked) if (name, tension) not in self.given}
+        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}  # to the project
         start, note = None, ""
         try:
-            project, start = self.start(asked, moved)
+            project, start = data_with_values(self.path, self.data, asked, left)[1:]
         except (PcmcError, MissingExtra) as error:
             note = f"the project's own way to these values: {error}"
         if start is not None and (new := _walls(start) - _walls(asked)):
@@ -172,15 +173,6 @@ class ProjectFallback:
         given = {wall for wall in _walls(start) if wall[0] not in moved}
         found = Reached(result.surface, result.certificate, None)
         return found, note, replace(self, given=self.given | given)
-
-    def start(self, asked: Surface, moved: Collection[str] = ()) -> tuple[projects.Project, Surface]:
-        """The project with the values of a surface, and its start shape.
-
-        Walls have the tensions that the project gives them beside the new tensions of its patches; those in
-        ``moved`` have the surface's. Errors as ``data_with_values``.
-        """
-        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}
-        return data_with_values(self.path, self.data, asked, left)[1:]
 
 
 def _walls(surface: Surface) -> frozenset[tuple[str, float]]:

@@ -23,6 +23,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from pathlib import Path
+from types import NoneType
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
@@ -167,14 +168,12 @@ class PageHandler(BaseHTTPRequestHandler):
             case ["GET", "page", name]:
                 self._send_file(name)
             case ["GET", "api", session, "export"]:
-                suffix = parse_qs(parts.query).get("suffix", [""])[0]
-                name, body = explorer.export(session, suffix)
-                self._send(body, BYTES, f"attachment; filename*=UTF-8''{quote(name, safe='')}")
+                name, body = explorer.export(session, parse_qs(parts.query).get("suffix", [""])[0])
+                self._send(body, BYTES, name)
             case ["POST", "api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
                 turn = re.fullmatch(r"(\w{1,20}) (\d{1,9})", self.headers.get("X-Turn", ""))
-                place = None if turn is None else (turn[1], int(turn[2]))
-                given = "".join(session), act, json_object(content)
-                self._send(explorer.answer(*given, self._gone, place), BYTES)
+                given = "".join(session), act, json_object(content), self._gone
+                self._send(explorer.answer(*given, turn and (turn[1], int(turn[2]))), BYTES)
             case _:
                 raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
 
@@ -197,12 +196,11 @@ class PageHandler(BaseHTTPRequestHandler):
             raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")
 
-    def _send(
-        self, body: bytes, kind: str, disposition: str = "", status: HTTPStatus = HTTPStatus.OK
-    ) -> None:
+    def _send(self, body: bytes, kind: str, file: str = "", status: HTTPStatus = HTTPStatus.OK) -> None:
+        """Answer with a body, which the browser saves under the name of a ``file`` if there is one."""
         headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
-        if disposition:
-            headers["Content-Disposition"] = disposition
+        if file:
+            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(file, safe='')}"
         if self.close_connection:
             headers["Connection"] = "close"
         self.server.limit(self.connection)
@@ -251,11 +249,6 @@ def json_object(content: bytes) -> dict[str, Any]:
     if not isinstance(asked, dict):
         raise RequestError("expected a JSON object")
     return asked
-
-
-def or_null(check: Check) -> Check:
-    """The check of a value that may be null."""
-    return lambda what, value: None if value is None else check(what, value)
 
 
 def of_type(words: str, *types: type) -> Check:
@@ -308,12 +301,12 @@ ACTS: dict[str, dict[str, Check]] = {
     "meet": {"targets": entries(Target), "vary": entries(Parameter)},
     "keep": {"name": variant_name},
     **{act: {"number": whole} for act in ("forget", "recall", "visit")},
-    "compare": {"number?": or_null(whole)},
+    "compare": {"number?": of_type("a whole number or null", int, NoneType)},
     **{act: {} for act in ("stabilise", "remesh", "undo", "redo", "reset", "stop", "state")},
 }
 """The acts of a session, with the arguments that each takes; they answer with its state."""
 REQUESTS: dict[str, dict[str, Check]] = ACTS | {
-    "open": {"session?": or_null(name)},
+    "open": {"session?": of_type("a name or null", str, NoneType)},
     **{act: {"what": name} for act in ("margin", "equilibria")},
     "save": {"name": name, "replace?": truth},
     **{act: {} for act in ("check", "verify", "families", "news")},

@@ -60,11 +60,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     named += [("wall", k, "") for k, p in patches if p.wall]
     named += [("room", k, room.name) for k, room in enumerate(surface.rooms, 1)]
     named += [("cable", k, cable.name) for k, cable in enumerate(surface.cables, 1)]
-    header = HEADER.format(
-        mark=content.mark and f"\n// {content.mark}",
-        origin=" ".join(map(repr, surface.origin.tolist())),
-        names="\n".join(f"// {kind} {k} {escaped(name, SPECIAL)}".rstrip() for kind, k, name in named),
-    )
+    names = "\n".join(f"// {kind} {k} {escaped(name, SPECIAL)}".rstrip() for kind, k, name in named)
+    mark, origin = content.mark and f"\n// {content.mark}", " ".join(map(repr, surface.origin.tolist()))
     topo = surface.topology
     sides = ((topo.edge_of_face + 1) * topo.sense)[:, [2, 0, 1]]
     vertex_tag, edge_tag = _tags(surface)
@@ -74,7 +71,7 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         "FACES": ("%d %d %d", sides, np.array(face_tags)[surface.patch_of_face]),
     }
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + _definitions(surface, weights))
+        file.write(HEADER.format(mark=mark, origin=origin, names=names) + _definitions(surface, weights))
         for name, (template, rows, tag) in sections.items():
             numbers = np.arange(1, len(rows) + 1)
             file.write(f"\n{name}\n" + format_rows(f"%d {template}%s\n", numbers, *rows.T, tag))
@@ -129,8 +126,7 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
     for kind, masks in ((support, at_vertices), (of_edge, at_edges)):
         tag = kinds[kind]
         for number, mask in enumerate(masks, 2):
-            first = np.strings.find(tag, "constraint") < 0
-            more = np.where(first, f" constraint {number}", f" {number}")
+            more = np.where(np.strings.find(tag, "constraint") < 0, f" constraint {number}", f" {number}")
             tag = np.strings.add(tag, np.where(mask, more, ""))
         tags.append(tag.astype(object))
     vertices, edges = tags
@@ -168,7 +164,6 @@ def _bodies(surface: Surface) -> str:
         bodies.append(((side * numbers)[of_face == pressure], f" pressure {pressure!r}"))
     text = ""
     for number, (members, rest) in enumerate(bodies, 1):
-        words = members.astype(str)
-        lines = [" ".join(words[k : k + 15]) for k in range(0, len(words), 15)]
+        lines = [" ".join(members[k : k + 15].astype(str)) for k in range(0, len(members), 15)]
         text += f"{number} " + " \\\n  ".join(lines) + f"{rest}\n"
     return text

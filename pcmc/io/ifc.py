@@ -103,8 +103,7 @@ class _Model:
         return self.add("IfcAxis2Placement3D", Location=origin)
 
     def placement(self, relative: Any = None, point: Iterable[float] = (0.0, 0.0, 0.0)) -> Any:
-        axes = self.axes(point)
-        return self.add("IfcLocalPlacement", PlacementRelTo=relative, RelativePlacement=axes)
+        return self.add("IfcLocalPlacement", PlacementRelTo=relative, RelativePlacement=self.axes(point))
 
     def of_force(self, measure: str) -> str:
         """The type of a number with a unit of force; without such a unit it is a bare number."""
@@ -166,7 +165,7 @@ class _Model:
 
     def add_cable(self, cable: Cable, place: Any) -> Any:
         """The tendon of a cable: its axis as polylines, and its force."""
-        chains = self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool))
+        chains = self.surface.topology.chains(cable.edges)
         lines = [self.polyline(self.surface.vertices[c.vertices], c.closed) for c in chains]
         pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
         about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
@@ -239,9 +238,8 @@ class _Model:
 
     def polyline(self, places: Floats, closed: bool) -> Any:
         """A line through points (k,3)."""
-        points = (places - self.middle).tolist()
-        entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
-        return self.add("IfcPolyline", Points=entities + entities[:1] * closed)
+        points = [self.add("IfcCartesianPoint", Coordinates=at) for at in (places - self.middle).tolist()]
+        return self.add("IfcPolyline", Points=points + points[:1] * closed)
 
     def element(
         self, kind: str, role: str, name: str, place: Any, shape: tuple[Any, str, list[Any]], **values: Any

@@ -167,8 +167,7 @@ def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], i
             return found
         count = found[column][0]
         if not 0 <= count <= len(data) or count != int(count):
-            text = f"{element.name} {number} lists {count} items"
-            raise FileError(text, where=number, found=count.item())
+            raise FileError(f"{element.name} {number} lists {count} items", where=number, found=count.item())
         need(offset + row(int(count)).itemsize)
         return np.frombuffer(data, row(int(count)), 1, offset)
 

@@ -194,10 +194,8 @@ def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tu
     if len(wrong):
         faces = np.flatnonzero((topo.edge_of_face == wrong[0]).any(axis=1))
         a, b = (data.patches[k].name for k in data.patch_of_face[faces])
-        opposed = (
-            f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
-            " sides; unless you want that, reverse the faces of one"
-        )
+        opposed = f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
+        opposed += " sides; unless you want that, reverse the faces of one"
     seam, turned = _open_seam(data.vertices, outer), _turned(data, outer, os.fspath(path))
     return tuple(filter(None, (seam, opposed, turned)))
 
@@ -205,21 +203,15 @@ def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tu
 def _open_seam(X: Floats, outer: Ints) -> str:
     if not len(outer):
         return ""
-    length = segment_lengths(X, outer)
-    beside = np.full(len(X), np.inf)
-    np.minimum.at(beside, outer.ravel(), np.repeat(length, 2))
-    rim = np.unique(outer)
-    distances, neighbours = map(np.asarray, cKDTree(X[rim]).query(X[rim], k=2))
-    apart, near = distances[:, 1], neighbours[:, 1]
+    rim, beside = np.unique(outer), np.full(len(X), np.inf)
+    np.minimum.at(beside, outer.ravel(), np.repeat(segment_lengths(X, outer), 2))
+    apart, near = (np.asarray(found)[:, 1] for found in cKDTree(X[rim]).query(X[rim], k=2))
     close = apart < GAP * np.minimum(beside[rim], beside[rim[near]])
     if not close.any():
         return ""
-    place = X[rim[close][0]].round(4).tolist()
-    return (
-        f"a seam is open: {np.count_nonzero(close)} boundary vertices are within"
-        f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
-        " drew the mesh, or with pcmc repair --weld"
-    )
+    far, place = f"{apart[close].max():.2g}", X[rim[close][0]].round(4).tolist()
+    text = f"a seam is open: {np.count_nonzero(close)} boundary vertices are within {far} of another one, the"
+    return f"{text} first at {place}; join them in the program that drew the mesh, or with pcmc repair --weld"
 
 
 def _turned(data: MeshData, outer: Ints, path: str) -> str:

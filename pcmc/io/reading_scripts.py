@@ -91,8 +91,7 @@ def rhino_arrays(path: str) -> dict[str, Any]:
         elif isinstance(geometry, rhino.PolylineCurve):
             held["line"] = coordinates(geometry.Point(k) for k in range(geometry.PointCount))
         objects.append(held)
-    unit = str(model.Settings.ModelUnitSystem.name)
-    return {"layers": layers, "objects": objects, "unit": unit}
+    return {"layers": layers, "objects": objects, "unit": str(model.Settings.ModelUnitSystem.name)}
 
 
 def ifc_arrays(path: str) -> dict[str, Any]:
@@ -246,17 +245,15 @@ def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: Any) -> tu
     changes["triangles turned"] += min(np.count_nonzero(turned), np.count_nonzero(~turned))
     over = bool(2 * np.count_nonzero(turned) > len(turned))
     faces = mesh.face_matrix()
-    size = len(faces)
     if holes >= 3:
         meshes.meshing_close_holes(maxholesize=holes, newfaceselected=True, selfintersection=False)
         mesh = meshes.current_mesh()
-        faces = _without_large_fills(mesh, size, _vertices(mesh), single, changes)
-    points = meshes.current_mesh().vertex_matrix()
-    up = _area_vectors(points, faces)[:, 2]
+        faces = _without_large_fills(mesh, len(faces), _vertices(mesh), single, changes)
+    up = _area_vectors(mesh.vertex_matrix(), faces)[:, 2]
     if abs(up.sum()) > 0.01 * np.abs(up).sum() and up.sum() < 0.0:  # a roof that looks down
         faces, over = faces[:, ::-1], not over
     changes["patches turned over"] += int(over)
-    return faces, _vertices(meshes.current_mesh())
+    return faces, _vertices(mesh)
 
 
 def _vertices(mesh: Any) -> Any:

@@ -46,7 +46,7 @@ class Repaired:
     def __str__(self) -> str:
         """The changes and notes in one line."""
         counts = (f"{number} {done}" for done, number in self.changes.items())
-        return "; ".join([*counts, *self.notes]) or "nothing to repair"
+        return "; ".join((*counts, *self.notes)) or "nothing to repair"
 
 
 def repair(
@@ -116,8 +116,8 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
 
         least = math.sqrt(np.nansum(triangles_for(face_areas(X[F]), np.ones(len(F)))) / MOST)
         if edge_length < least:
-            text = f"edge_length = {edge_length:g} would make more than {MOST} triangles"
-            text = f"{text}; use {1.01 * least:.2g} or more"
+            better = f"use {1.01 * least:.2g} or more"
+            text = f"edge_length = {edge_length:g} would make more than {MOST} triangles; {better}"
             raise OptionError(text, what="edge_length", found=edge_length, expected=least)
     with tempfile.TemporaryDirectory() as folder:
         request, patch, near = Path(folder) / "mesh.npz", data.patch_of_face, WELD * size
@@ -129,9 +129,10 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     patches = tuple(data.patches[k] for k in kept)
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
-    names = ("cables", "rooms", "planes", "lines")
-    given = {name: getattr(data, name) or data.parts.get(name) for name in names}
-    given = {"supports": data.support is not None and np.any(data.support), **given}
+    given: dict[str, Any] = {"supports": data.support is not None and np.any(data.support)}
+    given |= {
+        key: getattr(data, key) or data.parts.get(key) for key in ("cables", "rooms", "planes", "lines")
+    }
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)
