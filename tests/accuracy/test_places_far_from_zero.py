@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 import pcmc
@@ -32,9 +31,9 @@ def test_two_heights_have_a_name_each():
 
 def test_a_roof_there_has_the_mesh_the_margin_and_the_cloth_of_the_same_roof_here():
     roofs = []
-    for at in (np.zeros(2), np.array([500000.0, 5812345.0])):
-        corners, line = at + [[0, 0], [12, 0], [12, 8], [0, 8]], at + [[4, 0], [4, 8]]
-        hole = Hole({"circle": {"centre": (at + (8, 4)).tolist(), "radius": 1.0}})
+    for x, y in ((0.0, 0.0), (500000.0, 5812345.0)):
+        corners, line = [[x, y], [x + 12, y], [x + 12, y + 8], [x, y + 8]], [[x + 4, y], [x + 4, y + 8]]
+        hole = Hole({"circle": {"centre": [x + 8, y + 4], "radius": 1.0}})
         plan = Plan(corners, [line], edge_length=1.0, tension=2.6, holes=[hole])
         roofs.append(pcmc.solve(plan.surface()).surface)
     pressure = [pcmc.margin(roof, "pressure", meshes=1).factor for roof in roofs]
