@@ -65,7 +65,7 @@ def triangulate(
     """
     given = np.asarray(points, dtype=float)
     origin = file_origin(given, bounding_size(given))  # near it distances keep their digits
-    fixed, holes = given - origin, np.reshape(holes, (-1, 2)) - origin
+    fixed, inside_holes = given - origin, np.reshape(holes, (-1, 2)) - origin
     segments = np.asarray(segments, dtype=np.int64)
     validate.positive("edge_length", edge_length)
     near = cKDTree(fixed).query_pairs(1e-9 * edge_length)
@@ -79,7 +79,7 @@ def triangulate(
     spacing = np.full(len(fixed), float(edge_length))  # at each point its shortest segment
     np.minimum.at(spacing, segments.ravel(), np.repeat(segment_lengths(fixed, segments), 2))
     everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
-    mesh = _inside(everything, segments, holes, len(fixed), origin)
+    mesh = _inside(everything, segments, inside_holes, len(fixed), origin)
     for step in range(ROUNDS):
         X, T = mesh.points, mesh.triangles
         if step % 4 == 0 and step < ROUNDS - 4:
@@ -92,7 +92,7 @@ def triangulate(
             np.add.at(moment, T.ravel(), np.repeat(area[:, None] * X[T].mean(axis=1), 3, axis=0))
             np.add.at(weight, T.ravel(), np.repeat(area, 3))
             X = np.concatenate([fixed, moment[len(fixed) :] / weight[len(fixed) :, None]])
-        mesh = _inside(X, segments, holes, len(fixed), origin)
+        mesh = _inside(X, segments, inside_holes, len(fixed), origin)
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
     better = improve_angles(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2]
