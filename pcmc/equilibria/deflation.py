@@ -15,13 +15,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.arrays import Floats
 from ..base.tolerances import COLLAPSED
 from ..solvers import solve_once
 from ..solvers.homotopy import MIN_QUALITY
 from ..solvers.result import Result
 from ..solvers.state import SolverState
-from ..solvers.steps import Stepper
+from ..solvers.steps import LENGTHS, Stepper
 from ..stability.factorisation import SingularMatrix
 from ..surface import Surface
 from .shapes import Shape
@@ -31,7 +30,6 @@ LONGEST = 0.1  # of the size: the most that a step moves a vertex
 STEPS = 40  # at most
 DIFFERENCE = 1e-4  # of a step: where the derivative along it is taken
 NEAR = 1e-3  # residual from which Newton's method alone goes on
-SHORTER = (1.0, 0.5, 0.25, 0.125)  # of a step, tried in turn where it spoils triangles
 
 
 def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
@@ -40,37 +38,39 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
     It may be one of those known: where the way to the last steps is Newton's own.
     """
     try:
-        near = _approach(SolverState(start, MIN_QUALITY), known)
+        state = SolverState(start, MIN_QUALITY)
+        stepper = Stepper(state, minimum=False)
+        for _ in range(STEPS):
+            if not np.isfinite(state.energy) or state.quality < COLLAPSED:
+                return None
+            if state.at.residual < NEAR:
+                break
+            stepper.drop_outdated()
+            second = stepper.factorise()
+            if second is None:
+                return None
+            d, pressures, _ = stepper.direction(second)
+            shapes = (Shape(state.at.X + t * d, state.at.classes.faces) for t in (0.0, DIFFERENCE))
+            here, ahead = (_repulsion(shape, known, state.size) for shape in shapes)
+            slope = (ahead - here) / DIFFERENCE
+            share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
+            most = LONGEST * state.size / float(np.linalg.norm(d, axis=1).max())
+            share = float(np.clip(share, -most, most))
+            for t in (share * length for length in LENGTHS):
+                X, down = state.displaced(t * d)
+                if not state.spoils_triangles(X):
+                    state.change_pressures(t * pressures)
+                    state.move(X, down)
+                    break
+            else:
+                return None
+            state.maintain_mesh()
+        else:
+            return None
     except SingularMatrix:
         return None
-    result = None if near is None else solve_once(near, target="stationary")
-    return result if result is not None and result.converged else None
-
-
-def _approach(state: SolverState, known: Sequence[Shape]) -> Surface | None:
-    """A surface nearly at rest; None if the steps end before."""
-    stepper = Stepper(state, minimum=False)
-    for _ in range(STEPS):
-        if not np.isfinite(state.energy) or state.quality < COLLAPSED:
-            return None
-        if state.at.residual < NEAR:
-            return state.result_surface()
-        stepper.drop_outdated()
-        second = stepper.factorise()
-        if second is None:
-            return None
-        d, pressures, _ = stepper.direction(second)
-        F = state.at.classes.faces
-        here, ahead = (_repulsion(Shape(state.at.X + t * d, F), known, state.size) for t in (0.0, DIFFERENCE))
-        slope = (ahead - here) / DIFFERENCE
-        share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
-        longest = float(np.linalg.norm(d, axis=1).max())
-        share = float(np.clip(share, -LONGEST * state.size / longest, LONGEST * state.size / longest))
-        d = share * d
-        if not _move(state, d, share * pressures):
-            return None
-        state.maintain_mesh()
-    return None
+    result = solve_once(state.result_surface(), target="stationary")
+    return result if result.converged else None
 
 
 def _repulsion(shape: Shape, known: Sequence[Shape], size: float) -> float:
@@ -78,14 +78,3 @@ def _repulsion(shape: Shape, known: Sequence[Shape], size: float) -> float:
     least = 1e-9 * size  # where a start is one of those known
     far = np.array([max(shape.distance(other), least) for other in known])
     return float(np.log1p((WIDTH * size / far) ** 2).sum())
-
-
-def _move(state: SolverState, d: Floats, pressures: Floats) -> bool:
-    """Take a step, shortened until it spoils no triangles; False, with nothing moved, if none is."""
-    for t in SHORTER:
-        X, down = state.displaced(t * d)
-        if not state.spoils_triangles(X):
-            state.change_pressures(t * pressures)
-            state.move(X, down)
-            return True
-    return False

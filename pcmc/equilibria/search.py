@@ -137,9 +137,8 @@ def find_equilibria(
     expect_flat(given, "find_equilibria")
     validate.callback("callback", callback, "a function of a sentence")
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
-    every = (
-        [along] if isinstance(along, str | Direction | BoundaryMotion) else validate.sequence("along", along)
-    )
+    single = isinstance(along, str | Direction | BoundaryMotion)
+    every = [along] if single else validate.sequence("along", along)
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
     search = _Search(given, lines, chosen, callback)
     try:
@@ -350,12 +349,6 @@ class _Search:
             for line, branches in every
         ]
         searched.append(f"Deflated Newton: {self.starts} starts, {self.arrived} came to rest.")
-        return Equilibria(
-            tuple(self.found[k] for k in order),
-            tuple(sorted(ways, key=lambda way: way.saddle)),
-            tuple(self.lines),
-            {line.name: tuple(branches) for line, branches in every},
-            tuple(searched),
-            tuple(dict.fromkeys(self.failed)),
-            self.stopped,
-        )
+        down, branches = sorted(ways, key=lambda way: way.saddle), {line.name: tuple(b) for line, b in every}
+        known = tuple(self.found[k] for k in order), tuple(down), tuple(self.lines), branches
+        return Equilibria(*known, tuple(searched), tuple(dict.fromkeys(self.failed)), self.stopped)

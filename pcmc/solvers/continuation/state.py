@@ -19,7 +19,7 @@ from ...surface.geometry import vertex_area_vectors
 from ...surface.supports import apply_supports, onto_circles
 from ...surface.topology import SHEET
 from ..smoother import HarmonicExtension
-from .direction import ParameterLine
+from .parameters import ParameterLine
 
 LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name

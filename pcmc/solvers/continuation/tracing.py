@@ -22,7 +22,6 @@ from .. import solve_once
 from ..result import Callback, Progress, Status
 from .branch_point import BranchPoint, Tangent, along_branch, branch_point
 from .correction import (
-    Constraint,
     ContactChanged,
     MeshCollapsed,
     NotOnBranch,
@@ -32,8 +31,8 @@ from .correction import (
     fixed_parameter,
     fixed_volume,
 )
-from .direction import ParameterLine
 from .options import Ending, FollowOptions
+from .parameters import ParameterLine
 from .segment import Segment, crosses_goal
 from .state import BranchMesh, BranchState
 
@@ -189,21 +188,18 @@ class Tracer:
         return here.step(t * tangent.direction, here.parameter + t * tangent.slope)
 
     def solve_at(self, t: float) -> BranchState:
-        """The state on the branch at arclength t from here."""
-        ahead = self.predict(t)
-        return correct(ahead, self.constraint(t, ahead), self.options.tolerance)
-
-    def constraint(self, t: float, ahead: BranchState) -> Constraint:
-        """What the control prescribes at arclength t from here."""
-        here, tangent = self.here.state, self.here.tangent
+        """The state on the branch at arclength t from here, as far as the control says on the tangent."""
+        here, tangent, ahead = self.here.state, self.here.tangent, self.predict(t)
         if self.options.control == "parameter":
-            return fixed_parameter(ahead.parameter, self.line.scale)
-        if self.options.control == "volume":
+            asked = fixed_parameter(ahead.parameter, self.line.scale)
+        elif self.options.control == "volume":
             growth = float((here.volume_gradient * tangent.direction).sum())
-            return fixed_volume(here.mesh, here.volume + t * growth)
-        if self.options.control == "height":
-            return fixed_height(here.mesh, ahead.highest_vertex, ahead.height)
-        return fixed_arclength(ahead, tangent.row, tangent.rate)
+            asked = fixed_volume(here.mesh, here.volume + t * growth)
+        elif self.options.control == "height":
+            asked = fixed_height(here.mesh, ahead.highest_vertex, ahead.height)
+        else:
+            asked = fixed_arclength(ahead, tangent.row, tangent.rate)
+        return correct(ahead, asked, self.options.tolerance)
 
     def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
