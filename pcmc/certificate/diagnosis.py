@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
@@ -18,7 +18,7 @@ from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.supports import members
-from ..surface.topology import EdgeCurve
+from ..surface.topology import EdgeCurve, components
 from .forces import held_boundary
 from .tables import names_of
 
@@ -81,8 +81,7 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     """
     topo, n = surface.topology, surface.n
     edges = topo.edges[held_boundary(surface)]
-    links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    label = connected_components(links, directed=False)[1]
+    label = components(edges, n)
     on_curve = np.zeros(n, dtype=bool)
     on_curve[edges] = True
     curves, first = np.unique(label[on_curve], return_index=True)

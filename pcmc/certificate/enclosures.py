@@ -193,8 +193,7 @@ def second_variation(items: MeshArrays, space: MotionSpace, pattern: Pattern) ->
                         entry = plus(entry, times(times(across, lean), balls.dot3(c, nu)))
                     if heavy[0] != 0.0:
                         entry = plus(entry, times(heavy, _slope(b, c, nu, edge[i], edge[j], n)))
-                    at = pair_place(space, pattern, v, r, w, s, items.offset[f, i])
-                    gather(value, radius, at, entry)
+                    gather(value, radius, pair_place(space, pattern, v, r, w, s, items.offset[f, i]), entry)
     _add_cables(items, space, pattern, value, radius)
     return value, radius
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -188,13 +188,16 @@ class Forces:
     @property
     def per_length(self) -> Floats:
         """(n,3) the mean of ``pulls`` along the lines at a vertex, force/length; NaN where there is none."""
-        edges, force = self.surface.topology.edges, np.zeros_like(self.reactions)
-        sides = self.surface.topology.sides
-        half = 0.5 * segment_lengths(self.surface.vertices, sides)[:, None] * self.pulls
-        for side in (0, 1):
-            np.add.at(force, edges[:, side], half * self.lines[:, [side]])
-        share = self.lengths[:, None]
+        force, share = self.half_pulls(slice(None), self.pulls, self.lines), self.lengths[:, None]
         return np.divide(force, share, out=np.full(force.shape, np.nan), where=share > 0.0)
+
+    def half_pulls(self, edges: Any, pulls: Floats, ends: Bools | None = None) -> Floats:
+        """(n,3) half the pulls (k,3) along some edges at each end of these, or at the ``ends`` (k,2)."""
+        topo, force = self.surface.topology, np.zeros_like(self.reactions)
+        half = 0.5 * segment_lengths(self.surface.vertices, topo.sides[edges])[:, None] * pulls
+        for side in (0, 1):
+            np.add.at(force, topo.edges[edges, side], half if ends is None else half * ends[:, [side]])
+        return force
 
     def along_patch(self, patch: int | None) -> Bools:
         """(e,) the edges of lines that belong to a patch, or all of them."""

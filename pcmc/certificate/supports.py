@@ -199,7 +199,7 @@ def _labelled(acting: Forces) -> Iterator[_Part]:
                 sharing[left] = _weights(acting, parts[-1])
         # no pulls where others, such as ends of members, take all
         pulls_at = np.asarray(forces.any(axis=1, keepdims=True))
-        own = [_half_pulls(acting, part) * pulls_at[part.vertices] for part in parts]
+        own = [(acting.half_pulls(*_pulled(acting, part)) * pulls_at)[part.vertices] for part in parts]
         every = np.zeros_like(forces)
         for part, pulled in zip(parts, own, strict=True):
             every[part.vertices] += pulled
@@ -302,16 +302,6 @@ def _pulled(acting: Forces, part: _Part) -> tuple[Ints, Floats]:
 def _weights(acting: Forces, part: _Part) -> Floats:
     """(k,) how much of the rest of a force a support takes: a plane next to none where a line is clamped."""
     return np.where(acting.clamped[part.vertices] & (part.kind != "line"), SLIGHT, 1.0)
-
-
-def _half_pulls(acting: Forces, part: _Part) -> Floats:
-    """(k,3) the force on each vertex of a support of half the pulls along its edges there."""
-    edges, pulls = _pulled(acting, part)
-    topo, force = acting.surface.topology, np.zeros_like(acting.reactions)
-    half = 0.5 * segment_lengths(acting.surface.vertices, topo.sides[edges])[:, None] * pulls
-    for side in (0, 1):
-        np.add.at(force, topo.edges[edges, side], half)
-    return force[part.vertices]
 
 
 def _patch_of_edge(surface: Surface) -> Ints:

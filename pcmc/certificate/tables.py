@@ -57,7 +57,7 @@ def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
     if curve.closed:
         place = lengths @ (points[:-1] + points[1:]) / (2.0 * lengths.sum() or 1.0)
     else:
-        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        along = np.append(0.0, lengths.cumsum())
         place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
     place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}

@@ -21,9 +21,8 @@ from .cables import too_long, weak_cable
 from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
+SLACK = "no patch has a tension: every shape is at rest"
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-NO_TENSION = "no patch has a tension: every shape is at rest"
-FREE = "nothing resists {} rigid motions; every change of shape {} raises E"
 
 
 class Verdict(Enum):
@@ -226,8 +225,9 @@ def _saddle(f: Findings) -> list[object]:
     return [describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode), _near_fold(f)]
 
 
-def _at_volumes(f: Findings) -> str:
-    return "in this cell" if f.surface.periodic and not f.surface.rooms else "at these volumes"
+def _free(f: Findings) -> str:
+    where = "in this cell" if f.surface.periodic and not f.surface.rooms else "at these volumes"
+    return f"nothing resists {f.rigid} rigid motions; every change of shape {where} raises E"
 
 
 def _near_fold(f: Findings) -> str:
@@ -243,7 +243,7 @@ def _near_fold(f: Findings) -> str:
 
 # a verdict, when it applies, and the reason, or its parts
 RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], str | list[object]]], ...] = (
-    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: NO_TENSION),
+    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: SLACK),
     (Verdict.NO_EQUILIBRIUM, lambda f: f.proofs, lambda f: [*f.proofs, *f.folds, f.neck]),
     (Verdict.NONE_FOUND, lambda f: f.lost and f.tried, _none_found),
     (Verdict.RAN_AWAY, lambda f: f.lost, _ran_away),
@@ -256,7 +256,7 @@ RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], s
     (Verdict.SADDLE, lambda f: (heavy_cable_pulls(f.surface) <= 0.0).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
-    (Verdict.NEUTRAL, lambda f: f.rigid > 0, lambda f: FREE.format(f.rigid, _at_volumes(f))),
+    (Verdict.NEUTRAL, lambda f: f.rigid > 0, _free),
     (Verdict.NEUTRAL, lambda f: f.spectrum.soft, _near_fold),
     (Verdict.STABLE, lambda f: True, _near_fold),
 )

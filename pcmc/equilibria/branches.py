@@ -80,8 +80,15 @@ class TracedParameter:
 
     def leaving(self, branch: Branch, row: int, watch: Callable[[Progress], None]) -> list[Branch]:
         """The two branches that leave one at a bifurcation, from there on; OptionError if none is found."""
-        two = branch.switch(row, steps=STEPS, callback=self._within(watch))
-        return [_from_event(self._ended(one), branch, row) for one in two]
+        event, found = branch.events.loc[row], []
+        for one in map(self._ended, branch.switch(row, steps=STEPS, callback=self._within(watch))):
+            points = one.points
+            known = {name: event[name] for name in points.columns.intersection(event.index)}
+            at_event = points.iloc[0].to_dict() | known | {"arclength": -FIRST, "slope": 0.0}
+            surfaces = {0: branch.event_surfaces[row]} | {k + 1: s for k, s in one.surfaces.items()}
+            points = pd.concat([pd.DataFrame([at_event]), points], ignore_index=True)
+            found.append(replace(one, points=points, surfaces=surfaces))
+        return found
 
     def _ended(self, branch: Branch) -> Branch:
         """A branch that ended by itself; KeyboardInterrupt where it was stopped."""
@@ -128,18 +135,6 @@ class TracedParameter:
                 return way.last
             reason = way.message
         return reason
-
-
-def _from_event(branch: Branch, other: Branch, row: int) -> Branch:
-    """A branch that leaves another at an event, with the event as its first point."""
-    event, first = other.events.loc[row], branch.points.iloc[0]
-    there = first.to_dict() | {name: event[name] for name in branch.points.columns.intersection(event.index)}
-    there |= {"arclength": -FIRST, "slope": 0.0}
-    return replace(
-        branch,
-        points=pd.concat([pd.DataFrame([there]), branch.points], ignore_index=True),
-        surfaces={0: other.event_surfaces[row]} | {k + 1: one for k, one in branch.surfaces.items()},
-    )
 
 
 def join_branches(back: Branch, forth: Branch) -> Branch:

@@ -153,8 +153,7 @@ def _rests(end: NewtonRun, must_slip: bool) -> bool:
 def _refuse_loose_parts(surface: Surface) -> None:
     """Refuse a part with an open edge and no support: nothing stops it from moving away."""
     topo = surface.topology
-    open_parts = topo.components[topo.edges[topo.boundary_edge, 0]]
-    loose = np.setdiff1d(open_parts, topo.components[surface.held])
+    loose = np.setdiff1d(topo.components[topo.edges[topo.boundary_edge, 0]], topo.components[surface.held])
     if len(loose):
         vertex = int(np.flatnonzero(topo.components == loose[0])[0])
         face = int(np.flatnonzero((surface.faces == vertex).any(axis=1))[0])

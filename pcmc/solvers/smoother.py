@@ -62,8 +62,7 @@ class Smoother:
         """Compute L_α at the positions X (n,3) and factorise it."""
         self._factors = []
         for space, pattern, solver in zip(self._spaces, self._patterns, self._factorisers, strict=True):
-            data = _laplacian(self._moderated, self._classes, space, pattern, X)
-            self._factors.append(solver.factor(data))
+            self._factors.append(solver.factor(_laplacian(self._moderated, self._classes, space, pattern, X)))
 
     def solve(self, forces: Floats) -> Floats:
         """L_α⁻¹ forces (n,3), zero where a support holds the coordinate.

@@ -59,8 +59,7 @@ def low_start(surface: Surface) -> Surface | None:
     # a dome: 1 above the mean of the neighbours
     above = place[:, 2] - low[:, 2] if kept else in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
-        domed = _at(surface, low + above[:, None] * [0.0, 0.0, 1.0])
-        above *= np.sign(total_load(domed)) or 1.0
+        above *= np.sign(total_load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
     rise, most = RISE * span, float(np.abs(above[roof]).max())
     if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
@@ -71,8 +70,7 @@ def low_start(surface: Surface) -> Surface | None:
     if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
         place = surface.plane.to_local(moved.vertices)
         moved = _at(surface, in_the_middle(surface.faces, roof | surface.held, place))
-    walls_below = find_walls(moved)
-    return moved.moved(place_wall_rows(moved, walls_below, moved.vertices))
+    return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
 
 
 def _diagonal(place: Floats) -> float:

@@ -107,8 +107,7 @@ class Stepper:
             state.change_pressures(pressures)
         for t in 0.5 ** np.arange(12):
             X, down = state.displaced(t * d)
-            value = state.energy_at(X)
-            if reachable(X) and value < energy + 1e-3 * t * slope:
+            if reachable(X) and state.energy_at(X) < energy + 1e-3 * t * slope:
                 state.move(X, down)
                 self.second, self.kind = None, "descent"
                 return True
@@ -127,8 +126,7 @@ class Stepper:
         G = at.volume_gradients
         inflation = np.stack([smoother.solve(at.space.project(g)) for g in G])
         growth = -self._volumes_ahead() - np.einsum("rnd,nd->r", G, d)
-        small = np.einsum("rnd,snd->rs", G, inflation)
-        pressures = np.linalg.lstsq(small, growth)[0]
+        pressures = np.linalg.lstsq(np.einsum("rnd,snd->rs", G, inflation), growth)[0]
         return d + np.tensordot(pressures, inflation, axes=1), pressures
 
     def _volumes_ahead(self) -> Floats:
@@ -140,8 +138,7 @@ class Stepper:
     def _lagrangian(self, d: Floats, pressures: Floats, forces: Floats) -> tuple[float, float]:
         """The Lagrangian here and its slope along d (n,3), with the rooms' pressures changed."""
         at = self.state.at
-        growth = np.einsum("rnd,nd->r", at.volume_gradients, d)
-        slope = float((forces * d).sum() - pressures @ growth)
+        slope = float((forces * d).sum() - pressures @ np.einsum("rnd,nd->r", at.volume_gradients, d))
         return self.state.energy - float(pressures @ at.volume_defects), slope
 
     def saddle_near(self) -> bool:

@@ -104,8 +104,7 @@ def solve_case(
     ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
-    find = solve if search else solve_once
-    result = find(build(**shape), method, **solver)
+    result = (solve if search else solve_once)(build(**shape), method, **solver)
     answer = case_row(result, arguments)
     if mesh_check:
         from ..project import Outcome  # takes long to import

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...base.errors import NoBranch, SurfaceError
 from ...base.interrupts import stop_requested
@@ -42,15 +42,6 @@ CONTACT_STEP = 0.02  # length of a step at which a new contact, solved for by it
 BEND = 0.1  # correction over step length that the next step aims at
 MAX_BEND = 0.5  # correction over step length above which a step is refused
 MANY_ITERATIONS = 7  # a correction that took more Newton steps may have ended on another branch
-
-
-class BranchStep(NamedTuple):
-    """A step that succeeded: its segment, its correction over its length, and the events on it."""
-
-    segment: Segment
-    bend: float
-    at_goal: bool
-    events: list[dict[str, Any]]
 
 
 class Tracer:
@@ -117,10 +108,10 @@ class Tracer:
             return Ending.REACHED, ""
         length, difficulty = min(abs(self.options.step), self.options.largest), ""
         for _ in range(self.options.steps):
-            step = None
-            while step is None:
+            while True:
                 try:
-                    step = self.step(length)
+                    segment, bend, at_goal, events = self.step(length)
+                    break
                 except NotOnBranch as reason:
                     length, difficulty = 0.5 * length, str(reason)
                     if length < self.options.smallest and self.let_held_walls_pinch():
@@ -128,22 +119,24 @@ class Tracer:
                     elif length < self.options.smallest:
                         collapsed = isinstance(reason, MeshCollapsed)
                         return Ending.DEGENERATE if collapsed else Ending.LOST, difficulty
-            self.events += step.events
-            self.arclength += step.segment.length
-            self.here = step.segment.end
+            self.events += events
+            self.arclength += segment.length
+            self.here = segment.end
             self.record()
-            if step.at_goal:
+            if at_goal:
                 return Ending.REACHED, ""
             folds = sum(event["kind"] == "fold" for event in self.events)
             if self.options.folds is not None and folds >= self.options.folds:
                 return Ending.FOLDS, ""
             self.maintain_mesh()
-            longer = min(2.0, max(0.5, BEND / max(step.bend, 1e-9)))
+            longer = min(2.0, max(0.5, BEND / max(bend, 1e-9)))
             length = min(longer * length, self.options.largest)
         return Ending.STEPS, difficulty
 
-    def step(self, length: float) -> BranchStep:
-        """The next point, at this length, or nearer if a goal is."""
+    def step(self, length: float) -> tuple[Segment, float, bool, list[dict[str, Any]]]:
+        """The next segment, of this length, or shorter to a goal; its correction over its length, whether it
+        ends at a goal, and the events on it.
+        """
         here = self.here.state
         try:
             there = self.solve_at(length)
@@ -170,7 +163,7 @@ class Tracer:
                 given = fixed_parameter(asked, self.line.scale)
                 end = branch_point(correct(end.state, given, self.options.tolerance), self.here.tangent)
             segment = replace(segment, end=end, length=goal[0])
-        return BranchStep(segment, bend, goal is not None, self.events_on(segment))
+        return segment, bend, goal is not None, self.events_on(segment)
 
     def bend(self, there: BranchState, length: float) -> float:
         """Distance of a state from the tangent, over the length of the step."""
