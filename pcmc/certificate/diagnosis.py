@@ -172,16 +172,12 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
         meeting = film.meeting(surface, "then") if film else ""
         return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; {SWAP}"
     if held_wall_down(surface, pinchable):
-        return worst + (
-            "; the junction there comes down on the held bottom of its wall, so the wall has no height"
-            " left: make the wall weaker, or let its bottom slide so that the junction can rest on the plane"
-            f" ({KEY.format('sliding')})"
-        )
+        worst += "; the junction there comes down on the held bottom of its wall, so the wall has no height"
+        worst += " left: make the wall weaker, or let its bottom slide so that the junction can rest on the"
+        return f"{worst} plane ({KEY.format('sliding')})"
     if _slips(surface, pinchable, place, REACH * float(np.median(edge_lengths(surface)))):
-        worst += (
-            "; the junction there slips along a support, which does not hold its end: hold the bottom"
-            f" of its wall ({KEY.format('held')})"
-        )
+        worst += "; the junction there slips along a support, which does not hold its end: hold the bottom of"
+        worst += f" its wall ({KEY.format('held')})"
     return worst
 
 
@@ -298,7 +294,5 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     walls = " and of ".join(repr(surface.patches[i].name) for i in below)
     advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
     which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
-    return (
-        f"{text}; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
-        f" {ends[0][2]:.2f} as far, so only the mesh holds it there; {advice}"
-    )
+    text += f"; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
+    return f"{text} {ends[0][2]:.2f} as far, so only the mesh holds it there; {advice}"

@@ -43,10 +43,8 @@ def loads(surface: Surface) -> Floats:
     patch = np.repeat(mesh.patch, len(vector) // len(mesh.patch))
     found = surface.net_pressures[patch, None] * vector
     ends, _, weight = surface.cable_edges
-    heavy = np.append(
-        surface.weights[patch] * np.linalg.norm(vector, axis=1),
-        weight * segment_lengths(surface.vertices, ends),
-    )
+    areas, lengths = np.linalg.norm(vector, axis=1), segment_lengths(surface.vertices, ends)
+    heavy = np.append(surface.weights[patch] * areas, weight * lengths)
     found = np.concatenate([found, np.zeros((len(ends), 3))])
     return found - heavy[:, None] * np.array(surface.plane.normal) if surface.heavy else found
 
@@ -299,9 +297,8 @@ def cable_ends(
 
 
 def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Bools, Floats, Floats]:
-    """The vertices (n,) that lines and points hold, those on Π and each of the other planes (1 + planes,n),
-    and what these, (1 + planes,n,3), carry of the reactions (n,3), and of those at the ends of cables.
-    """
+    """The vertices (n,) that lines and points hold; those on Π and the other planes (1 + planes,n); and what
+    each plane carries of the forces and of those at the ``ends`` of cables (1 + planes,n,3)."""
     X, mirror = surface.vertices, np.array([[False], *([plane.mirror] for plane, _ in surface.on_planes)])
     ground = surface.on_plane | (surface.fixed & lying(surface.plane.height(X), X))
     on = np.array([ground, *(mask for _, mask in surface.on_planes)])

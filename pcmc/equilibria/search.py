@@ -29,11 +29,8 @@ from .ways_down import pass_between, way_down, with_good_triangles
 
 MODES = 8  # of the lowest modes a start is displaced along
 FAR = (0.05, 0.3)  # of the size: how far a start is displaced
-ENDS = {
-    Status.DIVERGED: "inflates without bound",
-    Status.VANISHED: "shrinks to nothing",
-    Status.DEGENERATE: "pinches off or collapses",
-}
+ENDS = {Status.DIVERGED: "inflates without bound", Status.VANISHED: "shrinks to nothing"}
+ENDS |= {Status.DEGENERATE: "pinches off or collapses"}
 
 Along = str | Direction | BoundaryMotion
 

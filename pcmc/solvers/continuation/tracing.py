@@ -196,11 +196,10 @@ class Tracer:
 
     def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        part, own = near.rest.part, self.options
+        part = near.rest.part
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
-        result = solve_once(
-            whole, "newton", target="stationary", tolerance=own.tolerance, backend=own.backend
-        )
+        accurate: dict[str, Any] = {"tolerance": self.options.tolerance, "backend": self.options.backend}
+        result = solve_once(whole, target="stationary", **accurate)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
