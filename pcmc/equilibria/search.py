@@ -22,10 +22,9 @@ from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter
-from .deflation import deflated_newton
 from .found import Equilibria, FoundEquilibrium, WayDown
+from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
-from .ways_down import pass_between, way_down, with_good_triangles
 
 MODES = 8  # of the lowest modes a start is displaced along
 FAR = (0.05, 0.3)  # of the size: how far a start is displaced

@@ -1,6 +1,6 @@
 """From point to point along a branch: steps, the events between them, and the mesh.
 
-A step goes along the tangent, and Newton's method brings it back onto the branch (``correction``). Where a
+A step goes along the tangent, and Newton's method brings it back onto the branch (``branch_point``). Where a
 goal, a fold or a change of index lies between two points, the branch is searched there (``segment``).
 """
 
@@ -20,11 +20,14 @@ from ...meshing.remeshing import remesh
 from ...surface import Surface
 from .. import solve_once
 from ..result import Callback, Progress, Status
-from .branch_point import BranchPoint, Tangent, along_branch, branch_point
-from .correction import (
+from .branch_point import (
+    BranchPoint,
     ContactChanged,
     MeshCollapsed,
     NotOnBranch,
+    Tangent,
+    along_branch,
+    branch_point,
     correct,
     fixed_arclength,
     fixed_height,

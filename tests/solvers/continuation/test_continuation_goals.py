@@ -11,7 +11,7 @@ from generators import two_caps, two_squares
 from pcmc import Direction, Parameter, follow, solve
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.solvers.continuation import Ending, FollowOptions
-from pcmc.solvers.continuation.correction import NotOnBranch, correct, fixed_parameter
+from pcmc.solvers.continuation.branch_point import NotOnBranch, correct, fixed_parameter
 from pcmc.solvers.continuation.options import CONTROLS
 from pcmc.solvers.continuation.segment import root
 from pcmc.solvers.continuation.state import QUANTITIES, BranchMesh, BranchState
