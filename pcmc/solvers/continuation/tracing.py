@@ -202,7 +202,7 @@ class Tracer:
         part = near.rest.part
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
         accurate: dict[str, Any] = {"tolerance": self.options.tolerance, "backend": self.options.backend}
-        result = solve_once(whole, target="stationary", **accurate)
+        result = solve_once(whole, "newton", target="stationary", **accurate)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
