@@ -82,8 +82,7 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     topo, n = surface.topology, surface.n
     edges = topo.edges[held_boundary(surface)]
     label = components(edges, n)
-    on_curve = np.zeros(n, dtype=bool)
-    on_curve[edges] = True
+    on_curve = np.isin(np.arange(n), edges)
     curves, first = np.unique(label[on_curve], return_index=True)
     part = topo.components[np.flatnonzero(on_curve)[first]]
     several = curves[np.bincount(part)[part] > 1] if len(part) else curves
@@ -199,8 +198,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
     """
     X, patch = surface.vertices, int(surface.patch_of_face[worst_face(surface, pinchable)[0]])
-    used = np.zeros(surface.n, dtype=bool)
-    used[surface.faces[surface.patch_of_face == patch]] = True
+    used = np.isin(np.arange(surface.n), surface.faces[surface.patch_of_face == patch])
     top = used & surface.topology.on_junction
     bottom, top = used & surface.pinned & ~top, top & ~surface.pinned
     if not (surface.auxiliary[patch] and top.any() and bottom.any()):

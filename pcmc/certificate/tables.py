@@ -71,9 +71,7 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
-        inside = np.zeros(surface.n, dtype=bool)
-        inside[standing.faces[faces]] = True
-        inside &= np.isfinite(curvature)
+        inside = np.isin(np.arange(surface.n), standing.faces[faces]) & np.isfinite(curvature)
         varies = patch.weight and inside.any()
         mean = float(curvature[inside].mean()) if inside.any() else np.nan
         row: dict[str, Any] = {

@@ -40,8 +40,7 @@ def low_start(surface: Surface) -> Surface | None:
         return None  # they lie on one line
     walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
-    roof = np.zeros(surface.n, dtype=bool)
-    roof[faces] = True
+    roof = np.isin(np.arange(surface.n), faces)
     held = surface.pinned | surface.on_ground
     place = surface.plane.to_local(surface.vertices)
     flat = place[:, :2].copy()

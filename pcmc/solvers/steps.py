@@ -101,10 +101,8 @@ class Stepper:
             self._smoother_age = 0
         self._smoother_age += 1
         d, pressures = self._smooth_direction(self._smoother)
-        energy, slope = state.energy, float((at.unbalanced * d).sum())
-        if len(pressures):
-            energy, slope = self._lagrangian(d, pressures, at.unbalanced)
-            state.change_pressures(pressures)
+        energy, slope = self._lagrangian(d, pressures, at.unbalanced)
+        state.change_pressures(pressures)
         for t in 0.5 ** np.arange(12):
             X, down = state.displaced(t * d)
             if reachable(X) and state.energy_at(X) < energy + 1e-3 * t * slope:
