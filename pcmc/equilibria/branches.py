@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from ..accuracy.varied import Varied
-from ..base.errors import NoBranch, OptionError
+from ..base import validate
+from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END
 from ..solvers.continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..solvers.result import Progress
@@ -45,13 +46,12 @@ class TracedParameter:
             name = "boundary"
         elif not isinstance(what, Direction):
             expected = "a name such as 'pressure' or 'tension of roof', a Direction or a BoundaryMotion"
-            raise OptionError(f"along: expected {expected}, found {what!r}", what="along", found=what)
+            validate.refuse("along", what, expected)
         value = parameter.line(surface).value
         reach = AROUND * abs(value) or FROM_ZERO
         low, high = span or (value - reach, value + reach)
         if not low < value < high:
-            text = f"span: expected numbers below and above the present value {value:g}, found {(low, high)}"
-            raise OptionError(text, what="span", found=(low, high), expected=value)
+            validate.refuse("span", (low, high), f"numbers below and above the present value {value:g}")
         return cls(name, parameter, value, (low, high))
 
     def trace(self, surface: Surface, watch: Callable[[Progress], None]) -> Branch | None:

@@ -185,8 +185,7 @@ class Workers:
 def _cluster(team: str, address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler."""
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
-        text = f"scheduler: expected 'tcp://host:8786', found {address!r}"
-        raise OptionError(text, what="scheduler", found=address, expected="tcp://host:8786")
+        validate.refuse("scheduler", address, "'tcp://host:8786'")
     require("distributed", extra="distributed")
     from distributed import Client
 
