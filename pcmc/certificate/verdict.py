@@ -171,7 +171,7 @@ def _residual(f: Findings) -> str:
 
 
 def _forces_left(f: Findings) -> list[object]:
-    X, coarser = f.surface.vertices, np.finfo(np.float32).eps / np.finfo(float).eps
+    X, coarser = f.surface.vertices[f.surface.free], np.finfo(np.float32).eps / np.finfo(float).eps
     few = f.residual <= NOISE * coarser * f.rounding and np.array_equal(X, X.astype(np.float32))
     digits = "its coordinates are in single precision, as in a .glb file, which alone leaves as much"
     coarse = f"{f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"

@@ -204,8 +204,8 @@ class Stepper:
         def in_basis_then(action: Callable[[Floats], Floats], z: Floats) -> Floats:
             if now is then:
                 return action(z)
-            out = action(np.append(then.from_other(now, z[:size]), z[size:]))
-            return np.append(now.from_other(then, out[:size]), out[size:])
+            out = action(np.append(then.to_coordinates(now.to_vectors(z[:size])), z[size:]))
+            return np.append(now.to_coordinates(then.to_vectors(out[:size])), out[size:])
 
         def times(z: Floats) -> Floats:
             change = at.times(now.to_vectors(z[:size]), z[size:])
