@@ -31,7 +31,7 @@ from scipy.spatial import cKDTree
 
 from ...base.arrays import Floats
 from ...base.errors import OptionError
-from ...base.tolerances import BRANCH_END, NULL_MODE, ON_BRANCH
+from ...base.tolerances import BRANCH_END, NOISE, NULL_MODE, ON_BRANCH
 from ...stability.bordered import BorderedFactor, solve_preconditioned
 from ...stability.factorisation import SingularMatrix
 from ...stability.modes import lowest
@@ -157,6 +157,8 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
             return at
         error = at.rest.residual + abs(g)
         slow = 0 if error < SLOW * last else slow + 1
+        if slow >= 3 and at.rest.residual <= NOISE * mesh.rounding and abs(g) <= ON_BRANCH:
+            return at
         if slow >= 3 or not np.isfinite(at.rest.residual + g):
             break
         last = error
