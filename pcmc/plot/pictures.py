@@ -188,8 +188,7 @@ def compose(
     for k, drawing in enumerate(drawings):
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         look = {"supports": dotted[k], "edges": edge[k] >= EDGES_FROM if edges is None else edges}
-        painted = scene(drawing.surface, drawing.view, fill, patches=drawing.patches, **look)
-        images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
+        images.append(paint(scene(drawing, fill, **look), frames[k], renderer))
     if legend:
         add_picture_legend(figure, list(zip(drawings, dotted, images, strict=True)))
     if mark:
