@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 EVERY = 0.5  # seconds between two looks at the files
 Signature = tuple[tuple[str, tuple[int, ...]], ...]
-Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]  # targets, and what may vary for them
+Targets = tuple[Target, ...]
+Varied = tuple[Parameter, ...]  # what may vary for targets
+Aims = tuple[Targets, Varied]
 
 
 @dataclass(frozen=True, eq=False)
