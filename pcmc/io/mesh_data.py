@@ -77,10 +77,8 @@ def checked_data(data: MeshData) -> MeshData:
 def numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -> Any:
     """The array if its dtype is one of these kinds and its shape this one; None stands for any length > 0."""
     array = np.asarray(values)
-    fits = array.ndim == len(shape) and all(
-        size == wanted if wanted is not None else size > 0
-        for size, wanted in zip(array.shape, shape, strict=True)
-    )
+    sizes = zip(array.shape, shape, strict=False)
+    fits = array.ndim == len(shape) and all(n > 0 if wanted is None else n == wanted for n, wanted in sizes)
     if array.dtype.kind in kinds and fits:
         return array
     numbers = "numbers" if "f" in kinds else "whole numbers"
@@ -92,8 +90,7 @@ def numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -
 def within(numbers: Any, name: str, size: int) -> Ints:
     """The indices as int64 if all are in 0..size-1; FileError with the first that is not."""
     rows = np.asarray(numbers).reshape(len(numbers), -1)
-    bad = np.flatnonzero(((rows < 0) | (rows >= size)).any(axis=1))
-    if len(bad):
+    if len(bad := np.flatnonzero(((rows < 0) | (rows >= size)).any(axis=1))):
         found = rows[bad[0]].tolist()
         text = f"{name}: entry {bad[0]} is {str(found).strip('[]')}, outside 0..{size - 1}"
         raise FileError(text, what=name, where=int(bad[0]), found=found, expected=(0, size - 1))
@@ -110,8 +107,7 @@ def support_of(surface: Surface, planes: bool = False) -> Ints:
 def support_kinds(values: npt.ArrayLike) -> Ints:
     """(n,) int8 FREE, SLIDING or FIXED from the numbers of a file; FileError for others."""
     numbers = np.asarray(values).ravel()
-    bad = np.flatnonzero(~np.isin(numbers, (FREE, SLIDING, FIXED)))
-    if len(bad):
+    if len(bad := np.flatnonzero(~np.isin(numbers, (FREE, SLIDING, FIXED)))):
         found = numbers[bad[0]].item()
         text = f"support: entry {bad[0]} is {found!r:.30}; expected 0 (free), 1 (sliding) or 2 (fixed)"
         raise FileError(text, what="support", where=int(bad[0]), found=found, expected=(0, 1, 2))
@@ -157,17 +153,14 @@ def coincident(X: Floats) -> tuple[Ints, Ints]:
 
 def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
     """The same with the vertices ``keep``; ``place`` is the new index of every vertex."""
-    n = len(data.vertices)
-    return replace(
-        data,
-        vertices=data.vertices[keep],
-        faces=place[data.faces],
-        support=None if data.support is None else data.support[keep],
-        scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
-        planes=tuple((plane, mask[keep]) for plane, mask in data.planes),
-        cables=tuple(filter(None, (cable.carried(place) for cable in data.cables))),
-        curves=tuple(replace(curve, vertices=place[curve.vertices]) for curve in data.curves),
-    )
+    X, support = data.vertices, None if data.support is None else data.support[keep]
+    parts: dict[str, Any] = {
+        "scalars": {k: v[keep] if len(v) == len(X) else v for k, v in data.scalars.items()},
+        "planes": tuple((plane, mask[keep]) for plane, mask in data.planes),
+        "cables": tuple(filter(None, (cable.carried(place) for cable in data.cables))),
+        "curves": tuple(replace(curve, vertices=place[curve.vertices]) for curve in data.curves),
+    }
+    return replace(data, vertices=X[keep], faces=place[data.faces], support=support, **parts)
 
 
 def to_surface(
@@ -182,15 +175,13 @@ def to_surface(
     n, X = len(data.vertices), data.vertices
     support = np.full(n, FREE) if data.support is None else data.support
     sliding = support == SLIDING if on_plane is None else checks.mask(on_plane, n, "on_plane")
-    if isinstance(fixed, str):
-        choice("fixed", fixed, ["boundary"])
-        held = topology(data.faces, data.patch_of_face, n).on_boundary
-    elif fixed is not None:
-        held = checks.mask(fixed, n, "fixed")
-    elif data.support is not None:
+    if fixed is None and data.support is not None:
         held = support == FIXED
+    elif fixed is None or isinstance(fixed, str):
+        free = ~sliding if fixed is None else choice("fixed", fixed, ["boundary"]) == "boundary"
+        held = topology(data.faces, data.patch_of_face, n).on_boundary & free
     else:
-        held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
+        held = checks.mask(fixed, n, "fixed")
     given = given_values("patch", [p.name for p in data.patches], tension=tensions, pressure=pressures)
     patches = tuple(replace(p, **given[p.name]) for p in data.patches)
     plane = plane or data.plane or Plane()
@@ -268,6 +259,5 @@ def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     parts = {f.name: in_new_unit(getattr(data, f.name), factor) for f in fields(data)}
     parts["patches"] = tuple(p if p.name in data.bare else in_new_unit(p, factor) for p in data.patches)
     parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
-    parts["units"] = Units(length, units.force)
-    parts["notes"] = (*data.notes, conversion_note(units.length, length))
-    return replace(data, **parts)
+    notes = (*data.notes, conversion_note(units.length, length))
+    return replace(data, **parts | {"units": Units(length, units.force), "notes": notes})
