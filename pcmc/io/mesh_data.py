@@ -175,13 +175,15 @@ def to_surface(
     n, X = len(data.vertices), data.vertices
     support = np.full(n, FREE) if data.support is None else data.support
     sliding = support == SLIDING if on_plane is None else checks.mask(on_plane, n, "on_plane")
-    if fixed is None and data.support is not None:
-        held = support == FIXED
-    elif fixed is None or isinstance(fixed, str):
-        free = ~sliding if fixed is None else choice("fixed", fixed, ["boundary"]) == "boundary"
-        held = topology(data.faces, data.patch_of_face, n).on_boundary & free
-    else:
+    if isinstance(fixed, str):
+        choice("fixed", fixed, ["boundary"])
+        held = topology(data.faces, data.patch_of_face, n).on_boundary
+    elif fixed is not None:
         held = checks.mask(fixed, n, "fixed")
+    elif data.support is not None:
+        held = support == FIXED
+    else:
+        held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
     given = given_values("patch", [p.name for p in data.patches], tension=tensions, pressure=pressures)
     patches = tuple(replace(p, **given[p.name]) for p in data.patches)
     plane = plane or data.plane or Plane()

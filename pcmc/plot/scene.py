@@ -151,17 +151,12 @@ def scene(drawing: Rendering, values: Floats | None, *, supports: bool, edges: b
     held = np.flatnonzero(seen & surface.held)
     edge_depth = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
     depth = [np.tile(near, len(P) // max(len(F), 1)), edge_depth, _nearest(surface.n, F, near)[held]]
-    return Scene(
-        view,
-        P,
-        np.clip(colors, 0.0, 1.0),
-        ends,
-        np.where(heavy, 1.6, 0.6),
-        np.where(heavy[:, None], rgb(LINE), rgb(MESH_LINE)),
-        surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2],
-        np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT)),
-        np.argsort(np.concatenate(depth), kind="stable"),
-    )
+    order = np.argsort(np.concatenate(depth), kind="stable")
+    shades = np.where(heavy[:, None], rgb(LINE), rgb(MESH_LINE))
+    dots = surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2]
+    dot_colors = np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
+    lines = ends, np.where(heavy, 1.6, 0.6), shades
+    return Scene(view, P, np.clip(colors, 0.0, 1.0), *lines, dots, dot_colors, order)
 
 
 def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
