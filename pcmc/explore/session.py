@@ -7,7 +7,6 @@ certificate of the failed attempt gives the reason. Its acts are answered as the
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -223,17 +222,16 @@ class Session:
     def follow(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
         """Move towards these values while a slider moves: as far as two quick attempts lead."""
         state = state.asking(values)
-        end = time.monotonic() + FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000)
-        way = reach(state.surface, state.wanted, until(stop, end), attempts=2, **FOLLOW)
+        late = until(stop, FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000))
+        way = reach(state.surface, state.wanted, late, attempts=2, **FOLLOW)
         failed = way.failed if way.certificate is None else None
         return state if stop() else state.following(replace(way, failed=failed), way.certificate)
 
     @act(moves=True)
     def settle(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
         """Move to these values, or as close as possible; the surface reached is a step of ``undo``."""
-        state, end = state.asking(values), time.monotonic() + SETTLE_SECONDS
-        progress = partial(setattr, self, "progress")
-        settled = self.fallback.settle(state.surface, state.wanted, stop, end, progress, **SETTLE)
+        state, progress = state.asking(values), partial(setattr, self, "progress")
+        settled = self.fallback.settle(state.surface, state.wanted, stop, SETTLE_SECONDS, progress, **SETTLE)
         if stop():
             return state
         way, note, self.fallback = settled
@@ -243,28 +241,27 @@ class Session:
     @act(moves=True)
     def stabilise(self, state: SessionState, stop: Stop) -> SessionState:
         """Move from a saddle to a stable shape, if there is one nearby."""
-        end = time.monotonic() + SETTLE_SECONDS
-        result = solve_until(state.surface, until(stop, end), target="minimum")
-        certificate = result.certify()
+        result = solve_until(state.surface, until(stop, SETTLE_SECONDS), target="minimum")
+        ended = result.certify()
         if stop():
             return state
-        if certificate.verdict not in AT_REST:
-            return replace(state, failure=certificate)
-        return replace(state.showing(result.surface, certificate), wanted=state.wanted).stepped()
+        if ended.verdict not in AT_REST:
+            return replace(state, failure=ended)
+        return replace(state.showing(result.surface, ended), wanted=state.wanted).stepped()
 
     @act(moves=True)
     def remesh(self, state: SessionState, stop: Stop) -> SessionState:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
-        asked, end = changeable_values(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
+        asked, late = changeable_values(state.wanted), until(stop, 2.0 * SETTLE_SECONDS)
         mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
-        result = solve_until(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
+        result = solve_until(remesh(state.surface, float(mean)), late, **SETTLE)
         if stop():
             return state
         if result.certificate.verdict not in AT_REST:
             return replace(state, failure=result.certificate)
         state = state.showing(result.surface).stepped().asking(asked)
         if changeable_values(state.surface) != asked:
-            way = reach(state.surface, state.wanted, until(stop, end), **SETTLE)
+            way = reach(state.surface, state.wanted, late, **SETTLE)
             state = state.following(way, None).stepped()
         return state
 
