@@ -44,13 +44,12 @@ def new(width: float, height: float, pad: float = 4.0) -> Any:
     return figure
 
 
-def grid(figure: Any, count: int, columns: int, **options: Any) -> tuple[list[Any], int]:
-    """``count`` axes in rows of ``columns``, and the number of rows."""
-    rows = -(-count // columns)
-    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
+def grid(figure: Any, count: int, columns: int, **options: Any) -> list[Any]:
+    """``count`` axes in rows of ``columns``."""
+    axes = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel().tolist()
     for unused in axes[count:]:
         unused.remove()
-    return axes[:count], rows
+    return list(axes[:count])
 
 
 def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:

@@ -178,7 +178,7 @@ def compose(
     figure = new(width, sum(heights) + 100.0, pad=0.0)
     if mark or any(drawing.title for drawing in drawings):
         figure.get_layout_engine().set(h_pad=ABOVE / DPI)
-    axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
+    axes = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):
         place.set_axis_off()
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
