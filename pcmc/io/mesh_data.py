@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints, Vector
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units, conversion_note, length_factor
 from ..base.validate import choice
@@ -225,18 +225,14 @@ def in_new_unit(value: Any, factor: float) -> Any:
             powers = {kind.field: POWERS[kind.dimension] for kind in KINDS.values() if kind.parts == parts}
             old = [(f, getattr(value, f), factor ** abs(p), p > 0) for f, p in powers.items()]
             return replace(value, **{f: x * by if up else x / by for f, x, by, up in old})
-        case Plane() | Line():
-            return replace(value, point=_point(value.point, factor))
-        case Circle():
-            return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
+        case Plane() | Line() | Circle():
+            key = value.KEYS[0]  # of its point
+            moved: dict[str, Any] = {key: tuple(factor * x for x in getattr(value, key))}
+            moved |= {"radius": factor * value.radius} if isinstance(value, Circle) else {}
+            return replace(value, **moved)
         case HeldCurve():
             return value.mapped(factor * np.eye(3), np.zeros(3))
     return value
-
-
-def _point(point: Vector, factor: float) -> Vector:
-    x, y, z = point
-    return factor * x, factor * y, factor * z
 
 
 def scaled_surface(surface: Surface, factor: float) -> Surface:
