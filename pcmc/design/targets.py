@@ -16,8 +16,7 @@ from ..surface import Surface
 
 __all__ = ["KINDS", "MEASURES", "Parameter", "Target", "as_parameters", "as_targets", "measure"]
 
-CABLE_QUANTITIES = ("sag", "length", "force")
-NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(CABLE_QUANTITIES, "cable")
+NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(("sag", "length", "force"), "cable")
 """Quantities of one patch, room or cable alone."""
 SHORT = {"reaction": "reaction per length"}  # names that stand for others
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import Floats
-from ...base.tolerances import BRANCH_END, ON_BRANCH
+from ...base.tolerances import BRANCH_END, NOISE, ON_BRANCH
 from ...stability.bordered import BorderedFactor, solve_preconditioned
 from ...stability.factorisation import SingularMatrix
 from .state import BranchMesh, BranchState
@@ -145,6 +145,8 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
             return at
         error = at.rest.residual + abs(g)
         slow = 0 if error < SLOW * last else slow + 1
+        if slow >= 3 and at.rest.residual <= NOISE * mesh.rounding and abs(g) <= ON_BRANCH:
+            return at
         if slow >= 3 or not np.isfinite(at.rest.residual + g):
             break
         last = error

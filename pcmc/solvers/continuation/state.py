@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...base.arrays import Bools, Floats
+from ...forces.loose_parts import rounding_left
 from ...forces.motion_space import MotionSpace
 from ...forces.pinching import part_by_positions, standing_part
 from ...forces.rooms import with_room_pressures
@@ -38,6 +39,9 @@ class BranchMesh:
         self.line, self.size, self._backend = line, surface.size, backend
         self.part = part = part_by_positions(surface, held) if held else standing_part(surface)
         self.surface = part.surface
+        self.rounding = rounding_left(
+            part.surface, part.classes, part.surface.vertices
+        )  # of the residual, about
         self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
@@ -103,7 +107,7 @@ class BranchState:
         rest, line = self.rest, self.mesh.line
         change = rest.space.to_coordinates(line.gradient(rest.surface, self.X))
         if self.carried is not None:
-            change = change + rest.jacobian.times(self.carried)
+            change = change + rest.jacobian(self.carried)
         return np.append(change, -rest.volume_units * line.rates.get("volumes", 0.0))
 
     @cached_property
