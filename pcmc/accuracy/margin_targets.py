@@ -19,7 +19,7 @@ from ..base.errors import OptionError
 from ..base.tolerances import AT_REST
 from ..certificate import certify
 from ..certificate.measures import Measurement
-from ..forces.functional import gradient_by
+from ..forces.functional import by_rates
 from ..surface import Surface
 from .margins import Margin, MarginEnd, margin
 from .varied import Varied
@@ -61,7 +61,7 @@ def measured_margin(surface: Surface, of: str | None) -> Measurement:
     cables = [cable.name for cable in end.cables]
     named |= {"cable": cables, "cable_weight": cables}
     for kind, names in named.items():
-        across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
+        across = np.array([(phi * by_rates(end, {f"{kind}s": one})[1]).sum() for one in np.eye(len(names))])
         multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
         slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along
     return Measurement(found.factor, still, slopes)

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..forces.functional import gradient_by, weighted
+from ..forces.functional import by_rates, weighted
 from ..forces.rooms import pressure_shares
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
@@ -207,10 +207,8 @@ def _lean(surface: Surface, of: str | None) -> Measurement:
     so ∂s/∂a = (b - c) × (n - s ν) / |N|. The largest of all θ and -θ: where walls are upright it has a kink.
     """
     walls = [surface.patch_index(of)] if of is not None else np.flatnonzero(surface.walls).tolist()
-    for wall in walls:
-        if not surface.walls[wall]:
-            text = f"lean of {of}: that patch is under pressure; a wall can lean"
-            raise OptionError(text, what="of", found=of)
+    if of is not None and not surface.walls[walls[0]]:
+        raise OptionError(f"lean of {of}: that patch is under pressure; a wall can lean", what="of", found=of)
     if not walls:
         raise OptionError("lean: the surface has no walls", what="of", found=of)
     sines = np.where(np.isin(surface.patch_of_face, walls), lean_sines(surface), 0.0)
@@ -258,7 +256,7 @@ def _length(surface: Surface, of: str) -> Measurement:
     """The length L of a cable."""
     cable, one = _chosen_cable(surface, of)
     length = segment_lengths(surface.vertices, cable.edges).sum()
-    return Measurement(float(length), gradient_by(surface, {"cables": one}))
+    return Measurement(float(length), by_rates(surface, {"cables": one})[1])
 
 
 def _force(surface: Surface, of: str) -> Measurement:

@@ -40,8 +40,8 @@ def run_command(arguments: list[str]) -> int:
 
 def _run(arguments: list[str]) -> int:
     try:
-        for library, extra in (("typer", "cli"), ("rich", "cli"), ("shapely", "plan")):
-            require(library, extra=extra)
+        for library in ("typer", "rich"):
+            require(library, extra="cli")
         import typer
 
         from .app import app

@@ -97,14 +97,15 @@ def solve_(
         text = f"--folder: {file.name} writes nothing there by itself; name the files, as"
         raise OptionError(f"{text} -o {folder}/roof.obj", what="--folder", found=str(folder))
     project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
-    options = dict(project.options) if method in (None, project.method) else {}
+    project = project.solved_by(method or project.method)
+    options = dict(project.options)
     if target is not None:
         options["target"] = target
     given: dict[str, Any] = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
     given["accuracy"] = ", ".join(accuracy) if accuracy else None
     wanted = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
-    asked: dict[str, Any] = {"method": method or project.method, "options": options, "wanted": wanted}
-    asked |= {"verify": verify or project.verify, "swap": swap or (), "output": own}
+    asked: dict[str, Any] = {"options": options, "wanted": wanted, "output": own}
+    asked |= {"verify": verify or project.verify, "swap": swap or ()}
     asked["mesh_check"] = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, **asked)
     if project.specified and not project.has_file:  # a drawing alone

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import count
 from string import ascii_lowercase
 from typing import NamedTuple
 
@@ -78,11 +79,9 @@ def triangles_at_true_size(schedule: Panels, millimetres: float) -> list[FlatPan
         [f"{'+'.join(str(k) for k in at_edge[e] if k != number) or 'rim'} / e{e}" for e in edges]
         for number, edges in enumerate(sides, start=1)
     ]
-    rows = zip(schedule.flat * millimetres, labels, schedule.panels["family"], strict=True)
-    return [  # an edge of a triangle has the number of the corner opposite
-        FlatPanel(corners, k, f"F{family}", [text[2], text[0], text[1]])
-        for k, (corners, text, family) in enumerate(rows, start=1)
-    ]
+    rows = zip(schedule.flat * millimetres, count(1), schedule.panels["family"], labels, strict=False)
+    # an edge of a triangle has the number of the corner opposite
+    return [FlatPanel(corners, k, f"F{family}", [c, a, b]) for corners, k, family, (a, b, c) in rows]
 
 
 def polygons_at_true_size(net: PanelNet, millimetres: float) -> list[FlatPanel]:
@@ -120,8 +119,7 @@ def _add_panel(sheet: Sheet, panel: FlatPanel) -> None:
     height = min(max(12.0, 0.15 * radius), 0.4 * radius, most)
     sheet.texts.append(Text(middle + np.array([0.0, 0.2 * height]), number, height, align="C"))
     if panel.below:
-        below = middle - np.array([0.0, 0.9 * height])
-        sheet.texts.append(Text(below, panel.below, 0.6 * height, align="C"))
+        sheet.texts.append(Text(middle - [0.0, 0.9 * height], panel.below, 0.6 * height, align="C"))
     for j, label in enumerate(panel.labels):
         small = min(4.0, 0.25 * radius, 0.7 * lengths[j] / (WIDTH * len(label)))
         at = corners[j] + 0.5 * edges[j] + small * inward[j]

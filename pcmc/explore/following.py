@@ -6,7 +6,7 @@ Where following leads nowhere, the walls or the start shape of the surface's pro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -30,10 +30,12 @@ FIRST_ATTEMPTS = 4  # of following, before the project's own walls are tried
 START_SECONDS = 6.0  # time limit of solving from the start shape
 Values = Mapping[str, Mapping[str, Any]]  # numbers by kind and name; and points, each [x, y, z]
 Stop = Callable[[], bool]
+Progressed = Callable[[str], None]  # is told each step
 
 
-def until(stop: Stop, end: float) -> Stop:
-    """True when ``stop`` is, or when the monotonic clock has passed ``end``."""
+def until(stop: Stop, seconds: float) -> Stop:
+    """True when ``stop`` is, or when so many seconds have passed."""
+    end = time.monotonic() + seconds
     return lambda: stop() or time.monotonic() > end
 
 
@@ -58,8 +60,7 @@ class Reached:
 
 def reach(start: Surface, asked: Surface, stop: Stop, attempts: int = 100, **options: Any) -> Reached:
     """Follow the equilibrium from ``start`` to the values of ``asked``; a step that fails is halved."""
-    here, certificate, done, step = start, None, 0.0, 1.0
-    failed = None
+    here, certificate, failed, done, step = start, None, None, 0.0, 1.0
     for _ in range(attempts):
         ahead = min(1.0, done + step)
         aim = between(start, asked, ahead).moved(_with_points(here, start, asked, ahead))
@@ -104,12 +105,12 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
 
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, by kind and name; walls follow the pressures of their rooms."""
-    given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
+    given: dict[str, Any] = {kind: values.get(kind) for kind in KINDS}
     changed, points = surface.retensioned(**given), values.get("points") or {}
     known = dict(zip(changeable_values(surface)["points"], single_points(surface).tolist(), strict=True))
     X = surface.vertices.copy()
     for name, place in points.items():
-        X[known[validate.choice("point", name, tuple(known))]] = place
+        X[known[validate.choice("point", name, tuple(known))]] = validate.triple(f"point {name!r}", place)
     return changed if np.array_equal(X, surface.vertices) else changed.moved(X)
 
 
@@ -126,27 +127,22 @@ class ProjectFallback:
         return replace(self, given=self.given | _walls(surface))
 
     def settle(
-        self,
-        here: Surface,
-        asked: Surface,
-        stop: Stop,
-        end: float,
-        progress: Callable[[str], None],
-        **options: Any,
+        self, here: Surface, asked: Surface, stop: Stop, seconds: float, progress: Progressed, **options: Any
     ) -> tuple[Reached, str, ProjectFallback]:
         """Follow to ``asked``; else with the project's walls, in small steps, and from its start shape.
 
-        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, unless
-        following led there: what did, or why the project does not; and the fallback for the next time.
+        Following ends after these ``seconds``. Returns where it ended; a note, unless following led there:
+        what did, or why the project does not; and the fallback for the next time.
         """
-        late = until(stop, end)
+        late = until(stop, seconds)
         way = reach(here, asked, late, attempts=FIRST_ATTEMPTS if self.data else 100, **options)
         if way.failed is None or stop() or not self.data:
             return way, "", self
         moved = {name for name, tension in _walls(asked) if (name, tension) not in self.given}
+        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}  # to the project
         start, note = None, ""
         try:
-            project, start = self.start(asked, moved)
+            project, start = data_with_values(self.path, self.data, asked, left)[1:]
         except (PcmcError, MissingExtra) as error:
             note = f"the project's own way to these values: {error}"
         if start is not None and (new := _walls(start) - _walls(asked)):
@@ -173,15 +169,6 @@ class ProjectFallback:
         found = Reached(result.surface, result.certificate, None)
         return found, note, replace(self, given=self.given | given)
 
-    def start(self, asked: Surface, moved: Collection[str] = ()) -> tuple[projects.Project, Surface]:
-        """The project with the values of a surface, and its start shape.
-
-        Walls have the tensions that the project gives them beside the new tensions of its patches; those in
-        ``moved`` have the surface's. Errors as ``data_with_values``.
-        """
-        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}
-        return data_with_values(self.path, self.data, asked, left)[1:]
-
 
 def _walls(surface: Surface) -> frozenset[tuple[str, float]]:
     return frozenset((patch.name, patch.tension) for patch in surface.patches if patch.wall)
@@ -189,7 +176,7 @@ def _walls(surface: Surface) -> frozenset[tuple[str, float]]:
 
 def solved_start_shape(project: projects.Project, start: Surface, stop: Stop) -> Result | None:
     """A start shape solved and remeshed as its project asks for, without targets; None where that fails."""
-    stop = until(stop, time.monotonic() + START_SECONDS)
+    stop = until(stop, START_SECONDS)
 
     def check(_: str) -> None:
         if stop():

@@ -23,17 +23,16 @@ from ..project.writing import certified_files
 from ..surface import Surface
 from ..surface.images import expect_no_images
 from . import page_data
-from .acts import Turn
 from .following import ProjectFallback, Stop
 from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, check_request, listen, pack
 from .roof import ShownRoof, Watch, save, signature
-from .session import Session, SessionState, solved_start
+from .session import Session, SessionState, Turn, solved_start
 
 LEFT_OUT = "members are left out: they are known for a part of the roof alone"
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 POLL = 0.1  # seconds after which the server sees that it shall end
-Answer = tuple[dict[str, Any], page_data.Arrays]  # header and arrays; see protocol.py
+Answer = tuple[dict[str, Any], page_data.Arrays]  # header and arrays; see listening.py
 
 
 class Explorer:
@@ -152,6 +151,9 @@ class Explorer:
         header, fields = self._shown(state)
         left_out = LEFT_OUT if has_members(roof.outcome) and "member_ends" not in fields else ""
         untouched = state.surface is self.start.surface  # the note is about the start
+        targets, vary = state.aims or roof.aims
+        aims = {"targets": [{**vars(target), "label": target.label} for target in targets]}
+        aims["vary"] = [{"label": parameter.label, "parameter": vars(parameter)} for parameter in vary]
         once = {
             "session": name,
             "formats": list(FORMATS),
@@ -164,7 +166,7 @@ class Explorer:
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",
             "quantities": page_data.target_choices(state.surface),
-            "aims": page_data.aims_data(*(state.aims or roof.aims)),
+            "aims": aims,
             "watching": self.watch is not None,
             "version": self.version,
             "superseded": False,
@@ -177,8 +179,9 @@ class Explorer:
         outcome = self.roof.outcome
         if not moving and has_members(outcome) and page_data.whole_of(state.surface) is None:
             members = members_drawn(outcome, state.surface, state.certificate)
-            about["figures"] += page_data.member_figures(members)
-            arrays |= page_data.member_ends(members, self.origin)
+            rows, ends = page_data.members_data(members, self.origin)
+            about["figures"] += rows
+            arrays |= ends
         return about, arrays
 
     def save(self, session: Session, name: str, replace: bool = False) -> dict[str, Any]:

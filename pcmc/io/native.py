@@ -46,16 +46,10 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in content.scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
+    mesh = {name: getattr(surface, name) for name in ("vertices", "faces", "patch_of_face")}
+    text = np.array(json.dumps(meta, default=_plain))
     with path.open("wb") as file:
-        np.savez_compressed(
-            file,
-            meta=np.array(json.dumps(meta, default=_plain)),
-            vertices=surface.vertices,
-            faces=surface.faces,
-            patch_of_face=surface.patch_of_face,
-            support=support_of(surface),
-            **arrays,
-        )
+        np.savez_compressed(file, meta=text, **mesh, support=support_of(surface), **arrays)
 
 
 def read(path: Path) -> MeshData:
@@ -70,8 +64,8 @@ def read(path: Path) -> MeshData:
         meta = json.loads(str(arrays.pop("meta")))
         if not isinstance(meta, dict) or not isinstance(meta["certificate"], dict):
             raise FileError(f"its description is damaged: {str(meta)[:60]!r}", where="meta")
-        kind, version = meta["format"], meta["version"]
-        if kind != FORMAT:
+        version = meta["version"]
+        if (kind := meta["format"]) != FORMAT:
             text = f"expected the format {FORMAT!r}, found {kind!r}"
             raise FileError(text, where="format", found=kind, expected=FORMAT)
         if version > VERSION:
@@ -82,12 +76,10 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=odd[0])
         metadata = parse_metadata(meta["description"])
         X, F, patch, support = (arrays[key] for key in ("vertices", "faces", "patch_of_face", "support"))
-        about: dict[str, Any] = {
-            "curves": _curves(meta.get("curves", ()), len(X)),
-            "scalars": _under("scalar ", arrays),
-            "certificate": {**meta["certificate"], **_under("certificate ", arrays)},
-        }
-        return metadata.mesh_data(X, F, patch, list(metadata.patches), support=support, **about)
+        about: dict[str, Any] = {"support": support, "scalars": _under("scalar ", arrays)}
+        about["curves"] = _curves(meta.get("curves", ()), len(X))
+        about["certificate"] = {**meta["certificate"], **_under("certificate ", arrays)}
+        return metadata.mesh_data(X, F, patch, list(metadata.patches), **about)
 
 
 def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:

@@ -239,27 +239,22 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     walls, rows, resting = part.walls, part.walls.rows, part.resting
     if not resting.any():
         return middle
-    top, direction, drop = X.copy(), np.zeros_like(X), np.zeros_like(X)
-    top[rows.vertices] = rows.top_places(X)
-    direction[rows.vertices] = rows.directions(surface)
-    of_held = walls.foot >= 0
-    of_held[rows.vertices] = rows.feet[:, 0] >= 0
+    top, share, offset = X.copy(), np.zeros((surface.n, 1)), np.zeros_like(X)
+    top[rows.vertices], share[rows.vertices, 0] = rows.top_places(X), 1.0 - rows.relative_height
+    offset[rows.vertices] = rows.offset
+    drop = X - surface.plane.nearest(X)
     drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
-    drop[rows.vertices] = rows.drops(X)
+    drop[rows.vertices] = rows.drops(surface, X)
     down = resting.copy()
     down[rows.vertices] = under_low(rows, resting | walls.corner)
     of_wall = resting | walls.top_free
     of_wall[rows.vertices] = True
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
     rising &= ~(surface.fixed[start] & surface.fixed[end])
-    start, end = edges[rising].T
-    place = 0.5 * (top[start] + top[end])
-    height = surface.plane.height(place)[:, None]
-    on_sliding = place + 0.5 * height * (direction[start] + direction[end])
-    share = np.zeros(surface.n)
-    share[rows.vertices] = 1.0 - rows.relative_height
-    below = 0.25 * (share[start] + share[end])[:, None] * (drop[start] + drop[end])
-    middle[rising] = np.where(of_held[start, None], place - below, on_sliding)
+    top, share, offset, drop = (
+        0.5 * values[edges[rising]].sum(axis=1) for values in (top, share, offset, drop)
+    )
+    middle[rising] = top - share * drop + np.linalg.norm(drop, axis=1)[:, None] * offset
     return middle
 
 

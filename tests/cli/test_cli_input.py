@@ -150,9 +150,3 @@ def test_names_of_files_that_the_locale_cannot_read_are_printed_as_they_are(fold
     assert cli.main(["solve", "roof.toml", "--no-mesh-check"]) == 0
     sys.stdout.flush()
     assert "written: rööf.pcmc".encode() in shown.getvalue()
-
-
-def test_without_shapely_a_command_names_the_extra(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "shapely", None)
-    assert cli.main(["schema"]) == 2
-    assert "pcmc-surfaces[plan]" in capsys.readouterr().err

@@ -89,6 +89,16 @@ def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
 
 
+def test_options_that_another_method_leaves_out_are_named(roof, capsys):
+    roof.write_text(TEXT + "order = 2\n", encoding="utf-8")
+    left = "roof.toml: method lbfgs solves without the file's options of newton: tolerance = 1e-11, order = 2"
+    for given in (["solve", "roof.toml"], ["sweep", "roof.toml", "east.tension=3", "--workers", "1"]):
+        cli.main([*given, "--method", "lbfgs"])
+        assert capsys.readouterr().err.count(left) == 1
+        cli.main([*given, "--method", "newton"])
+        assert left not in capsys.readouterr().err
+
+
 def test_an_accuracy_that_is_missed_is_1(roof):
     roof.write_text(TEXT + "accuracy = {height = 1e-9}\nmost_triangles = 9\n", encoding="utf-8")
     assert cli.main(["sweep", "roof.toml", "east.tension=3", "--workers", "1", "--csv", "t.csv"]) == 1
@@ -147,7 +157,7 @@ def test_the_store_of_a_generator_that_has_changed_is_refused(roof, capsys, monk
 
 
 def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch):
-    monkeypatch.setattr("pcmc.sweep.running._batches", lambda *_: iter(()))
+    monkeypatch.setattr("pcmc.sweep.running._batches", lambda *_: (batch for batch in ()))
     given = ["sweep", "roof.toml", *GRID[:1], "--csv", "t.csv", "--workers", "1"]
     assert cli.main(given) == 130
     assert capsys.readouterr().out == ""
