@@ -24,11 +24,7 @@ TALL = 4.0  # heights of a wall over the length of its top edge: a higher column
 
 
 def refine_near(
-    surface: Surface,
-    points: npt.ArrayLike,
-    levels: int,
-    radius: float,
-    project: Projection | None = None,
+    surface: Surface, points: npt.ArrayLike, levels: int, radius: float, project: Projection | None = None
 ) -> Surface:
     """The same surface with finer triangles near points: half the edge length at half the distance.
 

@@ -266,10 +266,5 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     ends = np.searchsorted(used, old.curves)
     cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
     return surface.with_mesh(
-        support,
-        vertices=X,
-        faces=F,
-        patch_of_face=patch_of_face,
-        cables=cables,
-        curves=old.on.joined(ends),
+        support, vertices=X, faces=F, patch_of_face=patch_of_face, cables=cables, curves=old.on.joined(ends)
     )
