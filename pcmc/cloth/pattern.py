@@ -17,11 +17,9 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas, lengths_along
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
-from .cut_mesh import CutMesh, cut_mesh
-from .flattening import FOLDED
-from .layout import ClothSheet, sheet_axes, with_levels, with_lines
+from .cut_mesh import ClothSheet, CutMesh, cut_mesh, sheet_axes, with_levels, with_lines
 from .settings import CuttingOptions
-from .sewing import Cloth, seams_of
+from .sewing import FOLDED, Cloth, seams_of
 from .strips import CuttingPattern, Strip
 
 ACROSS = 4  # edges across the narrowest strip, about

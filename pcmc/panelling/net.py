@@ -25,7 +25,6 @@ from .sheet import SheetMesh
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])  # corners of the panels from their place
 HEXAGON = np.array([[0, 1], [6, -1], [12, 1], [12, 5], [6, 7], [0, 5]]) / 6.0  # and i + j even
-NUDGE = 1e-6  # of a step: a vertex is at least so far from every line
 GRID = 1e-10  # of a step: cuts lie on a grid so fine
 SAME = 1e-8  # of the size: points that are so near are one
 ROUNDING = 1e-6  # of barycentric coordinates
@@ -78,20 +77,6 @@ def counted(count: Ints) -> tuple[Ints, Ints]:
     """
     number = np.repeat(np.arange(len(count)), count)
     return number, np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
-
-
-def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
-    """(m,3) the values (k,) at corners ``place`` (m,3), none nearer to a whole number than ``NUDGE``.
-
-    A boundary that lies on a line is moved inwards, so that the line is the boundary of the panels beside it.
-    Values marked ``up`` (k,) are moved upwards.
-    """
-    line = np.rint(values)
-    away = values[place].mean(axis=1)[:, None] - line[place]
-    inward = np.bincount(place.ravel(), away.ravel(), len(values))
-    down = inward < 0.0 if up is None else (inward < 0.0) & ~up
-    away = line + NUDGE * np.where(down, -1.0, 1.0)
-    return np.where(np.abs(values - line) < NUDGE, away, values)[place]
 
 
 def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool = False) -> Net:

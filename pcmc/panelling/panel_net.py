@@ -24,10 +24,9 @@ from ..surface.distance import distances
 from ..surface.geometry import cross_2d, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
-from .isothermic import curvature_coordinates
-from .net import INSIDE, Net, SheetNet, net, nudged, tidied, without_flat
+from .net import INSIDE, Net, SheetNet, net, tidied, without_flat
 from .planar import before, convex, planarised, planarity, polygon_areas, torsion, torsion_free_axes
-from .sheet import SheetMesh, sheets_of
+from .sheet import SheetMesh, curvature_coordinates, nudged, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
