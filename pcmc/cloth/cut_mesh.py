@@ -70,18 +70,14 @@ class CutMesh:
     def pieces(self) -> Pieces:
         """The pieces that it falls into, each with vertices of its own."""
         topo = self.topology
-        uncut = ~self.cut_edge[topo.edge_of_face.ravel()[topo.neighbours[:, 0]]]
-        one, other = topo.neighbours[uncut].T
-        start, end = (3 * (one // 3) + (one % 3 + step) % 3 for step in (1, 2))  # corners at its ends
-        # both triangles have the same outside, so the neighbour runs along the edge the other way
-        end_too, start_too = (3 * (other // 3) + (other % 3 + step) % 3 for step in (1, 2))
-        pairs = np.stack([np.append(start, end), np.append(start_too, end_too)], axis=1)
-        corner = self.F.ravel()
-        label = components(pairs, 3 * len(self.F))
+        sides = topo.neighbours[~self.cut_edge[topo.edge_of_face.ravel()[topo.neighbours[:, 0]]]]
+        # the corners there of both triangles, of which the second runs the other way
+        ends = 3 * (sides // 3)[:, None] + (sides[:, None] + np.array([[1], [2]])) % 3
+        ends[..., 1] = ends[:, ::-1, 1]
+        label = components(ends.reshape(-1, 2), 3 * len(self.F))
         vertex = np.empty(label.max() + 1, dtype=np.int64)
-        vertex[label] = corner
-        piece = components(np.stack([one // 3, other // 3], 1), len(self.F))
-        return Pieces(label.reshape(-1, 3), vertex, piece)
+        vertex[label] = self.F.ravel()
+        return Pieces(label.reshape(-1, 3), vertex, components(sides // 3, len(self.F)))
 
     def with_points(self, ends: Ints, points: Floats) -> CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
@@ -91,8 +87,7 @@ class CutMesh:
         # largest: two points of a seam and a corner may lie on a line
         place = edge_places(self.F[:, SIDES], ends)
         two = np.flatnonzero((place >= 0).sum(axis=1) == 2)
-        cut = place[two] >= 0
-        turn = np.where(cut[:, 0] & cut[:, 2], 2, cut.argmax(axis=1))
+        turn = ((place[two] < 0).argmax(axis=1) + 1) % 3  # after the side that is not cut
         roll = (np.arange(3) + turn[:, None]) % 3
         a, b, _ = np.take_along_axis(self.F[two], roll, axis=1).T
         p, q, _ = number[np.take_along_axis(place[two], roll, axis=1)].T
@@ -106,9 +101,8 @@ class CutMesh:
         split = edge_places(self.cuts, ends)
         halved = split >= 0
         halves = [np.stack([self.cuts[halved, side], number[split[halved]]], axis=1) for side in (0, 1)]
-        cuts = np.concatenate([self.cuts[~halved], *halves])
-        seam = np.concatenate([self.seam[~halved], self.seam[halved], self.seam[halved]])
-        return CutMesh(X, F, source, cuts, seam)
+        cuts, seam = np.concatenate([self.cuts[~halved], *halves]), self.seam
+        return CutMesh(X, F, source, cuts, np.concatenate([seam[~halved], seam[halved], seam[halved]]))
 
     def with_vertex(self, point: Floats, faces: Bools) -> tuple[CutMesh, int]:
         """The mesh with a vertex nearest to a point (3,) on chosen faces (m,), and its number."""
@@ -152,14 +146,13 @@ class CutMesh:
                 path = np.asarray(solver.find_geodesic_path(*ends))
                 found.append((float(lengths_along(path)[-1]), path, piece))
         _, path, piece = min(found, key=lambda one: one[0])
-        sides = self.topology.edges_of(self.pieces.piece == piece)
-        edges = self.topology.edges[sides]
-        middle, length = self.X[edges].mean(axis=1), segment_lengths(self.X, edges)
-        near = cKDTree(path).query(middle)[0] <= 0.5 * length + ON * self.size
+        edges = self.topology.edges[self.topology.edges_of(self.pieces.piece == piece)]
+        reach = 0.5 * segment_lengths(self.X, edges) + ON * self.size
+        edges = edges[cKDTree(path).query(self.X[edges].mean(axis=1))[0] <= reach]
         place, share = np.empty((len(path), 2), dtype=np.int64), np.empty(len(path))
         for k, point in enumerate(path):
-            weights, away = nearest_places(self.X[edges[near][:, [0, 1, 1]]], point)
-            place[k], share[k] = edges[near][away.argmin()], 1.0 - weights[away.argmin(), 0]
+            weights, away = nearest_places(self.X[edges[:, [0, 1, 1]]], point)
+            place[k], share[k] = edges[away.argmin()], 1.0 - weights[away.argmin(), 0]
         return self._along(place, share, path, number, name)
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
@@ -273,22 +266,19 @@ def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, 
     Along is the direction with this angle from x in the plan; by default the one across which the sheet is
     narrowest.
     """
-    normal = area_vectors(P).sum(axis=0)
+    normal, (east, north, _) = area_vectors(P).sum(axis=0), plane.axes
     normal = normal / (np.linalg.norm(normal) or 1.0)
-    east, north, _ = plane.axes
     if degrees is None:
-        first = east - (east @ normal) * normal
-        first = first if np.linalg.norm(first) > 0.1 else north - (north @ normal) * normal
+        first = east if np.linalg.norm(np.cross(east, normal)) > 0.1 else north
+        first = first - (first @ normal) * normal
         first /= np.linalg.norm(first)
         second = np.cross(normal, first)
         turned = np.cos(ANGLES)[:, None] * second - np.sin(ANGLES)[:, None] * first
         widths = np.ptp(P.reshape(-1, 3) @ turned.T, axis=0)
-        widths[:2] *= NARROWER
-        widths[0] *= NARROWER
+        widths[:2] *= NARROWER ** np.array([2, 1])
         across = turned[widths.argmin()]
     else:
-        wanted = np.cos(np.radians(degrees)) * east + np.sin(np.radians(degrees)) * north
-        across = np.cross(normal, wanted)
+        across = np.cross(normal, np.cos(np.radians(degrees)) * east + np.sin(np.radians(degrees)) * north)
         if np.linalg.norm(across) < 1e-6:
             text = f"direction: {degrees:g} degrees is square to a sheet of the roof; give another"
             raise OptionError(text, what="direction", found=degrees)
@@ -299,23 +289,17 @@ def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, 
 def level_ends(mesh: CutMesh, faces: Bools, height: Floats, level: float) -> Iterator[tuple[Floats, Floats]]:
     """The ends (3,) of each line on which height (n,) has a level on chosen faces (m,), between two cuts."""
     topo = mesh.topology
-    sides = topo.edge_of_face[faces]
-    above = height >= level
-    crossed = above[topo.edges[:, 0]] != above[topo.edges[:, 1]]
-    hit = crossed[sides]
-    rows = hit.any(axis=1)
-    links = sides[rows][hit[rows]].reshape(-1, 2).astype(np.int64)
-    cut = mesh.cut_edge[links]
-    nodes = np.where(cut, len(topo.edges) + np.arange(links.size).reshape(-1, 2), links)
-    names, local = np.unique(nodes, return_inverse=True)
-    edge = np.empty(len(names), dtype=np.int64)
-    edge[local.ravel()] = links.ravel()
+    sides, above = topo.edge_of_face[faces], (height >= level)[topo.edges]
+    hit = (above[:, 0] != above[:, 1])[sides]
+    links = sides[hit].reshape(-1, 2).astype(np.int64)  # two sides of each triangle, or none
+    nodes = np.where(mesh.cut_edge[links], len(topo.edges) + np.arange(links.size).reshape(-1, 2), links)
+    names, at, local = np.unique(nodes, return_index=True, return_inverse=True)
     for chain, closed, _ in joined(local.reshape(-1, 2), np.zeros(len(names), dtype=bool), len(names)):
         if not closed:
-            a, b = topo.edges[edge[chain[[0, -1]]]].T
+            a, b = topo.edges[links.ravel()[at[chain[[0, -1]]]]].T
             share = (level - height[a]) / (height[b] - height[a])
-            ends = mesh.X[a] + share[:, None] * (mesh.X[b] - mesh.X[a])
-            yield ends[0], ends[1]
+            start, end = mesh.X[a] + share[:, None] * (mesh.X[b] - mesh.X[a])
+            yield start, end
 
 
 def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
@@ -326,19 +310,17 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
         own = [level_ends(mesh, sheet.source[mesh.source], height, level) for level in sheet.levels[1:-1]]
         met = list[int]()
         for line in [line for lines in own for line in lines]:  # a geodesic may cross the next level
-            vertices = []
             for point in line:
                 mine = sheet.source[mesh.source]
-                others = [vertex for vertex in before if (mesh.F[mine] == vertex).any()]
-                away = np.linalg.norm(mesh.X[others] - point, axis=1) if others else np.array([np.inf])
-                if away.min() <= meet:
-                    vertices.append(others[int(away.argmin())])
+                others = np.intersect1d(before, mesh.F[mine]).astype(np.int64)
+                away = np.linalg.norm(mesh.X[others] - point, axis=1)
+                if away.min(initial=np.inf) <= meet:
+                    met.append(int(others[away.argmin()]))
                 else:
                     mesh, vertex = mesh.with_vertex(point, mine)
-                    vertices.append(vertex)
+                    met.append(vertex)
             mine = sheet.source[mesh.source]
-            mesh = mesh.with_seam(vertices[0], vertices[1], number, f"a seam of {sheet.patch!r}", mine)
-            met += vertices
+            mesh = mesh.with_seam(met[-2], met[-1], number, f"a seam of {sheet.patch!r}", mine)
             number += 1
         before += met
     return mesh
@@ -361,11 +343,10 @@ def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
                 raise OptionError(text, what="seams", found=point.tolist())
             place = weights @ mesh.X[mesh.F[f]]
             if k in (0, len(line) - 1):
-                rim = mesh.topology.edges[mesh.cut_edge]
-                on_rim, gap = nearest_places(mesh.X[np.column_stack([rim, rim[:, 1]])], place)
-                near = int(gap.argmin())
-                if gap[near] <= reach:
-                    place = on_rim[near] @ mesh.X[[*rim[near], rim[near, 1]]]
+                rim = mesh.X[mesh.topology.edges[mesh.cut_edge][:, [0, 1, 1]]]
+                on_rim, gap = nearest_places(rim, place)
+                if gap.min() <= reach:
+                    place = on_rim[gap.argmin()] @ rim[gap.argmin()]
             mesh, vertex = mesh.with_vertex(place, np.ones(len(mesh.F), dtype=bool))
             if k:
                 middle = _seen(mesh, 0.5 * (point + line[k - 1]), plane)[1]
@@ -380,6 +361,6 @@ def _seen(mesh: CutMesh, point: Floats, plane: Plane) -> tuple[Floats, int, floa
     the highest of several, and how far it is."""
     seen = mesh.X if len(point) == 3 else plane.to_local(mesh.X)[:, :2]
     weights, away = nearest_places(seen[mesh.F], point)
-    height = np.einsum("mi,mi->m", weights, plane.height(mesh.X)[mesh.F])
+    height = (weights * plane.height(mesh.X)[mesh.F]).sum(axis=1)
     f = int(np.where(away <= away.min() + ON * mesh.size, height, -np.inf).argmax())
     return weights[f], f, float(away[f])

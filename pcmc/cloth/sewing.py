@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
 
@@ -15,7 +17,7 @@ from ..base.arrays import Floats, Ints, block_rows, cached_array
 from ..base.tolerances import ON
 from ..forces.triangles import effective_tensions
 from ..surface import Surface
-from ..surface.geometry import edge_vectors, face_areas, segment_lengths
+from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths, unit_vectors
 from ..surface.supports import mirror_edges
 from .cut_mesh import ClothSheet, CutMesh, sheet_axes
 from .settings import CuttingOptions
@@ -53,24 +55,20 @@ class Cloth:
     ) -> Cloth:
         """Strips in the order of their patches, then of their places across the sheet."""
         piece = mesh.pieces.piece
-        count = int(piece.max()) + 1
-        first = np.zeros(count, dtype=np.int64)
-        first[piece[::-1]] = np.arange(len(piece))[::-1]
+        source = mesh.source[np.unique(piece, return_index=True)[1]]  # a face of each piece
         centre = mesh.X[mesh.F].mean(axis=1)
         middle = np.stack([np.bincount(piece, c) / np.bincount(piece) for c in centre.T], axis=1)
-        sheet, place = np.full(count, -1), middle[:, 0].copy()
+        sheet, place = np.full(len(source), -1), middle[:, 0].copy()
         for s, one in enumerate(sheets):
-            mine = one.source[mesh.source[first]]
+            mine = one.source[source]
             sheet[mine], place[mine] = s, middle[mine] @ one.across
-        order = np.lexsort((place.round(9), sheet, surface.patch_of_face[mesh.source[first]]))
-        rank = np.empty(count, dtype=np.int64)
-        rank[order] = np.arange(count)
+        order = np.lexsort((place.round(9), sheet, surface.patch_of_face[source]))
         along: list[Floats | None] = [sheets[s].along if s >= 0 else None for s in sheet[order].tolist()]
         for k in np.flatnonzero(sheet[order] < 0).tolist():  # beside drawn seams
-            name = surface.patches[surface.patch_of_face[mesh.source[first[order[k]]]]].name
+            name = surface.patches[surface.patch_of_face[source[order[k]]]].name
             if (degrees := options.of_patch("direction", name)) is not None:
                 along[k] = sheet_axes(mesh.X[mesh.F[piece == order[k]]], surface.plane, degrees)[0]
-        return cls(surface, mesh, rank[piece], sheet[order], along)
+        return cls(surface, mesh, np.argsort(order)[piece], sheet[order], along)
 
     @cached_array
     def strip_of_vertex(self) -> Ints:
@@ -87,11 +85,7 @@ class Cloth:
     @cached_array
     def local(self) -> Ints:
         """(u,) the number of each vertex of a piece in its strip."""
-        order = np.argsort(self.strip_of_vertex, kind="stable")
-        count = np.bincount(self.strip_of_vertex)
-        place = np.empty(len(order), dtype=np.int64)
-        place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-        return place
+        return pd.Series(self.strip_of_vertex).groupby(self.strip_of_vertex).cumcount().to_numpy()
 
     @cached_property
     def names(self) -> list[str]:
@@ -114,11 +108,9 @@ class Cloth:
         edge = self.mesh.topology.edge_of_face.ravel()
         chosen = np.flatnonzero(self.mesh.cut_edge[edge])
         chosen = chosen[np.argsort(edge[chosen], kind="stable")]
-        start, end = (3 * (chosen // 3) + (chosen % 3 + step) % 3 for step in (1, 2))
-        corner, own = self.mesh.F.ravel(), self.mesh.pieces.faces.ravel()
-        forward = corner[start] < corner[end]
-        low, high = np.where(forward, start, end), np.where(forward, end, start)
-        ends = np.stack([own[low], own[high]], axis=1)
+        sides = 3 * (chosen // 3)[:, None] + (chosen[:, None] + [1, 2]) % 3
+        forward = np.diff(self.mesh.F.ravel()[sides], axis=1)[:, 0] > 0
+        ends = self.mesh.pieces.faces.ravel()[np.where(forward[:, None], sides, sides[:, ::-1])]
         return StripSides(edge[chosen], ends, forward, self.strip_of_face[chosen // 3])
 
     @cached_array
@@ -127,14 +119,6 @@ class Cloth:
         seam = np.full(len(self.mesh.topology.edges), -1)
         seam[self.mesh.topology.edge_numbers(self.mesh.cuts)] = self.mesh.seam
         return seam
-
-    @cached_array
-    def mirror_of_edge(self) -> Ints:
-        """(e,) the mirror plane that each edge of the mesh is in, to be sewn to its image, from 1; else 0."""
-        found, X, near = np.zeros(len(self.mesh.topology.edges), dtype=int), self.mesh.X, ON * self.mesh.size
-        for number, (plane, _) in enumerate(self.surface.on_planes, 1):
-            found[mirror_edges([(plane, abs(plane.height(X)) <= near)], self.mesh.topology)] = number
-        return found
 
     def outlines(self, strip: int) -> list[Ints]:
         """The outlines of a strip: its vertices in the order of its triangles, the longest first."""
@@ -155,16 +139,15 @@ class Cloth:
         points, angles = flat.copy(), np.radians(np.arange(0.0, 180.0, 0.5))
         for k, along in enumerate(self.along):
             mine, faces = self.strip_of_vertex == k, F[self.strip_of_face == k]
+            c, s = np.cos(angles), np.sin(angles)
             if along is None:  # the direction across which it is narrowest
-                c, s = np.cos(angles), np.sin(angles)
                 narrow = np.ptp(flat[mine] @ np.stack([-s, c]), axis=0).argmin()
                 c, s = c[narrow], s[narrow]
             else:
-                P, Q = self.X[faces], flat[faces]
-                edges, flat_edges = P[:, 1:] - P[:, :1], Q[:, 1:] - Q[:, :1]
+                edges, flat_edges = (at[faces][:, 1:] - at[faces][:, :1] for at in (self.X, flat))
                 # along = share · edges, and a part normal to the triangle
                 share = np.linalg.solve(edges @ edges.transpose(0, 2, 1), (edges @ along)[:, :, None])
-                warp = (face_areas(P)[:, None] * (share * flat_edges).sum(axis=1)).sum(axis=0)
+                warp = face_areas(self.X[faces]) @ (share * flat_edges).sum(axis=1)
                 c, s = warp / (np.linalg.norm(warp) or 1.0)
             points[mine] = flat[mine] @ np.array([[c, -s], [s, c]])
         return points
@@ -181,19 +164,19 @@ class Cloth:
 
 def seams_of(cloth: Cloth) -> list[Seam]:
     """Cut edges joined to seams: those with the same strips beside them, drawn as one line."""
-    topo, sides = cloth.mesh.topology, cloth.sides
+    mesh, topo, sides = cloth.mesh, cloth.mesh.topology, cloth.sides
+    mirrors = np.zeros(len(topo.edges), dtype=int)  # that each edge is in, to be sewn to its image, from 1
+    for k, (plane, _) in enumerate(cloth.surface.on_planes, 1):
+        mirrors[mirror_edges([(plane, abs(plane.height(mesh.X)) <= ON * mesh.size)], topo)] = k
     start = np.flatnonzero(np.append(True, np.diff(sides.edge) > 0))
-    keys: dict[tuple[Any, ...], list[int]] = {}
+    keys = defaultdict[tuple[Any, ...], list[int]](list)
     for edge, strips in zip(sides.edge[start].tolist(), np.split(sides.strip, start[1:]), strict=True):
-        key = tuple(sorted(strips.tolist())), int(cloth.seam_of_edge[edge]), int(cloth.mirror_of_edge[edge])
-        keys.setdefault(key, []).append(edge)
+        keys[tuple(sorted(strips.tolist())), cloth.seam_of_edge[edge], mirrors[edge]].append(edge)
     seams: list[Seam] = []
     for (beside, number, mirror), edges in keys.items():
-        mask = np.zeros(len(topo.edges), dtype=bool)
-        mask[edges] = True
         alone = "mirror" if mirror else "rim"
         kind = alone if len(beside) == 1 else "seam" if number >= 0 else "junction"
-        for curve in topo.curves_among(mask):
+        for curve in topo.curves_among(np.isin(np.arange(len(topo.edges)), edges)):
             at = np.searchsorted(sides.edge, topo.edge_numbers(curve.pairs))[:, None] + np.arange(len(beside))
             onward = (curve.pairs[:, 0] < curve.pairs[:, 1])[:, None]
             strip, left = sides.strip[at], sides.forward[at] == onward
@@ -233,12 +216,17 @@ def flattened(
     ([[0.0, 0.0], [1.8, -2.4], [5.0, 0.0], [3.2, 2.4]], True)
     """
     pins, places = _pins(X, strip)
-    gradient, root = _gradients(X[F]), np.sqrt(face_areas(X[F]))
-    y = _conformal(F, gradient, root, pins, places, len(X)) if start is None else start
-    free = np.ones(2 * len(X), dtype=bool)
-    free[pins] = False
+    gradient, root, lengths = _gradients(X[F]), np.sqrt(face_areas(X[F])), segment_lengths(X, seams[0])
+    free = np.isin(np.arange(2 * len(X)), pins, invert=True)
+    y = start
+    if y is None:  # the map with the least Σ A ((xₛ - yₜ)² + (xₜ + yₛ)²) that takes the pins to their places
+        (g, h), w = gradient.transpose(1, 0, 2), root[:, None]
+        rows = np.stack([np.stack([w * g, -w * h], axis=2), np.stack([w * h, w * g], axis=2)], axis=2)
+        A, flat = block_rows(rows, F, len(X)), np.zeros(2 * len(X))
+        flat[pins] = places
+        flat[free] = _least_squares(A[:, free], -(A @ flat))
+        y = flat.reshape(-1, 2)
     free[pins[2::4]] = True  # the second point may move along x
-    lengths = segment_lengths(X, seams[0])
     misfit = partial(
         _misfit, F=F, gradient=gradient, root=root, seams=seams, lengths=lengths, stretch=stretch
     )
@@ -271,44 +259,26 @@ def _least_squares(J: csr_array, right: Floats) -> Floats:
 
 def _pins(X: Floats, strip: Ints) -> tuple[Ints, Floats]:
     """(4 k,) for each strip the places in a vector 2 u of x, y, x, y of two far points; their values."""
-    pins, places = [], []
-    order = np.argsort(strip, kind="stable")
-    for mine in np.split(order, np.flatnonzero(np.diff(strip[order])) + 1):
+    pins, places = list[int](), list[float]()
+    for mine in (np.flatnonzero(strip == k) for k in np.unique(strip)):
         first = mine[np.linalg.norm(X[mine] - X[mine].mean(axis=0), axis=1).argmax()]
         away = np.linalg.norm(X[mine] - X[first], axis=1)
-        ends = sorted((first, mine[away.argmax()]))
-        pins += [2 * ends[0], 2 * ends[0] + 1, 2 * ends[1], 2 * ends[1] + 1]
+        pins += [2 * end + axis for end in sorted((first, mine[away.argmax()])) for axis in (0, 1)]
         places += [0.0, 0.0, away.max(), 0.0]
     return np.array(pins), np.array(places)
 
 
 def _gradients(P: Floats) -> Floats:
     """(m,2,3) the gradient of a linear function in each triangle from its values at the corners."""
-    a, b = edge_vectors(P)[:, 2], -edge_vectors(P)[:, 1]
-    length = np.linalg.norm(a, axis=1)
-    x = np.einsum("ij,ij->i", a, b) / length
-    y = 2.0 * face_areas(P) / length
-    D = np.zeros((len(P), 2, 3))
-    D[:, 0, 1], D[:, 0, 0] = 1.0 / length, -1.0 / length
-    D[:, 1, 2], D[:, 1, 1] = 1.0 / y, -x / (length * y)
-    D[:, 1, 0] = -D[:, 1, 1:].sum(axis=1)
-    return D
+    along, normal = edge_vectors(P)[:, 2], area_vectors(P)
+    frame = unit_vectors(np.stack([along, np.cross(normal, along)], axis=1))
+    turned = np.cross(normal[:, None], edge_vectors(P))
+    return frame @ (turned / (2.0 * face_areas(P) ** 2)[:, None, None]).transpose(0, 2, 1)
 
 
 def _jacobians(y: Floats, F: Ints, gradient: Floats) -> Floats:
     """(m,2,2) the map from each triangle of the roof to the flat one."""
     return np.einsum("mci,mjc->mij", y[F], gradient)
-
-
-def _conformal(F: Ints, gradient: Floats, root: Floats, pins: Ints, places: Floats, count: int) -> Floats:
-    """(u,2) the map with the least Σ A ((xₛ - yₜ)² + (xₜ + yₛ)²) that takes the pins to their places."""
-    (g, h), w = gradient.transpose(1, 0, 2), root[:, None]
-    rows = np.stack([np.stack([w * g, -w * h], axis=2), np.stack([w * h, w * g], axis=2)], axis=2)
-    A = block_rows(rows, F, count)
-    y, free = np.zeros(2 * count), np.ones(2 * count, dtype=bool)
-    y[pins], free[pins] = places, False
-    y[free] = _least_squares(A[:, free], -(A @ y))
-    return y.reshape(-1, 2)
 
 
 def _misfit(

@@ -95,28 +95,24 @@ class Panels:
     @property
     def family_of_face(self) -> Floats:
         """(m,) the family of each face of the surface, NaN for walls that are no panels: for pictures."""
-        family = np.full(self.surface.m, np.nan)
-        family[self.panels["face"]] = self.panels["family"]
-        return family
+        family = self.panels.set_index("face")["family"]
+        return family.reindex(range(self.surface.m)).to_numpy(dtype=float)
 
     def __str__(self) -> str:
         return self.text()
 
     def text(self, units: Units = NO_UNITS) -> str:
         """Totals and the largest families, with the units of the numbers if they are given."""
-        total = self.edge_totals
+        total, angles = self.edge_totals, self.edges["dihedral"].dropna()
         lengths = ", ".join(f"{r.kind} {r.length:.6g} ({r['count']})" for _, r in total.iterrows())
-        angles = self.edges["dihedral"].dropna()
         between = f"{angles.min():.1f} to {angles.max():.1f} degrees between neighbours"
-        rows = {
-            "panels": f"{len(self.panels)} in {self.count} families, at least {self.at_least} are needed",
-            "tolerance": f"{self.tolerance:g}, mirror images {self.mirror_images}",
-            "area": f"{self.area:.8g}",
-            "largest panel": _described(self.largest),
-            "smallest panel": _described(self.smallest),
-            "edges": f"{total['length'].sum():.6g} long: {lengths}",
-            "angles": between if len(angles) else "",
-        }
+        needed = f"at least {self.at_least} are needed"
+        rows = {"panels": f"{len(self.panels)} in {self.count} families, {needed}"}
+        rows["tolerance"] = f"{self.tolerance:g}, mirror images {self.mirror_images}"
+        rows |= {"area": f"{self.area:.8g}", "largest panel": _described(self.largest)}
+        rows["smallest panel"] = _described(self.smallest)
+        rows["edges"] = f"{total['length'].sum():.6g} long: {lengths}"
+        rows["angles"] = between if len(angles) else ""
         head = head_text(self.certificate, units, rows)
         table = self.families.head(SHOWN).to_string(index=False, float_format=lambda x: f"{x:.5g}")
         rest = self.count - SHOWN
@@ -169,50 +165,40 @@ def panels(
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
     corners = surface.vertices[surface.faces[faces]]
     lengths = np.linalg.norm(edge_vectors(corners), axis=2)
-    parts = triangle_families(lengths, tolerance, mirror_images == "apart")
-    table = _panel_table(surface, faces, lengths, parts.family, parts.order)
+    family, order, at_least = triangle_families(lengths, tolerance, mirror_images == "apart")
+    table = _panel_table(surface, faces, lengths, family, order)
     groups = table.groupby("family")
     least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()
     counts = pd.DataFrame({"count": groups.size(), "mirrored": groups["mirrored"].sum()})
     spread, area = (most - least).max(axis=1), groups["area"].sum()
     shown = counts.join(0.5 * (least + most)).assign(spread=spread, area=area).reset_index()
     tables = shown, table, _edge_table(surface, faces)
-    return Panels(surface, tolerance, mirror_images, certificate, *tables, laid_flat(corners), parts.at_least)
+    return Panels(surface, tolerance, mirror_images, certificate, *tables, laid_flat(corners), at_least)
 
 
 def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints) -> pd.DataFrame:
-    aligned = np.take_along_axis(lengths, order, axis=1)
-    mean = np.stack([np.bincount(family, column) for column in aligned.T], axis=1)
-    ascending = np.argsort(mean, axis=1, kind="stable")[family]  # the families' edges by length
-    order = np.take_along_axis(order, ascending, axis=1)
-    aligned = np.take_along_axis(aligned, ascending, axis=1)
-    over = (order[:, 1] - order[:, 0]) % 3 == 2  # its edges ascend clockwise
-    more = np.bincount(family, over) > 0.5 * np.bincount(family)
-    edge = np.take_along_axis(surface.topology.edge_of_face[faces], order, axis=1)
-    names = np.array([patch.name for patch in surface.patches], dtype=object)
-    return pd.DataFrame(
-        {
-            "panel": np.arange(len(faces)) + 1,
-            "face": faces,
-            "patch": names[surface.patch_of_face[faces]],
-            "family": family + 1,
-            "mirrored": over != more[family],
-            **{name: aligned[:, k] for k, name in enumerate("abc")},
-            **{f"edge_{name}": edge[:, k] for k, name in enumerate("abc")},
-            "area": face_areas(surface.vertices[surface.faces[faces]]),
-        }
-    )
+    aligned = pd.DataFrame(np.take_along_axis(lengths, order, axis=1))
+    mean = aligned.groupby(family).transform("mean").to_numpy()
+    order = np.take_along_axis(order, np.argsort(mean, axis=1, kind="stable"), axis=1)  # the edges by length
+    over = pd.Series((order[:, 1] - order[:, 0]) % 3 == 2)  # its edges ascend clockwise
+    table = pd.DataFrame({"panel": np.arange(len(faces)) + 1, "face": faces})
+    table["patch"] = [surface.patches[k].name for k in surface.patch_of_face[faces]]
+    table["family"], table["mirrored"] = family + 1, over != (over.groupby(family).transform("mean") > 0.5)
+    table[["a", "b", "c"]] = np.take_along_axis(lengths, order, axis=1)
+    edges = np.take_along_axis(surface.topology.edge_of_face[faces], order, axis=1)
+    table[["edge_a", "edge_b", "edge_c"]] = edges
+    return table.assign(area=face_areas(surface.vertices[surface.faces[faces]]))
 
 
 def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:
     topo = surface.topology
     pairs = joints(surface.vertices, surface.faces[faces], topo.edge_of_face[faces])
-    edge = pairs["edge"].to_numpy()
-    junction, boundary = (topo.junction_edge | topo.seam_edge)[edge], topo.boundary_edge[edge]
-    kinds = {"junction": junction, "mirror": surface.mirror_edge[edge], "boundary": boundary}
-    kind = np.select([*kinds.values()], [*kinds], "inside")
-    table = pairs[["edge"]].assign(kind=kind, length=segment_lengths(surface.vertices, topo.edges[edge]))
-    return table.assign(panel=pairs["first"] + 1, neighbour=pairs["second"] + 1, dihedral=pairs["dihedral"])
+    kinds = {"junction": topo.junction_edge | topo.seam_edge}
+    kinds |= {"mirror": surface.mirror_edge, "boundary": topo.boundary_edge}
+    kind, edge = np.select([*kinds.values()], [*kinds], "inside"), pairs["edge"].to_numpy()
+    lengths = segment_lengths(surface.vertices, topo.edges[edge])
+    table = pairs[["edge"]].assign(kind=kind[edge], length=lengths, panel=pairs["first"] + 1)
+    return table.assign(neighbour=pairs["second"] + 1, dihedral=pairs["dihedral"])
 
 
 def _described(panel: pd.Series) -> str:

@@ -33,8 +33,11 @@ class Step:
 
     def plus(self, last: Step, first: Step, factor: float) -> Step:
         """This step and ``factor`` times what ``last`` has more than ``first``: loads add up."""
-        own, end, begin = ((one.pressures, one.forces, one.gravity) for one in (self, last, first))
-        return Step(self.name, *(a + factor * (b - c) for a, b, c in zip(own, end, begin, strict=True)))
+        sums: list[Any] = []
+        for name in ("pressures", "forces", "gravity"):
+            own, end, begin = (getattr(step, name) for step in (self, last, first))
+            sums.append(own + factor * (end - begin))
+        return Step(self.name, *sums)
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,8 @@ class Wind:
         if not isinstance(self.pressures, Mapping) or not self.pressures:
             expected = "pressures by patch name, such as {'roof': 0.5}"
             validate.refuse("Wind.pressures", self.pressures, expected)
-        checked, limits = dict[str, float](), {"least": -LARGEST, "most": LARGEST}
+        checked: dict[str, float] = {}
+        limits: dict[str, Any] = {"least": -LARGEST, "most": LARGEST}
         for zone, value in self.pressures.items():
             checked[zone] = validate.number("Wind.pressures", value, where=str(zone), **limits)
         vars(self).update(pressures=checked, **_checked_zone("Wind", self))

@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.errors import OptionError
 from ..surface.checks import LARGEST, SMALLEST
 
-STIFF = {"least": SMALLEST, "most": LARGEST}  # limits of stiffnesses and sizes
+STIFF: dict[str, Any] = {"least": SMALLEST, "most": LARGEST}  # limits of stiffnesses and sizes
 
 
 @dataclass(frozen=True)

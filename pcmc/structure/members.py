@@ -262,7 +262,9 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
             raise OptionError(text, what="members", where=member.label)
     else:
         parts = re.compile(re.escape(str(member.on)) + r"(-\d+)?( \(\d+\))?")
-        walls = [k for k in np.flatnonzero(surface.walls) if parts.fullmatch(surface.patches[k].name)]
+        walls = [
+            k for k in np.flatnonzero(surface.walls).tolist() if parts.fullmatch(surface.patches[k].name)
+        ]
         if not walls:
             known = [surface.patches[k].name for k in np.flatnonzero(surface.walls)]
             text = unknown("wall or cable", member.on, [*known, *(cable.name for cable in surface.cables)])

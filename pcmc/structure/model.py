@@ -191,10 +191,8 @@ class StructuralModel:
         """Of each cable of the standing surface the area of its section, length², and its material: those of
         a member, or of all cables, by default the patches' along their warp. A cable in a mirror plane is cut
         in half: it has half its tension, and half its section."""
-        named = [(str(one.on), one) for one in self.members] + [
-            (line.name, line.member) for line in self.lines
-        ]
-        own = {name: (one.profile.area, one.material) for name, one in named}
+        named = {str(one.on): one for one in self.members} | {line.name: line.member for line in self.lines}
+        own = {name: (one.profile.area, one.material) for name, one in named.items()}
         others = checked_areas(self.cable_area, self.surface, without=own)
         usual = self.cable_material or replace(self.materials[0], weft=None, shear=None)
         mirrors = [mask for plane, mask in self.standing.on_planes if plane.mirror]
@@ -205,8 +203,7 @@ class StructuralModel:
     @property
     def cable_areas(self) -> dict[str, float]:
         """Those areas by the names of the cables."""
-        sections = zip(self.standing.cables, self.cable_sections, strict=True)
-        return {cable.name: area for cable, (area, _) in sections}
+        return {cable.name: area for cable, area, *_ in self.cable_edges()}
 
     def cable_edges(self) -> Iterator[tuple[Cable, float, Material, Ints, Floats]]:
         """Each cable, the area of its section, its material, and the numbers (k,) and directions (k,3) of its
