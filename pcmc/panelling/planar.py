@@ -38,6 +38,11 @@ def before(start: Ints) -> Ints:
     return places
 
 
+def middles(P: Floats, start: Ints, corner: Ints) -> Floats:
+    """(p,3) the means of the corners of polygons."""
+    return np.add.reduceat(P[corner], start[:-1]) / np.diff(start)[:, None]
+
+
 def polygon_areas(P: Floats, start: Ints, corner: Ints) -> Floats:
     """(p,) areas of polygons of nodes P (n,3), length²; of a warped one, seen along its mean normal.
 
@@ -120,11 +125,10 @@ def planarised(P: Floats, start: Ints, corner: Ints, moves: Bools) -> Floats:
     First as far as the nodes stay near their places. Polygons that are still ``WARPED`` are then left: they
     would draw others far away. The rest is made planar to ``FLAT``.
     """
-    near = _gauss_newton(P, start, corner, moves, HOLD)
-    rest = np.flatnonzero(planarity(near, start, corner) < WARPED)
-    count = np.diff(start)[rest]
-    kept = np.repeat(start[rest] - np.cumsum(count) + count, count) + np.arange(count.sum())
-    return _gauss_newton(near, np.append(0, np.cumsum(count)), corner[kept], moves, 0.0)
+    near, count = _gauss_newton(P, start, corner, moves, HOLD), np.diff(start)
+    rest = planarity(near, start, corner) < WARPED
+    begins = np.append(0, np.cumsum(count[rest]))
+    return _gauss_newton(near, begins, corner[np.repeat(rest, count)], moves, 0.0)
 
 
 def _gauss_newton(P: Floats, start: Ints, corner: Ints, moves: Bools, hold: float) -> Floats:

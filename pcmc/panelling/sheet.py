@@ -25,6 +25,7 @@ from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints, block_rows
 from ..base.errors import OptionError
+from ..forces.motion_space import perpendicular
 from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, unit_vectors, vertex_sums
 from ..surface.topology import POINT, EdgeCurve, Topology, components, one_sided_copies, topology
@@ -77,13 +78,14 @@ class SheetMesh:
 
 def sheets_of(surface: Surface) -> list[tuple[int, Ints, SheetMesh]]:
     """The connected parts of the patches that are no walls: patch, triangles in the surface, sheet."""
-    topo = surface.topology
-    found: list[tuple[int, Ints, SheetMesh]] = []
-    beside = topo.neighbours // 3
-    same = np.ptp(surface.patch_of_face[beside].astype(np.int64), axis=1) == 0
-    part = components(beside[same], surface.m)
-    for number in range(int(part.max(initial=-1)) + 1):
-        faces = np.flatnonzero(part == number)
+    topo, found, beside = (
+        surface.topology,
+        list[tuple[int, Ints, SheetMesh]](),
+        surface.topology.neighbours // 3,
+    )
+    one, other = surface.patch_of_face[beside].T
+    part = components(beside[one == other], surface.m)
+    for faces in (np.flatnonzero(part == number) for number in np.unique(part)):
         patch = int(surface.patch_of_face[faces[0]])
         if surface.roof[patch]:
             vertex, F = np.unique(surface.faces[faces], return_inverse=True)
@@ -130,10 +132,9 @@ def shape_operators(X: Floats, F: Ints) -> Floats:
     Positive where the sheet bends away from its outside. From a cubic over the tangent plane, fitted to the
     vertices of two rings, or of more where they are few; of order 2 in the edge length.
     """
-    n = len(X)
-    pairs = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    rows, columns = np.concatenate([pairs, pairs[:, ::-1]]).T
-    near = csr_array(coo_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))) + eye_array(n)
+    n, m = len(X), len(F)
+    on = csr_array((np.ones(3 * m), F.ravel(), 3 * np.arange(m + 1)), shape=(m, n))
+    near = csr_array(on.T @ on)  # a vertex and its neighbours
     rings = csr_array(near @ near)
     for _ in range(MOST_RINGS - 2):
         few = np.diff(rings.indptr) <= LEAST_POINTS
@@ -141,27 +142,19 @@ def shape_operators(X: Floats, F: Ints) -> Floats:
             pick = csr_array((few.astype(float), (np.arange(n), np.arange(n))), shape=(n, n))
             rings = csr_array(rings + pick @ rings @ near)
     normal = unit_vectors(vertex_sums(area_vectors(X[F]), F, n))
-    tensors = np.empty((n, 3, 3))
+    frame, tensors = np.stack([*perpendicular(normal), normal], axis=1), np.empty((n, 3, 3))
     for count in np.unique(np.diff(rings.indptr)):  # those with as many neighbours at once
         at = np.flatnonzero(np.diff(rings.indptr) == count)
-        around = rings.indices[rings.indptr[at, None] + np.arange(count)]
-        tensors[at] = _fitted(X[around] - X[at, None], normal[at])
+        d = X[rings.indices[rings.indptr[at, None] + np.arange(count)]] - X[at, None]
+        reach = np.linalg.norm(d, axis=2).max(axis=1)
+        x, y, z = np.einsum("kci,kai->akc", d, frame[at]) / reach[:, None]
+        terms = [x, y, 0.5 * x * x, x * y, 0.5 * y * y, x**3, x * x * y, x * y * y, y**3]
+        A = np.stack(terms[: 9 if count > 12 else 5], axis=2)
+        c = np.einsum("ktc,kc->tk", np.linalg.pinv(A, RANK), z)
+        D = np.linalg.pinv(frame[at, :2] + c[:2].T[:, :, None] * normal[at, None])  # of tangents
+        second = (c[[[2, 3], [3, 4]]] / (reach * np.sqrt(1.0 + c[0] ** 2 + c[1] ** 2))).transpose(2, 0, 1)
+        tensors[at] = -D @ second @ D.swapaxes(1, 2)
     return tensors
-
-
-def _fitted(d: Floats, N: Floats) -> Floats:
-    """(k,3,3) shape operators at vertices with normals N (k,3), from the ways d (k,c,3) to neighbours."""
-    k = np.abs(N).argmin(axis=1)
-    e = unit_vectors(np.eye(3)[k] - np.take_along_axis(N, k[:, None], axis=1) * N)
-    frame = np.stack([e, np.cross(N, e), N], axis=1)
-    reach = np.linalg.norm(d, axis=2).max(axis=1)
-    x, y, z = np.einsum("kci,kai->akc", d, frame) / reach[:, None]
-    terms = [x, y, 0.5 * x * x, x * y, 0.5 * y * y, x**3, x * x * y, x * y * y, y**3]
-    A = np.stack(terms[: 9 if d.shape[1] > 12 else 5], axis=2)
-    c = np.einsum("ktc,kc->tk", np.linalg.pinv(A, RANK), z)
-    D = np.linalg.pinv(frame[:, :2] + c[:2].T[:, :, None] * N[:, None])  # of tangents
-    second = (c[[[2, 3], [3, 4]]] / (reach * np.sqrt(1.0 + c[0] ** 2 + c[1] ** 2))).transpose(2, 0, 1)
-    return np.asarray(-D @ second @ D.swapaxes(1, 2))
 
 
 def curvature_coordinates(sheet: SheetMesh, size: float, name: str) -> tuple[Floats, Ints, Bools, Floats]:
@@ -172,8 +165,7 @@ def curvature_coordinates(sheet: SheetMesh, size: float, name: str) -> tuple[Flo
     """
     directions = principal_directions(sheet.X, sheet.F)
     mean = float(np.median(np.abs(np.trace(directions.tensors, axis1=1, axis2=2)))) / 2.0
-    apart = float(np.median(np.abs(directions.w)))
-    if apart < max(ROUND * mean, FLAT / size):
+    if np.median(np.abs(directions.w)) < max(ROUND * mean, FLAT / size):
         what = "is part of a sphere" if mean * size > FLAT else "is flat"
         text = f"patch {name!r} {what}: every point is an umbilic; choose pattern 'quads' and a direction"
         raise OptionError(text, what="pattern", found="planar-quads", expected="quads")
@@ -199,13 +191,13 @@ class _OpenSheet:
         total = 2.0 * np.pi - np.bincount(F.ravel(), np.radians(angles(X[F])).ravel(), len(X))
         total += np.bincount(self.b, turn, len(X)) - np.bincount(self.a, turn, len(X))
         self.index = np.where(sheet.topology.on_boundary, 0.0, np.rint(total / np.pi) / 2.0)
-        cut = self._cuts()
-        self.cut = np.flatnonzero(cut)
-        label = one_sided_copies(f[~cut], g[~cut], ~same[~cut], m)
+        self.cut = self._cuts()
+        whole = np.delete(np.arange(len(f)), self.cut)
+        label = one_sided_copies(f[whole], g[whole], ~same[whole], m)
         sign = np.where(label[:m] < label[m:], 1.0, -1.0)
         self.root = root * sign
         self.flip = np.where(same, 1.0, -1.0) * sign[f] * sign[g]  # of z from f to g
-        shared = self.ends[~cut][:, [0, 2, 1, 3]].reshape(-1, 2)
+        shared = self.ends[whole][:, [0, 2, 1, 3]].reshape(-1, 2)
         self.place = components(shared, 3 * m).astype(np.int64)  # of corners: open vertices
         self.count = int(self.place.max()) + 1
         self.pin = self._rows(np.zeros((1, 1), dtype=np.int64), np.ones(1))  # of the first open vertex
@@ -219,11 +211,10 @@ class _OpenSheet:
         """The matrix with the values (r,k) in columns ``places`` (r,k) of open vertices."""
         return block_rows(np.broadcast_to(values, places.shape)[:, :, None, None], places, self.count)
 
-    def _cuts(self) -> Bools:
-        """Which of the inner edges are cut: paths from umbilics to the boundary, and between its loops."""
-        m, n = len(self.sheet.F), len(self.sheet.X)
-        link = csr_array(coo_array((np.ones(len(self.f)), (self.f, self.g)), shape=(m, m)))
-        centre = self.sheet.X[self.sheet.F].mean(axis=1)
+    def _cuts(self) -> Ints:
+        """The inner edges that are cut: paths from umbilics to the boundary, and between its loops."""
+        m, n, centre = len(self.sheet.F), len(self.sheet.X), self.sheet.X[self.sheet.F].mean(axis=1)
+        link = coo_array((np.ones(len(self.f)), (self.f, self.g)), shape=(m, m)).tocsr()
         start = int(np.linalg.norm(centre - centre.mean(axis=0), axis=1).argmin())
         before = breadth_first_order(link, start, directed=False)[1]
         cut = (before[self.f] != self.g) & (before[self.g] != self.f)
@@ -233,7 +224,7 @@ class _OpenSheet:
             loose = (degree == 1) & ~kept
             ends = cut & (loose[self.a] | loose[self.b])
             if not ends.any():
-                return cut
+                return np.flatnonzero(cut)
             cut &= ~ends
 
     def coordinates(self, size: float) -> tuple[Floats, Ints, Bools, Floats]:
@@ -294,8 +285,7 @@ class _OpenSheet:
         self, part: Any, common: csr_array, held: csr_array | None = None, to: Floats | None = None
     ) -> Floats:
         """(count,) f with the gradient ``part`` (m,) in the mean, common @ f = 0 and held @ f = to."""
-        if held is None or to is None:
-            held, to = self.pin, np.zeros(1)
+        held, to = (self.pin, np.zeros(1)) if held is None or to is None else (held, to)
         weighted = self.gradient.T @ diags_array(np.repeat(self.area, 2))
         target = np.stack([part.real, part.imag], axis=1).ravel()
         C, d = vstack([common, held]), np.append(np.zeros(common.shape[0]), to)
@@ -305,16 +295,14 @@ class _OpenSheet:
     def _corners(self, curve: EdgeCurve) -> Ints:
         """(k,2) the corners of triangles at the end and start of each edge of a boundary curve."""
         topo = self.sheet.topology
-        side = np.empty(len(topo.edges), dtype=np.int64)
-        side[topo.edge_of_face.ravel()] = np.arange(topo.edge_of_face.size)
-        side = side[topo.edge_numbers(curve.pairs)]
+        sides = np.unique(topo.edge_of_face, return_index=True)[1]  # one of each edge
+        side = sides[topo.edge_numbers(curve.pairs)]
         return np.asarray(3 * (side // 3)[:, None] + (side[:, None] + [2, 1]) % 3)
 
     def _along(self, curve: EdgeCurve) -> int:
         """0 if u is constant along a curve, 1 if v is, -1 if it is no line of curvature."""
         corners = self._corners(curve)
-        step = np.diff(self.sheet.X[self.sheet.F.ravel()[corners]], axis=1)[:, 0]
-        face = corners[:, 0] // 3
+        step, face = np.diff(self.sheet.X[self.sheet.F.ravel()[corners]], axis=1)[:, 0], corners[:, 0] // 3
         seen = self.root[face] * np.conj(_complex(self.frame[face], step))
         off = np.abs(np.angle(seen**2)) / 2.0  # from u's gradient; π/2 where u is constant
         middle = [float(np.median(np.pi / 2 - off)), float(np.median(off))]
