@@ -57,8 +57,7 @@ def swap(surface: Surface, patch: str) -> Surface:
     curve = curve[np.sort(np.unique(curve, return_index=True)[1])]
     edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if film.closed else -1]
     edge = EDGE * float(np.sqrt(face_areas(mesh.corners(surface)[mesh.beside(film, edges)]).mean()))
-    way = _opening(surface, film, mesh, edges)
-    patches = list(surface.patches)
+    way, patches = _opening(surface, film, mesh, edges), list(surface.patches)
     if way is None:
         del patches[film.patch]
         mesh = replace(mesh, patch=mesh.patch - (mesh.patch > film.patch))
@@ -176,9 +175,8 @@ def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats |
     span = mesh.X[edges[:, 1]] - mesh.X[edges[:, 0]]
     span -= lattice_steps(lattice, span) @ lattice
     lengths = np.bincount(edges.ravel(), np.repeat(0.5 * np.linalg.norm(span, axis=1), 2), len(at))
-    strength = np.linalg.norm(new, axis=1)
-    most = max(strength[at].sum(), np.linalg.norm(old, axis=1)[at].sum())
-    if most <= surface.tensions[film.patch] * lengths[at].sum():
+    strength, other = np.linalg.norm([new, old], axis=2)
+    if max(strength[at].sum(), other[at].sum()) <= surface.tensions[film.patch] * lengths[at].sum():
         return None
     at &= strength > 0.0
     return np.where(at[:, None], new / np.where(at, strength, 1.0)[:, None], 0.0)
@@ -207,14 +205,10 @@ def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) ->
     vertices, steps, patch = (np.array(part) for part in zip(*new, strict=True))
     shares = 1.0 - 2.0 * np.arange(1, columns + 1) / columns
     parting = np.concatenate([half, (half[split, None] * shares[:, None]).reshape(-1, 3)])
-    opened = _Mesh(
-        np.concatenate([mesh.X, np.repeat(mesh.X[split], columns, axis=0)]) + parting,
-        np.concatenate([mesh.supports, np.repeat(mesh.supports[split], columns, axis=0)]),
-        np.concatenate([V, vertices]),
-        np.concatenate([mesh.steps, steps.reshape(len(new), *mesh.steps.shape[1:])]),
-        np.concatenate([mesh.patch, patch]),
-    )
-    return opened, parting
+    own = np.concatenate([np.arange(count), np.repeat(split, columns)])  # the vertex that each one was
+    corners = np.concatenate([mesh.steps, steps.reshape(len(new), *mesh.steps.shape[1:])])
+    triangles = np.concatenate([V, vertices]), corners, np.concatenate([mesh.patch, patch])
+    return _Mesh(mesh.X[own] + parting, mesh.supports[own], *triangles), parting
 
 
 def _parted(
@@ -225,12 +219,9 @@ def _parted(
     Where a patch lies between both sides, its fan is cut in its middle, and triangles fill the gap.
     """
     rows = np.flatnonzero((mesh.vertices == vertex).any(axis=1))
-    sheet = mesh.patch[rows]
-    near, far = (
-        np.setdiff1d(mesh.vertices[rows[np.isin(sheet, side)]], edges)
-        for side in (film.one_side, film.other_side)
-    )
-    others = rows[~np.isin(sheet, film.sheets)]
+    of_sides = (rows[np.isin(mesh.patch[rows], side)] for side in (film.one_side, film.other_side))
+    near, far = (np.setdiff1d(mesh.vertices[beside], edges) for beside in of_sides)
+    others = rows[~np.isin(mesh.patch[rows], film.sheets)]
     corner = np.argmax(mesh.vertices[others] == vertex, axis=1)
     arcs = np.stack([mesh.vertices[others, (corner + k) % 3] for k in (1, 2)], axis=1)
     stop = np.bincount(arcs.ravel(), minlength=len(mesh.X)) != 2

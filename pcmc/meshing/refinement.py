@@ -67,26 +67,23 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     """
     expect_surface(surface)
     for _ in range(refinable(levels, surface.m)):
-        if surface.periodic:
-            surface = _refined_cell(surface, project)
-            continue
-        a, b, c = surface.faces.T
-        bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
+        cell = surface.cell
+        a, b, c = cell.faces.T
+        bc, ca, ab = cell.n + cell.topology.edge_of_face.T  # an edge's number is opposite its corner
         F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-        every = np.ones(len(surface.topology.edges), dtype=bool)
-        surface = with_vertices_on(surface, every, F, np.repeat(surface.patch_of_face, 4), project)
+        every = np.ones(len(cell.topology.edges), dtype=bool)
+        fine = with_vertices_on(cell, every, F, np.repeat(cell.patch_of_face, 4), project)
+        surface = _refined_cell(surface, fine) if surface.periodic else fine
     return surface
 
 
-def _refined_cell(surface: Surface, project: Projection | None) -> Surface:
+def _refined_cell(surface: Surface, fine: Surface) -> Surface:
     """One refinement of a periodic surface: where edges are images of each other, so are their midpoints."""
-    topo, edges = surface.topology, surface.cell.topology.edges
-    number, k = topo.edge_numbers(surface.original[edges]), np.arange(len(edges))
+    edges = surface.cell.topology.edges
+    number, k = surface.topology.edge_numbers(surface.original[edges]), np.arange(len(edges))
     columns = np.concatenate([surface.support_columns, edge_columns(surface)[number]])
     vertex = np.unique(number, return_index=True)[1][number]
-    midpoints = surface.n + np.stack([k, vertex], axis=1)[vertex != k]
-    fine = refine(surface.cell, 1, project)
-    images = np.concatenate([surface.images, midpoints])
+    images = np.concatenate([surface.images, surface.n + np.stack([k, vertex], axis=1)[vertex != k]])
     return fine.with_mesh(columns, images=images, rooms=surface.rooms)
 
 
@@ -122,8 +119,7 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     topo, (fixed, sliding) = surface.topology, surface.given_supports.fixed_and_sliding()
     start, end = topo.edges.T
     boundary = topo.boundary_edge
-    crossing = topo.on_boundary[start] & topo.on_boundary[end]
-    inner = (topo.junction_edge | topo.seam_edge) & ~crossing
+    inner = (topo.junction_edge | topo.seam_edge) & ~topo.on_boundary[topo.edges].all(axis=1)
     drawn, known = surface.edges_on_curves.drawn, np.zeros(surface.n, dtype=bool)
     known[topo.edges[drawn]] = True
     inside = ~(topo.on_boundary | known)[topo.edges].any(axis=1) & ~boundary & ~inner
@@ -133,12 +129,9 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     both_fixed = drawn | (fixed[start] & fixed[end] & (boundary | inner | inside))
     # lines of held edges inside a patch go on to the boundary by the edge along which they turn least
     inside &= both_fixed
-    X = surface.vertices
-    ends = np.bincount(topo.edges[inside].ravel(), minlength=surface.n) == 1
-    before = np.zeros(surface.n, dtype=np.int64)
-    line = np.concatenate([topo.edges[inside], topo.edges[inside][:, ::-1]])
-    before[line[:, 0]] = line[:, 1]
-    rim = topo.on_boundary & fixed
+    X, line, before = surface.vertices, topo.edges[inside], np.zeros(surface.n, dtype=np.int64)
+    ends = np.bincount(line.ravel(), minlength=surface.n) == 1
+    before[line], rim = line[:, ::-1], topo.on_boundary & fixed
     number = np.flatnonzero((ends[topo.edges] & rim[topo.edges][:, ::-1]).any(axis=1))
     here, there = np.where(ends[topo.edges[number, :1]], topo.edges[number], topo.edges[number][:, ::-1]).T
     along, on = X[here] - X[before[here]], X[there] - X[here]
@@ -174,8 +167,7 @@ def onto_circles_of(surface: Surface, columns: Bools, points: Floats) -> None:
 
 def edges_on_planes(surface: Surface) -> list[Bools]:
     """For each of ``on_planes`` the (e,) edges whose new vertices slide on it."""
-    topo = surface.topology
-    masks = []
+    topo, masks = surface.topology, list[Bools]()
     for plane, mask in surface.on_planes:
         along = mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
         along[topo.edge_of_face[mask[surface.faces].all(axis=1)]] = True
@@ -207,8 +199,7 @@ def with_vertices_on(
     new[drawn] = points[drawn]
     if surface.order == 1:
         _rest_on_bottoms(surface, cut, new)
-    number = surface.n + np.arange(len(new))
-    curves: tuple[HeldCurve, ...] = ()
+    number, curves = surface.n + np.arange(len(new)), tuple[HeldCurve, ...]()
     if surface.held_curves:
         halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
         curves = on.cut(cut, at).joined(np.concatenate([surface.topology.edges[~cut], *halves]))
@@ -228,28 +219,21 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
     below the middle of the top edge: rows that coincide where the junction rests part again beside it.
     """
-    start, end = edges.T
-    X, topo = surface.vertices, surface.topology
+    (start, end), X, topo = edges.T, surface.vertices, surface.topology
     if surface.order > 1:
         on_edges = np.empty((len(topo.edges), 3))
         on_edges[topo.edge_of_face] = middles_of_sides(X, surface.nodes, surface.order)
         return np.asarray(on_edges[topo.edge_numbers(edges)])
-    middle = 0.5 * (X[start] + X[end])
-    part = standing_part(surface)
+    middle, part = 0.5 * (X[start] + X[end]), standing_part(surface)
     walls, rows, resting = part.walls, part.walls.rows, part.resting
     if not resting.any():
         return middle
-    top, direction, drop = X.copy(), np.zeros_like(X), np.zeros_like(X)
-    top[rows.vertices] = rows.top_places(X)
-    direction[rows.vertices] = rows.directions(surface)
-    of_held = walls.foot >= 0
-    of_held[rows.vertices] = rows.feet[:, 0] >= 0
+    own, of_held, of_wall = rows.vertices, walls.foot >= 0, resting | walls.top_free
+    top, direction, drop, down = X.copy(), np.zeros_like(X), np.zeros_like(X), resting.copy()
     drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
-    drop[rows.vertices] = rows.drops(X)
-    down = resting.copy()
-    down[rows.vertices] = under_low(rows, resting | walls.corner)
-    of_wall = resting | walls.top_free
-    of_wall[rows.vertices] = True
+    top[own], direction[own], drop[own] = rows.top_places(X), rows.directions(surface), rows.drops(X)
+    of_held[own], of_wall[own] = rows.feet[:, 0] >= 0, True
+    down[own] = under_low(rows, resting | walls.corner)
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
     rising &= ~(surface.fixed[start] & surface.fixed[end])
     start, end = edges[rising].T
@@ -277,10 +261,9 @@ def _rest_on_bottoms(surface: Surface, cut: Bools, new: Floats) -> None:
     down[rows.vertices] = under_low(rows, down) & (rows.feet[:, 0] >= 0)
     foot[rows.vertices] = np.where(rows.fraction == 0.0, *rows.feet.T)
     foot[bottoms], down[bottoms] = bottoms, True
-    moved = new - 0.5 * surface.vertices[topo.edges[cut]].sum(axis=1)
-    number = np.full(len(cut) + 1, -1)
+    ends, number = topo.edges[cut], np.full(len(cut) + 1, -1)
     number[np.flatnonzero(cut)] = np.arange(len(new))
-    ends = topo.edges[cut]
+    moved = new - surface.vertices[ends].mean(axis=1)
     follows = (foot[ends] >= 0).all(axis=1) & down[ends].any(axis=1) & ~surface.fixed[ends].all(axis=1)
     below = np.where(follows, number[topo.edge_numbers(foot[ends])], -1)
     new[below >= 0] += moved[below[below >= 0]]
