@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..base.tolerances import AT_REST
 from ..certificate import certify
@@ -42,25 +43,17 @@ def measured_margin(surface: Surface, of: str | None) -> Measurement:
     varied = Varied.of(surface, what)
     if varied.unit:
         raise OptionError(f"margin of {what}: it is 0 now, so it has no factor", what="of", found=what)
-    found = _known(surface, what)
-    still = np.zeros_like(surface.vertices)
-    if found is None:
-        return Measurement(math.nan, still)
-    if not len(found.mode):
-        return Measurement(found.factor, still)
+    found, still = _known(surface, what), np.zeros_like(surface.vertices)
+    if found is None or not len(found.mode):
+        return Measurement(math.nan if found is None else found.factor, still)
     if found.ends_by is not MarginEnd.FOLD:
         text = f"margin of {what}: it ends by a {found.ends_by.name.lower()}, whose slopes are not known;"
         raise OptionError(f"{text} as a target it has to end by a fold", what="of", found=what)
-    end, phi = found.surface, found.mode
-    line = varied.direction.line(end)
-    along = float((phi * line.gradient(end, end.vertices)).sum())
+    end, phi, slopes = found.surface, found.mode, dict[str, Floats]()
+    along = float((phi * varied.direction.line(end).gradient(end, end.vertices)).sum())
     walls = {(k, p.name) for k, _ in varied.parts if varied.what == k for p in end.patches if p.wall}
-    patches = [patch.name for patch in end.patches]
-    named = dict.fromkeys(("tension", "pressure", "weight", "snow"), patches)
-    slopes = {}
-    cables = [cable.name for cable in end.cables]
-    named |= {"cable": cables, "cable_weight": cables}
-    for kind, names in named.items():
+    for kind in ("tension", "pressure", "weight", "snow", "cable", "cable_weight"):
+        names = [part.name for part in (end.cables if "cable" in kind else end.patches)]
         across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
         multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
         slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along

@@ -94,6 +94,7 @@ def find_end(
         step = SHORTER * min(end - begin, step)
         branch = _follow(branch.surfaces[len(branch.points) - 2], varied, index, most, callback, step)
     squeezed, there, detail = _compression(branch), branch.last, ""
+    kind, factor = MarginEnd.NONE, float(branch.points.parameter.iloc[-1])
     if squeezed is not None and (ended.empty or sense * (squeezed - ended.parameter.iloc[0]) <= 0.0):
         kind, factor = MarginEnd.COMPRESSION, squeezed
     elif len(ended):
@@ -104,10 +105,8 @@ def find_end(
         kind = MarginEnd.CONTACT if touched else MarginEnd.BIFURCATION
         if event.kind == "fold" or event.along_branch >= ALONG:
             kind = MarginEnd.FOLD
-    elif branch.ending is Ending.REACHED:
-        kind, factor = MarginEnd.NONE, float(branch.points.parameter.iloc[-1])
-    else:
-        factor, detail = float(branch.points.parameter.iloc[-1]), branch.detail
+    elif branch.ending is not Ending.REACHED:
+        detail = branch.detail
         # a solve a little beyond its last point tells what a branch that was lost ends by
         beyond = varied.direction.line(there).surface_at(there, factor + sense * BEYOND * max(factor, 1.0))
         down = solve_once(beyond).certificate.verdict is Verdict.WALL_DOWN
@@ -144,18 +143,13 @@ def _follow(
 
 
 def _compression(branch: Branch) -> float | None:
-    """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points.
-
-    None if none does.
-    """
-    if len(branch.points) < 2:
-        return None
+    """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points;
+    None if none does."""
     parameters, surfaces = branch.points.parameter.tolist()[-2:], [*branch.surfaces.values()][-2:]
-    ends = []
-    for pulls in HEAVY:
+    ends = list[float]()
+    for pulls in HEAVY if len(branch.points) > 1 else ():
         before, after = (pulls(surface).min(initial=np.inf) for surface in surfaces)
-        if after <= 0.0:
-            ends.append(float(np.interp(0.0, [after, before], parameters[::-1])))
+        ends += [float(np.interp(0.0, [after, before], parameters[::-1]))] if after <= 0.0 else []
     return min(ends, key=lambda end: abs(end - parameters[0]), default=None)
 
 
@@ -295,7 +289,9 @@ def margin(
             doubt = "" if check.persists else f"the mesh check finds that the roof {check.verdict.value}"
         except PcmcError as error:
             ends, doubt = ends[:1], str(error)
-        notes.append(f"no bar: {doubt}" if doubt else _shown(ends[1:], unit))
+        words = [(one, one.ends_by.value.partition(":")[0]) for one in ends[1:]]
+        shown = [f"on {one.surface.m} triangles {unit * one.factor:.4g} ({why})" for one, why in words]
+        notes.append(f"no bar: {doubt}" if doubt else ", ".join(shown))
     numbers = np.array([[unit * one.factor] for one in ends])
     alike = {one.ends_by in OPEN for one in ends} == {False}
     bars = extrapolate(numbers if alike else numbers[:1], np.array([EVENT_ACCURACY * abs(numbers[0, 0])]))
@@ -307,30 +303,11 @@ def margin(
     if certificate.symmetric_in:
         notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
     kinds = {dimension_of(kind) for kind, _ in varied.parts}
-    return Margin(
-        what=varied.what,
-        more=varied.more,
-        factor=math.nan if varied.unit else end.factor,
-        values=varied.at(end.factor),
-        bar=float(bars.error[0]),
-        limit=float(bars.limit[0]),
-        limit_bar=float(bars.limit_error[0]),
-        ends_by=end.ends_by,
-        detail="; ".join(filter(None, (end.detail, *notes))),
-        surface=end.surface,
-        mode=mode,
-        where=_where(end, mode),
-        index=index,
-        dimension=kinds.pop() if len(kinds) == 1 else "",
-    )
-
-
-def _shown(ends: list[End], unit: float) -> str:
-    """The ends on finer meshes in words."""
-    return ", ".join(
-        f"on {end.surface.m} triangles {unit * end.factor:.4g} ({end.ends_by.value.partition(':')[0]})"
-        for end in ends
-    )
+    factor, dimension = math.nan if varied.unit else end.factor, kinds.pop() if len(kinds) == 1 else ""
+    bar, limit, limit_bar = (float(value[0]) for value in (bars.error, bars.limit, bars.limit_error))
+    about = varied.what, varied.more, factor, varied.at(end.factor), bar, limit, limit_bar, end.ends_by
+    detail = "; ".join(filter(None, (end.detail, *notes)))
+    return Margin(*about, detail, end.surface, mode, _where(end, mode), index, dimension)
 
 
 def _mode(end: End, index: int) -> Floats:
@@ -354,7 +331,7 @@ def _where(end: End, mode: Floats) -> str:
         vectors, areas = vertex_area_vectors(surface.vertices, surface.faces[surface.patch_of_face == k])
         through[k], size[k] = (mode * vectors).sum(), motion @ areas
     near = np.unique(surface.patch_of_face[(surface.faces == most).any(axis=1)])
-    largest = int(roof[size[roof].argmax()]) if len(roof) else int(near[0])
+    largest = int(size.argmax()) if size.any() else int([*roof, near[0]][0])
     turns = end.ends_by is MarginEnd.BIFURCATION  # to either side
     if abs(through[largest]) >= INFLATES * size[largest] > 0.0 and not (turns and len(near) > 1):
         part = "the roof" if len(roof) == 1 else repr(surface.patches[largest].name)
