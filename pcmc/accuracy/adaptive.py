@@ -221,11 +221,9 @@ def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
 
 
 def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, float]:
-    """The accuracy of each row of a mesh check's table that is asked for.
-
-    A quantity alone stands for that of the whole surface, and where there is none, as for heights, for
-    those of all patches. With a patch it stands for all curves of that patch, too.
-    """
+    """The accuracy of each row of a mesh check's table that is asked for. A quantity alone stands for that of
+    the whole surface, and where there is none, as for heights, for those of all patches. With a patch it
+    stands for all curves of that patch, too."""
     goals: dict[Goal, float] = {}
     for name, accuracy in wanted.items():
         quantity, _, patch = name.partition(" of ")
@@ -338,10 +336,8 @@ class _Search:
 
     def _next(self, here: _Round) -> Result:
         """The surface on a mesh with equal shares of the error; if it does not come to rest there, on the
-        check's finer mesh.
-
-        With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
-        """
+        check's finer mesh. With equal shares N triangles have the error (Σ √η)² / N, the m triangles here
+        have Σ η."""
         surface, finer = here.result.surface, here.check.surfaces[1:2]
         if finer:
             shares = error_shares(surface, finer[0], here.goals)

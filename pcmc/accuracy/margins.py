@@ -76,10 +76,8 @@ def find_end(
     surface: Surface, varied: Varied, index: int, most: float, callback: Callback | None = None
 ) -> End:
     """Follow the equilibria of a surface of this index until it rises, λ turns, or a part is compressed.
-
     Where the contact with Π changes on the last step, too, that is repeated in smaller ones, which tell the
-    two apart. Raises KeyboardInterrupt where ``callback`` raises StopIteration, or for Ctrl-C.
-    """
+    two apart. Raises KeyboardInterrupt where ``callback`` raises StopIteration, or for Ctrl-C."""
     sense, contacts = (1.0 if varied.more else -1.0), list[float]()
     branch, step = _follow(surface, varied, index, most, callback, LARGEST), LARGEST
     while True:

@@ -125,7 +125,6 @@ class CutMesh:
 
     def with_seam(self, start: int, end: int, number: int, name: str, faces: Bools) -> CutMesh:
         """The mesh cut along a geodesic between two vertices of one piece; OptionError if there is none.
-
         Where several pieces have both vertices it is one of those with ``faces`` (m,), if there is any."""
         if start == end:
             return self
@@ -156,10 +155,8 @@ class CutMesh:
         return self._along(place, share, path, number, name)
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
-        """The mesh with the points of a path as vertices, and the edges between them cut.
-
-        An inner vertex that the path passes closely is moved onto it, which spares triangles without width.
-        """
+        """The mesh with the points of a path as vertices, and the edges between them cut. An inner vertex
+        that the path passes closely is moved onto it, which spares triangles without width."""
         X, fixed = self.X.copy(), self.topology.edges[self.cut_edge]
         nearest = np.where(share > 0.5, place[:, 1], place[:, 0])
         gap = np.minimum(share, 1.0 - share)
@@ -262,10 +259,8 @@ class ClothSheet:
 
 def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, Floats]:
     """Unit vectors (3,) along and across the strips of triangles P (m,3,3), square to their mean normal.
-
     Along is the direction with this angle from x in the plan; by default the one across which the sheet is
-    narrowest.
-    """
+    narrowest."""
     normal, (east, north, _) = area_vectors(P).sum(axis=0), plane.axes
     normal = normal / (np.linalg.norm(normal) or 1.0)
     if degrees is None:
@@ -327,11 +322,9 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
 
 
 def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
-    """The mesh cut along lines, each of points (k,2) in the plan or (k,3), joined by geodesics.
-
-    An end within an edge's length of a cut or a rim is put there. Of two sheets, one over the other, points
-    of the plan are on the upper one. OptionError for a point off the roof.
-    """
+    """The mesh cut along lines, each of points (k,2) in the plan or (k,3), joined by geodesics. An end within
+    an edge's length of a cut or a rim is put there. Of two sheets, one over the other, points of the plan are
+    on the upper one. OptionError for a point off the roof."""
     first = int(mesh.seam.max(initial=-1)) + 1
     for number, line in enumerate(lines):
         name, previous = f"seam {number + 1}", -1

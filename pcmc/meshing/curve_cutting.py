@@ -80,11 +80,9 @@ def _curve_edges(surface: Surface) -> tuple[Bools, Ints]:
 
 
 def refined_round(surface: Surface) -> Surface:
-    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
-
-    With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
-    (a + b)/2 + (t_a - t_b)/8.
-    """
+    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals. With t the
+    components of the edge b - a across the normals at its ends, the middle of the cubic is (a + b)/2 + (t_a -
+    t_b)/8."""
     topo, n = surface.topology, surface.n
     chosen = np.flatnonzero(~_curve_edges(surface)[0])
     # the normals of each sheet at its vertices
@@ -136,12 +134,9 @@ def _cut_once(
 def cut_triangles(
     F: Ints, patch: Ints, ends: Ints, number: Ints, first: Ints | None = None
 ) -> tuple[Ints, Ints]:
-    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
-
-    The edges ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides
-    a line leads to the middle of one of them from the corner opposite: of the side opposite corner
-    ``first`` (m,), where that is given.
-    """
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four. The edges
+    ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides a line leads to the middle of one of
+    them from the corner opposite: of the side opposite corner ``first`` (m,), where that is given."""
     place = edge_places(F[:, SIDES], ends)
     middle = np.where(place >= 0, number[place], -1)
     count = (middle >= 0).sum(axis=1)

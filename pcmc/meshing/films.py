@@ -55,9 +55,7 @@ class Film:
 
 def film_of(surface: Surface, patch: int) -> Film | None:
     """The strip that a patch is; None for one of another shape, or without four different patches beside it.
-
-    A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones.
-    """
+    A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones."""
     topo, original = surface.topology, surface.original
     curves = [curve for curve in topo.junctions if patch in curve.sheets]
     lengths = [

@@ -184,9 +184,7 @@ def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats |
 
 def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) -> tuple[_Mesh, Floats]:
     """The mesh with a new film, of so many columns of triangles; how far its vertices are from its middle.
-
-    ``half`` (n,3) leads from the curve to the film's junction with A and C, and back to that with B and D.
-    """
+    ``half`` (n,3) leads from the curve to the film's junction with A and C, and back to that with B and D."""
     split, count = np.flatnonzero(half.any(axis=1)), len(mesh.X)
     across = np.repeat(np.arange(count)[:, None], columns + 1, axis=1)  # from A and C to B and D
     across[split, 1:] = count + np.arange(len(split) * columns).reshape(-1, columns)
@@ -214,10 +212,8 @@ def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) ->
 def _parted(
     film: Film, mesh: _Mesh, vertex: int, across: Sequence[int], edges: Ints, V: Ints
 ) -> list[Triangle]:
-    """Gives the last vertex ``across`` to the other patches on the side of B and D, in V (m,3).
-
-    Where a patch lies between both sides, its fan is cut in its middle, and triangles fill the gap.
-    """
+    """Gives the last vertex ``across`` to the other patches on the side of B and D, in V (m,3). Where a patch
+    lies between both sides, its fan is cut in its middle, and triangles fill the gap."""
     rows = np.flatnonzero((mesh.vertices == vertex).any(axis=1))
     of_sides = (rows[np.isin(mesh.patch[rows], side)] for side in (film.one_side, film.other_side))
     near, far = (np.setdiff1d(mesh.vertices[beside], edges) for beside in of_sides)
@@ -284,9 +280,8 @@ def _rebuilt(
 
 def _widened(surface: Surface, parting: Floats) -> tuple[Surface, float]:
     """The surface with its new film as wide as lowers the energy most, all others following; how many times.
-
-    ``parting`` (n,3): the way of the film's vertices from its middle. Others go the mean way of those around.
-    """
+    ``parting`` (n,3): the way of the film's vertices from its middle. Others go the mean way of those
+    around."""
     known = parting.any(axis=1) | surface.fixed | (surface.original != np.arange(surface.n))
     way = in_the_middle(surface.original[surface.faces], known, parting)
     way = surface.spread(apply_supports(surface, way))

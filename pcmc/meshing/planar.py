@@ -138,10 +138,8 @@ def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats
 
 def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k: int) -> PlanarMesh:
     """The Delaunay triangulation with every segment an edge, inside the outline and outside the holes; points
-    used elsewhere only go.
-
-    Segments separate the parts of it; a part with a side that no other triangle has is outside.
-    """
+    used elsewhere only go. Segments separate the parts of it; a part with a side that no other triangle has
+    is outside."""
     try:
         T: Ints = Delaunay(points).simplices.astype(np.int64)
     except QhullError:
@@ -205,10 +203,8 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
 
 
 def _delaunay_below(X: Floats, a: int, b: int, rim: list[int]) -> list[tuple[int, int, int]]:
-    """Delaunay triangles between edge (a, b) and the vertices of the rim to its left, a to b.
-
-    The apex over (a, b) is the vertex that sees it under the largest angle: its circle is empty.
-    """
+    """Delaunay triangles between edge (a, b) and the vertices of the rim to its left, a to b. The apex over
+    (a, b) is the vertex that sees it under the largest angle: its circle is empty."""
     if not rim:
         return []
     u, v = X[a] - X[rim], X[b] - X[rim]
@@ -244,10 +240,8 @@ def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats,
 
 
 def _spaced_out(points: Floats, need: Floats, given: int = 0) -> Bools:
-    """(p,) a choice of points, earlier ones first: pairs are not nearer than both points need.
-
-    The first ``given`` points are always chosen.
-    """
+    """(p,) a choice of points, earlier ones first: pairs are not nearer than both points need. The first
+    ``given`` points are always chosen."""
     chosen = np.ones(len(points), dtype=bool)
     if len(points) > 1:
         pairs = cKDTree(points).query_pairs(float(need.max()), output_type="ndarray")

@@ -147,10 +147,8 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 
 
 def edge_columns(surface: Surface) -> Bools:
-    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``.
-
-    A new vertex slides along a line or circle if both ends of its edge lie on it, and one of them slides.
-    """
+    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``. A new vertex slides
+    along a line or circle if both ends of its edge lie on it, and one of them slides."""
     columns, edges = [*held_midpoints(surface), *edges_on_planes(surface)], surface.topology.edges
     for guide, along in surface.given_supports.on_line:
         on = surface.fixed & (guide.distance(surface.vertices) <= ON * surface.size)
@@ -214,11 +212,9 @@ def with_vertices_on(
 
 
 def midpoints(surface: Surface, edges: Ints) -> Floats:
-    """(k,3) the middles of edges (k,2), for a finer mesh.
-
-    A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
-    below the middle of the top edge: rows that coincide where the junction rests part again beside it.
-    """
+    """(k,3) the middles of edges (k,2), for a finer mesh. A wall's edge may lead from a resting junction to a
+    standing vertex. Its middle is placed in its row below the middle of the top edge: rows that coincide
+    where the junction rests part again beside it."""
     (start, end), X, topo = edges.T, surface.vertices, surface.topology
     if surface.order > 1:
         on_edges = np.empty((len(topo.edges), 3))
@@ -248,10 +244,8 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
 
 
 def _rest_on_bottoms(surface: Surface, cut: Bools, new: Floats) -> None:
-    """Move new points (k,3) of a wall as those of its held bottom were moved, where it rests, in place.
-
-    A curved bottom has new points beside the middles of its edges; what does not lie on it does not rest.
-    """
+    """Move new points (k,3) of a wall as those of its held bottom were moved, where it rests, in place. A
+    curved bottom has new points beside the middles of its edges; what does not lie on it does not rest."""
     part, topo = standing_part(surface), surface.topology
     rows, foot = part.walls.rows, part.walls.foot.copy()
     down = (part.resting | part.walls.corner) & (foot >= 0)

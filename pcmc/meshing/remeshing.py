@@ -146,10 +146,8 @@ def _refuse_too_many(surface: Surface, size: Floats, name: str) -> None:
 
 
 def _refuse_flat_chord(surface: Surface, chord: float, size: float) -> None:
-    """Refuse a chord that the shortest edges exceed by far: MMG would take long, and give up.
-
-    An equilateral triangle of edge e is up to H e² / 6 away from a sphere of mean curvature H.
-    """
+    """Refuse a chord that the shortest edges exceed by far: MMG would take long, and give up. An equilateral
+    triangle of edge e is up to H e² / 6 away from a sphere of mean curvature H."""
     curvature = np.abs(mean_curvature(surface, "cotangent"))
     known = curvature[np.isfinite(curvature)]
     reached = (float(known.mean()) if len(known) else 0.0) * (SHORTEST * size) ** 2 / 6.0
@@ -224,10 +222,8 @@ def _corners_to_keep(mesh: CurveMesh, size: Floats) -> Ints:
 
 
 def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]) -> Surface:
-    """A Surface of the best triangles for each patch: they fit, because the curves are the same.
-
-    Vertices of ``old`` keep its positions: MMG scales the mesh, which changes the last digits.
-    """
+    """A Surface of the best triangles for each patch: they fit, because the curves are the same. Vertices of
+    ``old`` keep its positions: MMG scales the mesh, which changes the last digits."""
     meshes = [old, *candidates]
     angle = np.full((len(meshes), len(surface.patches)), 180.0)  # the smallest in each patch
     for row, mesh in zip(angle, meshes, strict=True):

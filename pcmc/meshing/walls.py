@@ -224,11 +224,8 @@ class _Builder:
 def _labels(
     surface: Surface, borders: Sequence[EdgeCurve], tension: Mapping[tuple[str, str], float]
 ) -> tuple[list[int], list[Patch]]:
-    """A label for each border, and the labels' patches: one for each pair of patches.
-
-    Where a pair's borders cross, as of four quarters, each is a patch of its own: a patch must not have four
-    faces at an edge.
-    """
+    """A label for each border, and the labels' patches: one for each pair of patches. Where a pair's borders
+    cross, as of four quarters, each is a patch of its own: a patch must not have four faces at an edge."""
     kinds = []
     for place, border in enumerate(borders):
         ends = [c.vertices[[0, -1]] for c in borders if c.sheets == border.sheets and not c.closed]

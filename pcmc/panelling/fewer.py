@@ -199,10 +199,8 @@ class _Search:
         return surface if self.leaves(surface.vertices) <= self.change else None
 
     def _step(self, X: Floats, targets: Floats, inside: float) -> Floats | None:
-        """A damped Gauss-Newton step on the edges farther than ``inside`` from their targets, or None.
-
-        It is shortened until no triangle turns over or is much worse, and no corner leaves the shape.
-        """
+        """A damped Gauss-Newton step on the edges farther than ``inside`` from their targets, or None. It is
+        shortened until no triangle turns over or is much worse, and no corner leaves the shape."""
         edges = edge_vectors(X[self.faces])
         lengths = np.linalg.norm(edges, axis=2)
         off = lengths - targets

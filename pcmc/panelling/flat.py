@@ -95,10 +95,8 @@ def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple
 
 
 def _beside(row: list[tuple[float, Floats]], panel: Floats) -> Floats:
-    """The panel (k,2) to the right of those of a row, one side up or the other, as far left as possible.
-
-    Its highest point has y = 0, at the left end of a row its leftmost one x = 0.
-    """
+    """The panel (k,2) to the right of those of a row, one side up or the other, as far left as possible. Its
+    highest point has y = 0, at the left end of a row its leftmost one x = 0."""
     placements = []
     for turned in (panel, -panel):
         at = turned - np.array([turned[:, 0].min(), turned[:, 1].max()])

@@ -160,11 +160,9 @@ def tidied(net: Net, size: float) -> Net:
 
 
 def without_flat(net: Net, size: float) -> Net:
-    """Without triangles that planarity has laid flat on a straight rim; their nodes come to lie on it.
-
-    The panels on both sides of such a triangle reach the rim: their planes meet only there, and so their
-    common node comes to lie on it.
-    """
+    """Without triangles that planarity has laid flat on a straight rim; their nodes come to lie on it. The
+    panels on both sides of such a triangle reach the rim: their planes meet only there, and so their common
+    node comes to lie on it."""
     P, start, corner, sides = net.points, net.start, net.corner, net.sides
     _, row, uses = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     back, rim, count = before(start), uses[row.ravel()] == 1, np.diff(start)
@@ -184,10 +182,8 @@ def without_flat(net: Net, size: float) -> Net:
 
 
 def _pieces(at: Floats, hexagons: bool) -> tuple[Ints, Ints, Floats]:
-    """The pieces of triangles with coordinates ``at`` (m,3,2) between lines, counter-clockwise.
-
-    (k,) the triangle of each corner of a piece; (k,) its piece, ascending; (k,3) its place in the triangle.
-    """
+    """The pieces of triangles with coordinates ``at`` (m,3,2) between lines, counter-clockwise. (k,) the
+    triangle of each corner of a piece; (k,) its piece, ascending; (k,3) its place in the triangle."""
     shapely = load_library("shapely", "plan")
     shape = HEXAGON if hexagons else SQUARE
     low = np.floor(at.min(axis=1)) - hexagons
@@ -227,10 +223,8 @@ def _outlines(row: Ints, piece: Ints, sheet: Ints, vertex: Ints) -> tuple[Ints, 
 
 
 def _split(edge: Ints, ends: Ints, place: Floats) -> tuple[Ints, Ints, Ints, Floats]:
-    """Sides of panels from vertex to vertex of all that have ``ends`` (s,2) on their edge, at ``place``.
-
-    (k,) the side that each is a part of, its two vertices, and where on the side it starts, 0 to 1.
-    """
+    """Sides of panels from vertex to vertex of all that have ``ends`` (s,2) on their edge, at ``place``. (k,)
+    the side that each is a part of, its two vertices, and where on the side it starts, 0 to 1."""
     spots = np.stack([np.repeat(edge, 2), ends.ravel()], axis=1)
     spots, index, number = np.unique(spots, axis=0, return_index=True, return_inverse=True)
     place = place.ravel()[index]

@@ -96,10 +96,8 @@ def sheets_of(surface: Surface) -> list[tuple[int, Ints, SheetMesh]]:
 
 
 class Directions(NamedTuple):
-    """The principal directions of each triangle, as complex numbers in its frame.
-
-    ``w`` = (κ₁ - κ₂)/2 e^{2iφ}, with φ the angle of the direction of κ₁ from the first vector of the frame.
-    """
+    """The principal directions of each triangle, as complex numbers in its frame. ``w`` = (κ₁ - κ₂)/2
+    e^{2iφ}, with φ the angle of the direction of κ₁ from the first vector of the frame."""
 
     frame: Floats  # (m,2,3) orthonormal vectors in each triangle's plane, counter-clockwise from outside
     w: Floats  # (m,) complex, 1/length
@@ -127,11 +125,9 @@ def principal_directions(X: Floats, F: Ints) -> Directions:
 
 
 def shape_operators(X: Floats, F: Ints) -> Floats:
-    """(n,3,3) symmetric: the curvature II(a, b) = aᵀTb of tangent vectors at each vertex, 1/length.
-
-    Positive where the sheet bends away from its outside. From a cubic over the tangent plane, fitted to the
-    vertices of two rings, or of more where they are few; of order 2 in the edge length.
-    """
+    """(n,3,3) symmetric: the curvature II(a, b) = aᵀTb of tangent vectors at each vertex, 1/length. Positive
+    where the sheet bends away from its outside. From a cubic over the tangent plane, fitted to the vertices
+    of two rings, or of more where they are few; of order 2 in the edge length."""
     n, m = len(X), len(F)
     on = csr_array((np.ones(3 * m), F.ravel(), 3 * np.arange(m + 1)), shape=(m, n))
     near = csr_array(on.T @ on)  # a vertex and its neighbours
@@ -158,11 +154,9 @@ def shape_operators(X: Floats, F: Ints) -> Floats:
 
 
 def curvature_coordinates(sheet: SheetMesh, size: float, name: str) -> tuple[Floats, Ints, Bools, Floats]:
-    """The coordinates of a sheet; panels have about the ``size``, length.
-
-    (m,3,2) u, v at the corners of triangles: whole numbers on lines of the net; the vertices that are
-    umbilics; (n,) those on curves that are lines; (m,) degrees of the lines from the principal directions.
-    """
+    """The coordinates of a sheet; panels have about the ``size``, length. (m,3,2) u, v at the corners of
+    triangles: whole numbers on lines of the net; the vertices that are umbilics; (n,) those on curves that
+    are lines; (m,) degrees of the lines from the principal directions."""
     directions = principal_directions(sheet.X, sheet.F)
     mean = float(np.median(np.abs(np.trace(directions.tensors, axis1=1, axis2=2)))) / 2.0
     if np.median(np.abs(directions.w)) < max(ROUND * mean, FLAT / size):
@@ -337,11 +331,9 @@ def _complex(frame: Floats, vectors: Floats) -> Any:
 
 
 def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
-    """(m,3) the values (k,) at corners ``place`` (m,3), none nearer to a whole number than ``NUDGE``.
-
-    A boundary that lies on a line is moved inwards, so that the line is the boundary of the panels beside it.
-    Values marked ``up`` (k,) are moved upwards.
-    """
+    """(m,3) the values (k,) at corners ``place`` (m,3), none nearer to a whole number than ``NUDGE``. A
+    boundary that lies on a line is moved inwards, so that the line is the boundary of the panels beside it.
+    Values marked ``up`` (k,) are moved upwards."""
     line = np.rint(values)
     away = values[place].mean(axis=1)[:, None] - line[place]
     inward = np.bincount(place.ravel(), away.ravel(), len(values))

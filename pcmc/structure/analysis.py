@@ -55,8 +55,8 @@ class Case:
     ----------
     name : of the step.
     results : at the share of the load that was reached.
-    share : of the loads besides the form-finding load and self-weight: 1 if all of it is carried. Where
-        self-weight itself is not carried it is 0, and the results are those of the share of self-weight.
+    share : of the loads besides the form-finding load and self-weight; 1 if all is carried, 0 where
+        self-weight is not: then the results are those of the share of self-weight.
     pressure, volume : of the enclosed gas, NaN without one.
     """
 
@@ -88,7 +88,6 @@ class Analysis:
 
     Attributes
     ----------
-    model : the model.
     cases : the form-finding load first, then the loads and combinations.
     remedy : a factor on all tensions and pressures, tried: with it the same shape carries all cases; 0 where
         none of those tried is enough, None where none was tried.
@@ -231,7 +230,6 @@ class Analysis:
         return lines
 
     def __str__(self) -> str:
-        """The units, the main columns of the table, and the answers."""
         return f"{self.model.units.sentence}\n{self.text()}" if self.model.units else self.text()
 
     def text(self) -> str:
@@ -264,12 +262,11 @@ def analyse(
     """Run CalculiX on a structural model: each case and combination on its own, as far as it is carried.
 
     A case starts from the form-finding load and self-weight. Its loads grow until all of them act, or no
-    equilibrium is found: membranes whose prestress is used up carry nothing across. Then the case ends with
-    the share of its loads that was reached. With an enclosed gas its pressure is found, too.
+    equilibrium is found: membranes whose prestress is used up carry nothing across. With an enclosed gas its
+    pressure is found, too.
 
     Parameters
     ----------
-    model : the model, with its loads and combinations.
     timeout : seconds for each run of the program; by default none.
     remedy : where a case is not carried, try the same shape with larger tensions and pressures.
     progress : called with a few words before each case.

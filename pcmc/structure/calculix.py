@@ -57,10 +57,8 @@ def run_as_far(
     model: StructuralModel, steps: Sequence[Step], timeout: float | None = None
 ) -> tuple[StepResults, ...]:
     """The results of these steps of a model, as far as the program finds equilibria; see ``read_steps``.
-
     CalculixError where it finds none even for the first of them, the form-finding load; OptionError where a
-    material's law does not hold.
-    """
+    material's law does not hold."""
     # where beams meet the program compares 1e-5 to terms of 1/length: in mm it misses what it finds in m
     unit = 10.0 ** max(round(math.log10(model.surface.size / USUAL_SIZE)), 0)
     with folder_for_input() as path:
@@ -95,11 +93,9 @@ def folder_for_input() -> Iterator[Path]:
 
 
 def run_file(path: Path, timeout: float | None = None) -> str:
-    """What the program prints for an input file; its results go beside the file.
-
-    One thread: with several, sums of forces differ in their last digits from run to run. ``timeout`` is in
-    seconds. CalculixError, in one line with what the program says, where it stops.
-    """
+    """What the program prints for an input file; its results go beside the file. One thread: with several,
+    sums of forces differ in their last digits from run to run. ``timeout`` is in seconds. CalculixError, in
+    one line with what the program says, where it stops."""
     one = dict.fromkeys(("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "NUMBER_OF_CPUS"), "1")
     how: Any = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
     how |= {"timeout": timeout, "cwd": path.parent, "env": {**os.environ, **one}, "check": False}

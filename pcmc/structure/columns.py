@@ -46,14 +46,12 @@ def columns_at_rest(model: StructuralModel) -> pd.DataFrame:
 
 
 def column_table(model: StructuralModel, cases: Iterable[tuple[str, Floats]]) -> pd.DataFrame:
-    """A row per case and bar, from the reactions (n,3) in each case.
-
-    Columns: ``case``, ``member``, ``kind``, column or stay; ``x``, ``y``, ``z`` of the point that it holds;
-    ``length``; ``N``, tension above 0; ``stress`` N/A; ``utilisation``, |stress| over the strength, NaN where
-    that is not given; ``euler``, the load under which a column buckles, and ``euler_over``, that over the
-    thrust, NaN without one; ``slack``, whether it is a stay that would be pressed and is left out;
-    ``left_x``, …, the force that the bars at the point leave to others.
-    """
+    """A row per case and bar, from the reactions (n,3) in each case. Columns: ``case``, ``member``, ``kind``,
+    column or stay; ``x``, ``y``, ``z`` of the point that it holds; ``length``; ``N``, tension above 0;
+    ``stress`` N/A; ``utilisation``, |stress| over the strength, NaN where that is not given; ``euler``, the
+    load under which a column buckles, and ``euler_over``, that over the thrust, NaN without one; ``slack``,
+    whether it is a stay that would be pressed and is left out; ``left_x``, …, the force that the bars at the
+    point leave to others."""
     rows = list[list[object]]()
     for (case, reactions), (vertex, own) in product(cases, at_points(model.bars).items()):
         directions, force = np.array([bar.direction for bar in own]), reactions[vertex]

@@ -157,11 +157,8 @@ class FrameForces:
     def within(self, chain: Ints, closed: bool = False) -> Floats:
         """(k,6) along bars (c,), each from where the one before ends, at their k points: N, tension above 0;
         the shear forces upright and across; the torque; the moments upright, above 0 with tension below, and
-        across. V = dM/ds.
-
-        Moments are those at the points; the other forces jump there, as loads do: the mean is taken, and at
-        ends the line through the two nearest bars.
-        """
+        across. V = dM/ds. Moments are those at the points; the other forces jump there, as loads do: the mean
+        is taken, and at ends the line through the two nearest bars."""
         columns, signs = [0, 2, 1, 3, 4, 5], [1.0, -1.0, -1.0, 1.0, -1.0, 1.0]
         first, last = -self.ends[chain, :6][:, columns] * signs, self.ends[chain, 6:][:, columns] * signs
         middle, before, after = 0.5 * (first + last)[:, :4], last[:, 4:], first[:, 4:]

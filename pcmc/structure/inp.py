@@ -58,8 +58,7 @@ def text_of(
 ) -> str:
     """The input file of a model under these steps, the form-finding load first; with ``every`` it prints the
     results of each increment, and writes none for viewers. A length of 1 in the file is ``unit`` in the
-    model.
-    """
+    model."""
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
     heading = "pcmc structural model", certificate.mark or mark, certificate.verdict.value
     text = [f"*HEADING\n{'; '.join(filter(None, heading))}\n" + (f"** {model.note}\n" if model.note else "")]
@@ -134,11 +133,9 @@ def _beams(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
 
 
 def _ties(model: StructuralModel, number: Ints) -> Iterator[str]:
-    """What ties the nodes of members to those of the sheets, and holds their ends.
-
-    Where membranes and beams, or shells and cables, share nodes, the constraints that CalculiX makes for
-    them contradict each other from one increment to the next, or it stops with "code 255".
-    """
+    """What ties the nodes of members to those of the sheets, and holds their ends. Where membranes and beams,
+    or shells and cables, share nodes, the constraints that CalculiX makes for them contradict each other from
+    one increment to the next, or it stops with "code 255"."""
     turns = held_turns(model, model.standing.vertices)
     for v, node in zip(model.tied.tolist(), number[model.tied].tolist(), strict=True):
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]

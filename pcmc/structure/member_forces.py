@@ -205,10 +205,9 @@ def supports_with_members(results: StepResults) -> pd.DataFrame:
 def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
-    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a
-    row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
-    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``.
-    """
+    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a row per
+    case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
+    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
     rows, along = list[dict[str, object]](), [pd.DataFrame()]
     for case, beam in ((case, beam) for case, beams in cases for beam in beams):
         about, moved = {"case": case, "member": beam.line.name}, np.linalg.norm(beam.displacements, axis=1)

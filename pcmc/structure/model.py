@@ -49,8 +49,7 @@ class StructuralModel:
     Parameters
     ----------
     surface : a certified surface, or the result of a solver.
-    material : of all patches, or one for each, by name.
-    thickness : t > 0, length, or one for each patch, by name.
+    material, thickness : of all patches, or one for each, by name; t > 0, length.
     loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
         the first step and acts in all others, too, as self-weight does once it has come.
     anyway : accept a surface that is not certified; the file's heading then names its verdict.
@@ -58,14 +57,13 @@ class StructuralModel:
         stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
     cable_material, certificate : by default those of the patches, and the one of the surface.
-    units : of the numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it is not
-        given. Without a unit of length that takes metres.
-    combinations : sums of the loads with factors: by the name of each combination the factors by the names
-        of the steps, and "form" for the form-finding load, such as {"uls": {"form": 1, "snow": 1.5}}. Each
-        is one more step. The form-finding load and self-weight have the factor 1 where they are not named.
+    units : of the numbers; without a unit of length the gravity of ``SelfWeight`` takes metres.
+    combinations : of each, by name, factors by the names of the steps, and of "form" for the form-finding
+        load, such as {"uls": {"form": 1, "snow": 1.5}}: one more step each. The form-finding load and
+        self-weight have the factor 1 where they are not named.
     gas : what is enclosed and changes its pressure with its volume; see ``Gas``. ``analyse`` finds it.
-    members : beams and cables in the place of walls, along edges, or with a profile for a cable of the
-        surface; see ``Member``. A wall with a member is left out of the model. Columns and stays, too.
+    members : beams and cables in the place of walls, which the model leaves out, along edges, or with a
+        profile for a cable of the surface; columns and stays; see ``Member``.
 
     Raises
     ------
@@ -175,8 +173,7 @@ class StructuralModel:
     @cached_array
     def prestress(self) -> Floats:
         """(e,) the membrane stress of each element under the form-finding load, force/area: α/t, with a
-        weight w per area (α + w z)/t, z the height of the middle above Π, as E = ∫ (α + w z) dA has it.
-        """
+        weight w per area (α + w z)/t, z the height of the middle above Π, as E = ∫ (α + w z) dA has it."""
         s, patch = self.standing, self.standing.patch_of_face[self.active]
         return effective_tensions(s, s.vertices, s.faces[self.active], patch) / self.thicknesses[patch]
 
@@ -318,8 +315,7 @@ class StructuralModel:
     @cached_array
     def axes(self) -> Floats:
         """(n,3,3) rows: the axes in which supports hold a vertex. On a plane the first is its normal, held;
-        along a line it is the line, and the others are held.
-        """
+        along a line it is the line, and the others are held."""
         axes = np.tile(np.eye(3), (self.surface.n, 1, 1))
         guided = np.flatnonzero(self.held & (self.freedom > 0))
         along = self.allowed[guided]
@@ -337,8 +333,7 @@ class StructuralModel:
 
     def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
         """(n,3) the loads of a step as forces on the vertices: thirds of triangles', halves of cable edges';
-        ``displacements`` (n,3) turn the pressures with the surface.
-        """
+        ``displacements`` (n,3) turn the pressures with the surface."""
         s, down = self.standing, -np.array(self.standing.plane.normal)
         X = s.vertices if displacements is None else s.vertices + displacements
         density = np.array([material.density for material in self.materials])
