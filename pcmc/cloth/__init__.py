@@ -10,12 +10,12 @@ from .sheets import pattern_drawings
 from .strips import CuttingPattern, Seam, Side, Strip
 
 __all__ = [
-    "CuttingPattern",
     "CuttingOptions",
+    "CuttingPattern",
     "Seam",
     "Side",
     "Strip",
     "cutting_pattern",
-    "pattern_drawings",
     "cutting_pattern_of",
 ]
+__all__ += ["pattern_drawings"]

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -33,21 +34,13 @@ NARROWER = 0.98  # of the width square to x or y: another direction must do bett
 
 @dataclass(frozen=True, eq=False)
 class CutMesh:
-    """The sheets of a roof, with the edges that are cut.
+    """The sheets of a roof, with the edges that are cut."""
 
-    Attributes
-    ----------
-    X, F : (n,3) vertices and (m,3) triangles.
-    source : (m,) the face of the surface that each triangle is a part of.
-    cuts : (c,2) edges along which the cloth is cut, each row ascending.
-    seam : (c,) the number of the seam on each, -1 for the curves of the roof.
-    """
-
-    X: Floats
-    F: Ints
-    source: Ints
-    cuts: Ints
-    seam: Ints
+    X: Floats  # (n,3)
+    F: Ints  # (m,3)
+    source: Ints  # (m,) the face of the surface that each triangle is a part of
+    cuts: Ints  # (c,2) edges along which the cloth is cut, each row ascending
+    seam: Ints  # (c,) the number of the seam on each, -1 for the curves of the roof
 
     @cached_property
     def topology(self) -> Topology:
@@ -183,8 +176,7 @@ class CutMesh:
         return replace(mesh, cuts=cuts, seam=np.append(mesh.seam, np.full(len(pairs), number)))
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(NamedTuple):
     """The pieces of a cut mesh: vertices on a cut are there once for each piece beside it."""
 
     faces: Ints  # (m,3) the triangles of the mesh, of vertices of pieces

@@ -46,13 +46,10 @@ def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
     >>> joints(X, np.array([[0, 1, 2], [1, 0, 3]]), np.array([[1, 2, 0], [3, 4, 0]])).dihedral.tolist()
     [135.0, nan, nan, nan, nan]
     """
-    sides = edge_of_face.ravel()
-    order = np.argsort(sides, kind="stable")
-    edge = sides[order]
-    start = np.flatnonzero(np.append(True, edge[1:] != edge[:-1]))
-    count = np.diff(np.append(start, len(edge)))
-    lead = np.repeat(start, count)  # the first triangle at each edge: angles are seen from it
-    face, side = order // 3, order % 3
+    order = np.argsort(edge_of_face.ravel(), kind="stable")
+    edge, face, side = edge_of_face.ravel()[order], order // 3, order % 3
+    _, start, group, count = np.unique(edge, return_index=True, return_inverse=True, return_counts=True)
+    lead = start[group]  # the first triangle at each edge: angles are seen from it
     along, normal = edge_vectors(X[F])[face, side], area_vectors(X[F])[face]
     both = np.stack([np.cross(normal, along), normal])
     inward, normal = both / np.maximum(np.linalg.norm(both, axis=2), 1e-300)[..., None]
@@ -61,11 +58,10 @@ def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
     angle[start] = 0.0
     turn = np.lexsort((angle, edge))
     edge, face, angle = edge[turn], face[turn], angle[turn]
-    after = np.arange(len(edge)) + 1
-    last = start + count - 1
+    after, last = np.arange(len(edge)) + 1, start + count - 1
     after[last] = start
     between = (angle[after] - angle) % 360.0
-    between[count.repeat(count) == 1] = np.nan
+    between[count[group] == 1] = np.nan
     second = np.where(np.isnan(between), -1, face[after])
     once = np.ones(len(edge), dtype=bool)
     once[last[count == 2]] = False  # two triangles are one pair
@@ -114,14 +110,10 @@ def _beside(row: list[tuple[float, Floats]], panel: Floats) -> Floats:
 
 def _reach(triangle: Floats, levels: Floats) -> Floats:
     """(2,k) the least and the largest x of a triangle at each level y."""
-    x = []
-    for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-        low, high = sorted((a, b), key=lambda point: float(point[1]))
-        inside = (levels >= low[1]) & (levels <= high[1])
-        rise = high[1] - low[1]
-        share = (levels - low[1]) / rise if rise > 0.0 else np.zeros_like(levels)
-        at = low[0] + share * (high[0] - low[0])
-        x += [np.where(inside, at, np.nan), np.where(inside & (rise == 0.0), high[0], np.nan)]
+    (a, b), (c, d) = (points.T[..., None] for points in (triangle, np.roll(triangle, -1, axis=0)))
+    share = (levels - b) / np.where(d == b, np.nan, d - b)
+    sides = np.where((share >= 0.0) & (share <= 1.0), a + share * (c - a), np.nan)
+    x = np.concatenate([sides, np.where(levels == b, a, np.nan)])  # where a corner is, also of a level side
     return np.stack([np.nanmin(x, axis=0), np.nanmax(x, axis=0)])
 
 

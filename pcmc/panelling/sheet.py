@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_array, eye_array, vstack
@@ -95,17 +95,10 @@ def sheets_of(surface: Surface) -> list[tuple[int, Ints, SheetMesh]]:
     return found
 
 
-class Directions(NamedTuple):
-    """The principal directions of each triangle, as complex numbers in its frame. ``w`` = (κ₁ - κ₂)/2
-    e^{2iφ}, with φ the angle of the direction of κ₁ from the first vector of the frame."""
-
-    frame: Floats  # (m,2,3) orthonormal vectors in each triangle's plane, counter-clockwise from outside
-    w: Floats  # (m,) complex, 1/length
-    tensors: Floats  # (n,3,3) shape operators at the vertices, 1/length
-
-
-def principal_directions(X: Floats, F: Ints) -> Directions:
-    """The principal directions of a sheet's triangles F (m,3), from cubics fitted around vertices X (n,3).
+def principal_directions(X: Floats, F: Ints) -> tuple[Floats, Floats, Floats]:
+    """Of a sheet's triangles F (m,3) the frames (m,2,3), orthonormal vectors in the plane; the principal
+    directions as complex numbers in these, w = (κ₁ - κ₂)/2 e^{2iφ} (m,), φ the angle of that of κ₁ from the
+    first vector; and ``shape_operators`` (n,3,3).
 
     On a cylinder of radius 2, κ₁ - κ₂ is 1/2 and the directions are those of the axis and around it.
 
@@ -113,7 +106,7 @@ def principal_directions(X: Floats, F: Ints) -> Directions:
     >>> X = np.column_stack([2 * np.cos(angle), 2 * np.sin(angle), height])
     >>> sides = [[k, k + 1, k + 6, k + 7] for k in range(29) if k % 6 < 5]
     >>> F = np.array(sides)[:, [[0, 1, 2], [1, 3, 2]]].reshape(-1, 3)
-    >>> np.abs(2 * principal_directions(X, F).w).round(1).max().item()
+    >>> np.abs(2 * principal_directions(X, F)[1]).round(1).max().item()
     0.5
     """
     tensors = shape_operators(X, F)
@@ -121,7 +114,7 @@ def principal_directions(X: Floats, F: Ints) -> Directions:
     first = unit_vectors(P[:, 1] - P[:, 0])
     frame = np.stack([first, np.cross(unit_vectors(area_vectors(P)), first)], axis=1)
     T = np.einsum("fai,fij,fbj->fab", frame, tensors[F].mean(axis=1), frame)
-    return Directions(frame, 0.5 * (T[:, 0, 0] - T[:, 1, 1]) + 1j * T[:, 0, 1], tensors)
+    return frame, 0.5 * (T[:, 0, 0] - T[:, 1, 1]) + 1j * T[:, 0, 1], tensors
 
 
 def shape_operators(X: Floats, F: Ints) -> Floats:
@@ -157,27 +150,27 @@ def curvature_coordinates(sheet: SheetMesh, size: float, name: str) -> tuple[Flo
     """The coordinates of a sheet; panels have about the ``size``, length. (m,3,2) u, v at the corners of
     triangles: whole numbers on lines of the net; the vertices that are umbilics; (n,) those on curves that
     are lines; (m,) degrees of the lines from the principal directions."""
-    directions = principal_directions(sheet.X, sheet.F)
-    mean = float(np.median(np.abs(np.trace(directions.tensors, axis1=1, axis2=2)))) / 2.0
-    if np.median(np.abs(directions.w)) < max(ROUND * mean, FLAT / size):
+    frame, w, tensors = principal_directions(sheet.X, sheet.F)
+    mean = float(np.median(np.abs(np.trace(tensors, axis1=1, axis2=2)))) / 2.0
+    if np.median(np.abs(w)) < max(ROUND * mean, FLAT / size):
         what = "is part of a sphere" if mean * size > FLAT else "is flat"
         text = f"patch {name!r} {what}: every point is an umbilic; choose pattern 'quads' and a direction"
         raise OptionError(text, what="pattern", found="planar-quads", expected="quads")
-    return _OpenSheet(sheet, directions).coordinates(size)
+    return _OpenSheet(sheet, frame, w).coordinates(size)
 
 
 class _OpenSheet:
     """A sheet cut open, so that the directions have one sign all over it."""
 
-    def __init__(self, sheet: SheetMesh, directions: Directions) -> None:
-        self.sheet, self.frame, m = sheet, directions.frame, len(sheet.F)
+    def __init__(self, sheet: SheetMesh, frame: Floats, w: Floats) -> None:
+        self.sheet, self.frame, m = sheet, frame, len(sheet.F)
         one, other = sheet.topology.neighbours.T
         self.f, self.g = f, g = one // 3, other // 3
         # the corners of f at the ends a, b of each inner edge, as f runs along it, and those of g there
         steps = (f, one, 1), (f, one, 2), (g, other, 2), (g, other, 1)
         self.ends = np.stack([3 * face + (side + step) % 3 for face, side, step in steps], axis=1)
         self.a, self.b = sheet.F.ravel()[self.ends[:, :2]].T
-        root, along = np.sqrt(directions.w), sheet.X[self.b] - sheet.X[self.a]
+        root, along = np.sqrt(w), sheet.X[self.b] - sheet.X[self.a]
         seen_f, seen_g = (root[face] * np.conj(_complex(self.frame[face], along)) for face in (f, g))
         same = (seen_g * np.conj(seen_f)).real > 0.0
         # at each inner vertex the index of the directions, a multiple of 1/2, from their turn at its edges
@@ -223,13 +216,10 @@ class _OpenSheet:
 
     def coordinates(self, size: float) -> tuple[Floats, Ints, Bools, Floats]:
         """Solve freely, choose the lattice, then hold umbilics, aligned curves and the cuts on it."""
-        e, place = self.cut, self.place
-        curves, _ = self.sheet.boundary()
-        along = [self._along(curve) for curve in curves]
-        lines = [[c for c, one in zip(curves, along, strict=True) if one == axis] for axis in range(2)]
+        place, corners, flip = self.place, self.ends[self.cut][:, ::-1], self.flip[self.cut]
+        lines = [[c for c in self.sheet.boundary()[0] if self._along(c) == axis] for axis in range(2)]
         # across a cut edge the difference along it is the same up to the sign
-        flip, one = self.flip[e], np.ones(len(e))
-        corners = self.ends[e][:, ::-1]
+        one = np.ones(len(flip))
         shared = self._rows(place[corners], np.stack([one, -one, -flip, flip], axis=1))
         common = [
             vstack([shared, *(self._rows(place[self._corners(c)], np.array([1.0, -1.0])) for c in mine)])
@@ -243,11 +233,9 @@ class _OpenSheet:
         umbilics = np.flatnonzero(self.index)
         corner_of = np.zeros(len(self.sheet.X), dtype=np.int64)
         corner_of[self.sheet.F.ravel()] = np.arange(place.size)
-        chains = self._chains()
-        flip = self.flip[chains]
-        pairs = place[self.ends[chains][:, [2, 0]]]
+        solved, chains = list[Floats](), self._chains()
+        flip, pairs = self.flip[chains], place[self.ends[chains][:, [2, 0]]]
         jumps = self._rows(pairs, np.stack([np.ones(len(flip)), -flip], axis=1))  # c of z → ±z + c
-        solved = []
         for axis in range(2):
             on = place[corner_of[np.append(umbilics, [c.vertices[0] for c in lines[axis]]).astype(np.int64)]]
             rest = np.where(np.arange(len(on)) < len(umbilics), 0.5, 0.0)

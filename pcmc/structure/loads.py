@@ -194,8 +194,8 @@ def step_name(together: Sequence[Load]) -> str:
 
 def check_loads(
     loads: object, surface: Surface, replaced: Sequence[str] = ()
-) -> tuple[Load | tuple[Load, ...], ...]:
-    """Loads, or tuples of them, whose patches are there; none on walls ``replaced`` by members, and none that
+) -> tuple[tuple[Load, ...], ...]:
+    """The loads of each step, whose patches are there; none on walls ``replaced`` by members, and none that
     acts downwards beside mirror planes that lean."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
@@ -213,7 +213,7 @@ def check_loads(
                 if name in replaced:
                     text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
                     raise OptionError(f"{text}; leave it out", what="loads", where=name)
-    return tuple(loads)
+    return tuple(map(acting_together, loads))
 
 
 def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) -> dict[str, dict[str, float]]:
