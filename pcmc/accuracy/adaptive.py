@@ -344,9 +344,8 @@ class _Search:
         else:  # no finer mesh has this surface: finer everywhere
             shares = face_areas(surface.vertices[surface.faces]) ** 2
         factor = SPARE * evenness(shares) * here.excess if math.isfinite(here.excess) else MOST
-        sizes = size_field(
-            surface, shares, min(np.clip(factor, LEAST, MOST) * surface.m, self.most_triangles)
-        )
+        triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
+        sizes = size_field(surface, shares, triangles)
         result = solve_once(remesh(surface, sizes, growth=GROWTH, project=self.project), **self.options)
         if result.converged or result.status is Status.STOPPED or not finer:
             return result

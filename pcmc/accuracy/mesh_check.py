@@ -274,9 +274,8 @@ def row_name(quantity: str, of: str) -> str:
 
 def _text_table(table: pd.DataFrame, units: Units) -> str:
     """Lines with as many digits as the bars let stand."""
-    lines = table[["quantity", "of"]].assign(
-        **{"on this mesh": list(map(with_bar, table.value, table.error))}
-    )
+    lines = table[["quantity", "of"]].copy()
+    lines["on this mesh"] = list(map(with_bar, table.value, table.error))
     lines["limit"] = list(map(with_bar, table.limit, table.limit_error))
     if units:
         lines["unit"] = [units.behind(dimension_of(quantity)).strip() for quantity in table.quantity]

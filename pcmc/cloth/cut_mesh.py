@@ -84,10 +84,8 @@ class CutMesh:
         roll = (np.arange(3) + turn[:, None]) % 3
         a, b, _ = np.take_along_axis(self.F[two], roll, axis=1).T
         p, q, _ = number[np.take_along_axis(place[two], roll, axis=1)].T
-        from_a, from_b = (
-            np.minimum(*(angles(X[np.stack(corners, axis=1)]).min(axis=1) for corners in pair))
-            for pair in (((q, a, p), (a, b, p)), ((q, a, b), (q, b, p)))
-        )
+        pairs = np.array([[(q, a, p), (a, b, p)], [(q, a, b), (q, b, p)]]).swapaxes(2, 3)
+        from_a, from_b = angles(X[pairs]).min(axis=(1, 3))
         first = np.zeros(len(self.F), dtype=np.int64)
         first[two] = np.where(from_b > from_a, (turn + 1) % 3, turn)
         F, source = cut_triangles(self.F, self.source, ends, number, first)

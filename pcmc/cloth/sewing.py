@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -227,10 +227,8 @@ def flattened(
         flat[free] = _least_squares(A[:, free], -(A @ flat))
         y = flat.reshape(-1, 2)
     free[pins[2::4]] = True  # the second point may move along x
-    misfit = partial(
-        _misfit, F=F, gradient=gradient, root=root, seams=seams, lengths=lengths, stretch=stretch
-    )
-    residual, jacobian = misfit(y)
+    about = F, gradient, root, seams, lengths, stretch
+    residual, jacobian = _misfit(y, *about)
     size = float(np.ptp(X, axis=0).max())
     for _ in range(ROUNDS):
         step = np.zeros(len(free))
@@ -238,7 +236,7 @@ def flattened(
         part, before = 1.0, float(residual @ residual)
         while True:
             moved = y + part * step.reshape(-1, 2)
-            residual, jacobian = misfit(moved)
+            residual, jacobian = _misfit(moved, *about)
             if residual @ residual <= before or part < SHORTEST:
                 break
             part *= 0.5

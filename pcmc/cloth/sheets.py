@@ -112,15 +112,9 @@ def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
     texts = [(seen(at)[:2], str(strip.number), np.zeros(2)) for strip, at in _middles(pattern)]
     every = np.concatenate([line.points for line in lines])
     x, y = np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
+    views = [DrawnView("roof", lines, texts, stations=(x, y))]
     decimals = length_decimals(length, pattern.surface.size)
-    return placed(
-        [DrawnView("roof", lines, texts, stations=(x, y))],
-        title,
-        sheet,
-        length_factor(length, "mm"),
-        None,
-        decimals,
-    )
+    return placed(views, title, sheet, length_factor(length, "mm"), None, decimals)
 
 
 def _inside(strip: Strip) -> Floats:

@@ -43,10 +43,8 @@ class Film:
         name = [repr(patch.name) for patch in surface.patches]
         (a, c), (b, d) = self.one_side, self.other_side
         if surface.walls[self.patch]:
-            beside = [
-                {k for curve in surface.topology.junctions if s in curve.sheets for k in curve.sheets}
-                for s in (a, b, c, d)
-            ]
+            sheets = [curve.sheets for curve in surface.topology.junctions]
+            beside = [{k for own in sheets if s in own for k in own} for s in (a, b, c, d)]
             ends = [{k for k in one & other if surface.roof[k]} for one, other in (beside[:2], beside[2:])]
             if [len(end) for end in ends] == [1, 1]:
                 return f"{name[ends[0].pop()]} and {name[ends[1].pop()]} {when} meet"
@@ -58,21 +56,17 @@ def film_of(surface: Surface, patch: int) -> Film | None:
     A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones."""
     topo, original = surface.topology, surface.original
     curves = [curve for curve in topo.junctions if patch in curve.sheets]
-    lengths = [
-        float(segment_lengths(surface.vertices, topo.sides[topo.edge_numbers(curve.pairs)]).sum())
-        for curve in curves
-    ]
+    edges = [topo.sides[topo.edge_numbers(curve.pairs)] for curve in curves]
+    lengths = [float(segment_lengths(surface.vertices, own).sum()) for own in edges]
     ends = [set() if curve.closed else {int(v) for v in curve.vertices[[0, -1]]} for curve in curves]
     found = list[tuple[float, int, int]]()
     for i, j in combinations(range(len(curves)), 2):
         one, other = curves[i], curves[j]
         rest = [k for k in range(len(curves)) if k not in (i, j)]
         around = {k for curve in (one, other) for k in curve.sheets} - {patch}
-        if (
-            (one.closed, len(one.sheets), len(other.sheets), len(around)) == (other.closed, 3, 3, 4)
-            and all(len(ends[k] & ends[i]) == len(ends[k] & ends[j]) == 1 for k in rest)
-            and surface.fixed[original[sorted(ends[i] & ends[j])]].all()
-        ):
+        strip = (one.closed, len(one.sheets), len(other.sheets), len(around)) == (other.closed, 3, 3, 4)
+        strip = strip and all(len(ends[k] & ends[i]) == len(ends[k] & ends[j]) == 1 for k in rest)
+        if strip and surface.fixed[original[sorted(ends[i] & ends[j])]].all():
             found.append((sum(lengths[k] for k in rest), i, j))
     if not found:
         return None
@@ -103,11 +97,11 @@ def _across(surface: Surface, one: EdgeCurve, other: EdgeCurve) -> tuple[Ints, f
         if one.closed:
             start = np.broadcast_to(one.vertices[0], len(way))
             way = np.roll(way, -int(apart(np.stack([start, way], axis=1)).argmin()))
-        places = [
-            np.arange(count) * len(v) // count if one.closed else np.rint(np.linspace(0, len(v) - 1, count))
-            for v in (one.vertices, way)
-        ]
-        rows.append(np.stack([one.vertices[places[0].astype(int)], way[places[1].astype(int)]], axis=1))
+        row = list[Ints]()
+        for v in (one.vertices, way):
+            ends = np.rint(np.linspace(0, len(v) - 1, count)).astype(int)
+            row.append(v[np.arange(count) * len(v) // count if one.closed else ends])
+        rows.append(np.stack(row, axis=1))
     pairs = min(rows, key=lambda row: float(apart(row).sum()))
     return pairs, float(apart(pairs).mean())
 

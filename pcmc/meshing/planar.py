@@ -84,10 +84,8 @@ def triangulate(
                 X = np.concatenate([X, _additions(mesh, segments, fixed, spacing, edge_length)])
         else:
             area = np.abs(signed_areas(X, T))[:, None]
-            sums = vertex_sums(
-                area * np.pad(X[T].mean(axis=1), ((0, 0), (0, 1)), constant_values=1.0), T, len(X)
-            )
-            X = np.concatenate([fixed, sums[len(fixed) :, :2] / sums[len(fixed) :, 2:]])
+            sums = vertex_sums(np.hstack([area * X[T].mean(axis=1), area]), T, len(X))[len(fixed) :]
+            X = np.concatenate([fixed, sums[:, :2] / sums[:, 2:]])
         mesh = _inside(X, segments, holes, len(fixed))
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])

@@ -179,10 +179,10 @@ class _Builder:
         for bad in np.flatnonzero(low)[:1]:
             vertex, at = int(top.vertices[bad]), self.local[top.vertices[bad]].round(6).tolist()
             text = f"no room for a wall under vertex {vertex}, {height[bad]:.3g} above the wall's bottom, at"
-            text += (
-                f" {at} ({low.sum()} such vertices); raise it, or use shorter edges if both ends of the wall"
+            text += f" {at} ({low.sum()} such vertices); raise it, or use shorter edges if both ends of the"
+            raise SurfaceError(
+                f"{text} wall are held", what="vertices", where=vertex, found=float(height[bad])
             )
-            raise SurfaceError(f"{text} are held", what="vertices", where=vertex, found=float(height[bad]))
 
     def line(self, vertex: int, supported: set[int]) -> list[int]:
         """Vertices of the vertical line under a vertex, from the foot up to the vertex itself."""

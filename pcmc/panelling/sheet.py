@@ -78,13 +78,9 @@ class SheetMesh:
 
 def sheets_of(surface: Surface) -> list[tuple[int, Ints, SheetMesh]]:
     """The connected parts of the patches that are no walls: patch, triangles in the surface, sheet."""
-    topo, found, beside = (
-        surface.topology,
-        list[tuple[int, Ints, SheetMesh]](),
-        surface.topology.neighbours // 3,
-    )
-    one, other = surface.patch_of_face[beside].T
-    part = components(beside[one == other], surface.m)
+    topo, found = surface.topology, list[tuple[int, Ints, SheetMesh]]()
+    beside = topo.neighbours // 3
+    part = components(beside[np.equal(*surface.patch_of_face[beside].T)], surface.m)
     for faces in (np.flatnonzero(part == number) for number in np.unique(part)):
         patch = int(surface.patch_of_face[faces[0]])
         if surface.roof[patch]:
@@ -221,10 +217,8 @@ class _OpenSheet:
         # across a cut edge the difference along it is the same up to the sign
         one = np.ones(len(flip))
         shared = self._rows(place[corners], np.stack([one, -one, -flip, flip], axis=1))
-        common = [
-            vstack([shared, *(self._rows(place[self._corners(c)], np.array([1.0, -1.0])) for c in mine)])
-            for mine in lines
-        ]
+        level = [[self._rows(place[self._corners(c)], np.array([1.0, -1.0])) for c in own] for own in lines]
+        common = [vstack([shared, *rows]) for rows in level]
         parts = [self.root, 1j * self.root]
         free = [self._solve(part, rows) for part, rows in zip(parts, common, strict=True)]
         image = (free[0] + 1j * free[1])[place].reshape(-1, 3)

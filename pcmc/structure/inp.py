@@ -79,9 +79,8 @@ def text_of(
     text.append("*INITIAL CONDITIONS, TYPE=STRESS\n")
     for elements, stress, points in prestress:  # a line for each integration point
         tensors = unit**2 * np.repeat(stress[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], points, axis=0)
-        text.append(
-            _rows(np.repeat(elements, points), np.tile(np.arange(points), len(elements)) + 1, tensors)
-        )
+        point = np.tile(np.arange(points), len(elements)) + 1
+        text.append(_rows(np.repeat(elements, points), point, tensors))
     return "".join(chain(text, *(_step(model, step, k == 0, every, unit) for k, step in enumerate(steps))))
 
 

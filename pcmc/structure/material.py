@@ -84,9 +84,8 @@ class Profile:
 
     def __post_init__(self) -> None:
         for name in ("area", "upright", "sideways"):
-            vars(self)[name] = _size(
-                name, self.upright if getattr(self, name) is None else getattr(self, name)
-            )
+            value = self.upright if getattr(self, name) is None else getattr(self, name)
+            vars(self)[name] = _size(name, value)
 
     @classmethod
     def rectangle(cls, width: float, height: float) -> Profile:

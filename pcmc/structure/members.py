@@ -262,17 +262,16 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
             raise OptionError(text, what="members", where=member.label)
     else:
         parts = re.compile(re.escape(str(member.on)) + r"(-\d+)?( \(\d+\))?")
-        walls = [
-            k for k in np.flatnonzero(surface.walls).tolist() if parts.fullmatch(surface.patches[k].name)
-        ]
+        every = [(k, surface.patches[k].name) for k in np.flatnonzero(surface.walls).tolist()]
+        walls = [(name, k) for k, name in every if parts.fullmatch(name)]
         if not walls:
-            known = [surface.patches[k].name for k in np.flatnonzero(surface.walls)]
+            known = [name for _, name in every]
             text = unknown("wall or cable", member.on, [*known, *(cable.name for cable in surface.cables)])
             if member.on in [patch.name for patch in surface.patches]:
                 text = f"{member.on!r} is no wall; it stands in the place of one"
             text = f"member {member.label!r}: {text}; a divider needs a wall to have a member"
             raise OptionError(text, what="members", found=member.on)
-        found = [(surface.patches[k].name, _top(surface, k)) for k in walls]
+        found = [(name, _top(surface, k)) for name, k in walls]
     curves = [(wall, curve) for wall, edges in found for curve in surface.topology.curves_among(edges)]
     for number, (wall, curve) in enumerate(curves, 1):
         name = member.label if len(curves) == 1 else f"{member.label}-{number}"
@@ -283,9 +282,8 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
 def _top(surface: Surface, wall: int) -> Bools:
     """(e,) the edges of a wall where sheets of the roof meet; OptionError where it rests on Π."""
     topo, mine = surface.topology, surface.patch_of_face == wall
-    sheets = np.bincount(
-        topo.edge_of_face[surface.roof[surface.patch_of_face]].ravel(), None, len(topo.edges)
-    )
+    roof = topo.edge_of_face[surface.roof[surface.patch_of_face]]
+    sheets = np.bincount(roof.ravel(), minlength=len(topo.edges))
     top: Bools = np.isin(np.arange(len(topo.edges)), topo.edge_of_face[mine]) & (sheets >= 2)
     name, standing = surface.patches[wall].name, standing_part(surface)
     if not top.any() or (standing.surface.patch_of_face == wall).sum() < mine.sum():

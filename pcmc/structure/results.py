@@ -183,14 +183,10 @@ def _check_strain(step: Step, what: str, left: Floats) -> None:
 def _taut(model: StructuralModel, k: int, tables: list[Tables]) -> float:
     """The time in step k at which the first face gets slack, by lines through the least principal stress at
     the increments, from the end of the step before on; 1 if none does."""
-    X, F, least = (
-        model.standing.vertices.copy(),
-        model.standing.faces[model.active],
-        list[tuple[float, float]](),
-    )
+    X, F = model.standing.vertices.copy(), model.standing.faces[model.active]
     before = tables[k - 1] if k else {}
     both = [before.get(kind, [])[-1:] + tables[k][kind] for kind in ("displacements", "stresses")]
-    least += [] if k else [(0.0, float(model.prestress.min()))]
+    least = [] if k else [(0.0, float(model.prestress.min()))]
     for moved, block in zip(*both, strict=True):
         X[moved.ids - 1] = model.standing.vertices[moved.ids - 1] + moved.values
         least.append((block.time - k, float(_in_planes(X[F], block.tensors(model.faces + 1)).min())))
@@ -265,10 +261,9 @@ def read_tables(text: str, unit: float = 1.0) -> list[Tables]:
     for head, end in zip(heads, [*(head.start() for head in heads[1:]), len(text)], strict=True):
         kind, line = head[1], text.count("\n", 0, head.start()) + 1
         if kind in KEYS:
-            body = EXPONENT.sub(
-                r"E\1", re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])
-            )  # no names of axes
-            rows = _numbers(body.split(), 8 if kind == "stresses" else 4, kind, line)
+            body = re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])  # names of local axes
+            words = EXPONENT.sub(r"E\1", body).split()
+            rows = _numbers(words, 8 if kind == "stresses" else 4, kind, line)
             rows = rows[np.argsort(rows[:, 0], kind="stable")]
             time = float(_numbers([head[4]], 1, "time", line)[0, 0])
             number = max(math.ceil(time - WHOLE), 1)
