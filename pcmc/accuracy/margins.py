@@ -1,4 +1,13 @@
-"""``margin``: how far an equilibrium is from the edge, what ends its stability, with an error bar."""
+"""``margin``: how far an equilibrium is from the edge, what ends its stability, with an error bar.
+
+As a target its slopes by tensions and loads have a closed form. At a fold the equations Bᵀ∇E = 0 have the
+left null vector φ, the mode, as they are symmetric. Along a change dμ of a tension or a load the fold moves
+so that ⟨φ, ∂∇E/∂λ⟩ dλ + ⟨φ, ∂∇E/∂μ⟩ dμ = 0, whatever the shape:
+
+    dλ/dμ = - ⟨φ, ∂∇E/∂μ⟩ / ⟨φ, ∂∇E/∂λ⟩
+
+(Govaerts 2000, ch. 4). A number that λ multiplies changes its ∂μ by λ, too.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -14,16 +23,18 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import PcmcError, SurfaceError
-from ..base.tolerances import EVENT_ACCURACY
+from ..base.errors import OptionError, PcmcError, SurfaceError
+from ..base.tolerances import AT_REST, EVENT_ACCURACY
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict, certify
 from ..certificate.balance import pressures_left_over
 from ..certificate.certificate import certified
 from ..certificate.diagnosis import worst_face
+from ..certificate.measures import Measurement
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
 from ..forces.cables import heavy_cable_pulls
+from ..forces.functional import gradient_by
 from ..forces.pinching import standing_part
 from ..forces.triangles import heavy_triangle_pulls
 from ..solvers import solve_once
@@ -337,3 +348,37 @@ def _where(end: End, mode: Floats) -> str:
     names = " | ".join(surface.patches[k].name for k in near[:3]) + " …" * (len(near) > 3)
     part = f"the junction {names}" if len(near) > 1 else repr(surface.patches[near[0]].name)
     return f"{part} sways to one side, most near {point_text(surface.vertices[most], surface.size)}"
+
+
+@lru_cache(maxsize=4)
+def _known(surface: Surface, what: str) -> Margin | None:
+    """Of the last surfaces, as value and slopes are asked for one after the other; None if not at rest."""
+    certificate = certify(surface)
+    at_rest = certificate.residual <= AT_REST
+    return margin(surface, what, meshes=1, certificate=certificate) if at_rest else None
+
+
+def measured_margin(surface: Surface, of: str | None) -> Measurement:
+    """The factor of ``pcmc.margin``, on this mesh alone; constant without an end, NaN if not at rest."""
+    what = of or "pressure"
+    if surface.rooms:
+        text = f"margin of {what}: as a target it needs rooms of given pressures, not volumes"
+        raise OptionError(text, what="of", found=what)
+    varied = Varied.of(surface, what)
+    if varied.unit:
+        raise OptionError(f"margin of {what}: it is 0 now, so it has no factor", what="of", found=what)
+    found, still = _known(surface, what), np.zeros_like(surface.vertices)
+    if found is None or not len(found.mode):
+        return Measurement(math.nan if found is None else found.factor, still)
+    if found.ends_by is not MarginEnd.FOLD:
+        text = f"margin of {what}: it ends by a {found.ends_by.name.lower()}, whose slopes are not known;"
+        raise OptionError(f"{text} as a target it has to end by a fold", what="of", found=what)
+    end, phi, slopes = found.surface, found.mode, dict[str, Floats]()
+    along = float((phi * varied.direction.line(end).gradient(end, end.vertices)).sum())
+    walls = {(k, p.name) for k, _ in varied.parts if varied.what == k for p in end.patches if p.wall}
+    for kind in ("tension", "pressure", "weight", "snow", "cable", "cable_weight"):
+        names = [part.name for part in (end.cables if "cable" in kind else end.patches)]
+        across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
+        multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
+        slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along
+    return Measurement(found.factor, still, slopes)
